@@ -9,8 +9,7 @@ from fembeam.model.branch import Branch
 from fembeam.model.equations import load_period
 from fembeam.model.model import Model
 from fembeam.model.orbit import Attractor, Orbit, extremes_of
-from fembeam.model.placed_shapes import PlacedShapes
 from fembeam.model.run import Run
 from fembeam.model.run_file import load
-from fembeam.model.shapes import Shapes
 from fembeam.model.watched_places import observed, places
+from fembeam.response import PlacedShapes, Shapes

@@ -18,7 +18,7 @@ import numpy as np
 import reduction
 import solvers
 from fembeam.model import initial_states
-from fembeam.model.shapes import Vector
+from fembeam.response.shapes import Vector
 from fembeam.scene import contact_rows, loads, signals_of, static_rows, support_loads, tangent, weight
 from fembeam.scene.contact_rows import ContactRow
 from fembeam.support import require

@@ -19,7 +19,7 @@ import reduction
 import solvers
 from fembeam.model import initial_states
 from fembeam.model.equations import ModalEquations
-from fembeam.model.shapes import Vector
+from fembeam.response.shapes import Vector
 from fembeam.scene import for_duration, respun, with_signals, with_value
 from fembeam.support import Part, Printed, bar, note, require, require_no_text, require_positive
 from solvers.problem import counted

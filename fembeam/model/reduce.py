@@ -12,8 +12,7 @@ from scipy import sparse
 
 import reduction
 from fembeam.model.model import Model
-from fembeam.model.placed_shapes import PlacedShapes, placed_shapes
-from fembeam.model.shapes import Shapes
+from fembeam.response import PlacedShapes, Shapes, placed_shapes
 from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, carried_on, loaded, watched
 from fembeam.structures import COMPONENTS
 from fembeam.support import is_whole, require

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.model.histories import Histories
+from fembeam.response import Histories
 from fembeam.scene import ON, Source
 from fembeam.support import Part, Printed, is_finite
 from solvers.problem import Losses, counted
@@ -21,7 +21,7 @@ from solvers.problem import Losses, counted
 if TYPE_CHECKING:
     from fembeam.model.model import Model
     from fembeam.model.sensitivity import Sensitivity
-    from fembeam.response import Reactions, Readout
+    from fembeam.response import Reactions
     from fembeam.scene_file import SceneFile
 
 Vector = NDArray[np.float64]
@@ -66,9 +66,7 @@ class Run(Histories, Printed):
     borders: Callable[[], Any] = field(repr=False)  # what `transitions` are made by
     lost: Callable[[], Losses] = field(repr=False)  # and `losses`
     model: Model | None = None
-    stored_forces: Vector | None = None  # (r, k) of a run read from a file
-    stored_means: Vector | None = None  # (m, k) likewise, over each sample
-    stored: Readout | None = None  # likewise
+    kept: Mapping[str, Any] = field(default_factory=dict, repr=False)  # of a run read from a file, see `Readout`
     others: tuple[Any, ...] = ()  # of the further beams
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
@@ -96,13 +94,6 @@ class Run(Histories, Printed):
     def energy(self) -> solvers.Energy:
         """The energy balance."""
         return self.ledger()
-
-    @cached_property
-    def readout(self) -> Readout:
-        """Loads, damping, section forces and reactions, from the model or from the file."""
-        from fembeam.response import Readout
-
-        return self.stored if self.stored is not None and self.model is None else Readout(self.model, self.t)
 
     @cached_property
     def transitions(self) -> Any:
@@ -274,34 +265,6 @@ class Run(Histories, Printed):
         from fembeam.model.run_csv import to_xarray
 
         return to_xarray(self, z)
-
-    def force(self, stop: int | str = 0, mean: bool = False) -> Vector:
-        """Contact force (k,) of a stop, N or N m, from its law and the entry rate latched at the time; of an element F.
-
-        ``stop``: its number, or its name as in ``run.force("valve")``. Of an annular stop (k, 2), its components on the
-        place along both directions; with ``mean`` the size N (k,).
-
-        ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
-        are seen: the trapezoidal rule over the samples gives impulses as exactly as the run has them, those of the log
-        to the last sample and, from sample to sample, of what always acts. Between two samples the law is evaluated on
-        a cubic to divide the impulse at their middle. ValueError for a run without samples.
-        """
-        if mean:
-            from fembeam.response import mean_force
-
-            return mean_force(self, self._stop(stop))
-        number = self._stop(stop)
-        forces = self._forces[self._rows[number]]
-        return self._at_samples(forces.T if self.circles[number, 0] else forces[0])
-
-    @cached_property
-    def _forces(self) -> Vector:
-        """Forces (r, k) on all rows of contacts."""
-        if self.stored_forces is not None:
-            return self.stored_forces
-        from fembeam.response import forces
-
-        return forces(self)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write everything to one file, whole or not at all; read it with `load`.

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from fembeam.model.placed_shapes import PlacedShapes
 from fembeam.model.watched_places import places as usual_places
-from fembeam.response import BodyReaction
+from fembeam.response import BodyReaction, PlacedShapes
 from fembeam.scene import said, unit_of
 from fembeam.support import require
 from solvers.problem import dataframe, optional

@@ -14,10 +14,8 @@ import numpy as np
 
 import solvers
 from fembeam.model import saved_arrays
-from fembeam.model.placed_shapes import PlacedShapes, tuples
 from fembeam.model.run import Run
-from fembeam.model.shapes import Shapes
-from fembeam.response import READOUT_UNITS, packed, unpacked
+from fembeam.response import READOUT_UNITS, PlacedShapes, Shapes, packed, tuples, unpacked
 from fembeam.scene import Source
 from fembeam.support import versions, written_whole
 from solvers.problem import Losses, Transitions, columns_of, optional
@@ -239,12 +237,10 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         directions=arrays["directions"],
         impactor_masses=arrays["impactor_masses"],
         scene=about["scene"],
-        stored_forces=arrays["force"],
-        stored_means=arrays["mean_force"],
         borders=partial(Transitions, *_unpacked(about["events"], arrays["transitions"]), names=names),
         lost=partial(Losses, work, stored, slip, arrays["work"], names=names),
         end=arrays["end"],
-        stored=unpacked(about["readout"], arrays, [getattr(one, "nodes", None) for one in shapes]),
+        kept=unpacked(about["readout"], arrays, [getattr(one, "nodes", None) for one in shapes]),
         others=tuple(shapes[1:]),
         source=source,
         versions=about["versions"],

@@ -17,8 +17,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.model.placed_shapes import PlacedShapes
-from fembeam.response import rows_of
+from fembeam.response import PlacedShapes, rows_of
 from fembeam.structures import FrameForces
 from fembeam.support import require
 from solvers.problem import optional

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.model.equations import load_period
-from fembeam.model.histories import directed
+from fembeam.response import directed
 from fembeam.scene import changes_structure, path_of, replaced, value_of
 from fembeam.scene.signals import is_of_signal
 from fembeam.support import Part, Printed, require

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fembeam.model.placed_shapes import PlacedShapes
+from fembeam.response import PlacedShapes
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
-    from fembeam.model.shapes import Shapes
+    from fembeam.response import Shapes
 
 
 def places(shapes: Shapes | PlacedShapes) -> dict[str, Any]:

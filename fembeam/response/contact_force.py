@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from contacts.path import renew
 
 if TYPE_CHECKING:
-    from fembeam.model import Run
+    from fembeam.response.histories import Histories
     from fembeam.scene.contact_rows import ContactRow
     from solvers.problem import Transitions
 
 Vector = NDArray[np.float64]
 
 
-def forces(run: Run) -> Vector:
+def forces(run: Histories) -> Vector:
     """Forces (r, k) of all stops and elements of a run at its samples on their rows of coordinates, N or N m."""
     found: list[Vector] = []
     for stop, contact in enumerate(run.readout.model.contact_rows):
@@ -30,7 +30,7 @@ def forces(run: Run) -> Vector:
     return np.array(found).reshape(len(found), len(run.t))
 
 
-def _force_of(run: Run, stop: int, contact: ContactRow) -> Vector:
+def _force_of(run: Histories, stop: int, contact: ContactRow) -> Vector:
     """Force (k,) of one stop or element at the samples."""
     if contact.always or contact.remembers:
         return force_at(run, stop, contact, run.t, run._deformation(stop), run._deformation_rate(stop))
@@ -45,7 +45,7 @@ def _force_of(run: Run, stop: int, contact: ContactRow) -> Vector:
     return np.asarray(contact.force(delta, run._deformation_rate(stop), entry_rate))
 
 
-def force_at(run: Run, stop: int, contact: ContactRow, t: Vector, delta: Vector, rate: Vector) -> Vector:
+def force_at(run: Histories, stop: int, contact: ContactRow, t: Vector, delta: Vector, rate: Vector) -> Vector:
     """Force of one that always acts at times t (k,), ascending, of deformations and rates there."""
     if contact.remembers:
         return _replayed(
@@ -54,7 +54,7 @@ def force_at(run: Run, stop: int, contact: ContactRow, t: Vector, delta: Vector,
     return np.asarray(contact.force(delta, rate))
 
 
-def latched_before(run: Run, time: float) -> tuple[Vector, ...]:
+def latched_before(run: Histories, time: float) -> tuple[Vector, ...]:
     """What each law has latched before a time of the run; empty without laws with memory."""
     rows, found = run.readout.model.contact_rows, []
     for stop, contact in enumerate(rows) if any(row.remembers for row in rows) else ():
@@ -67,7 +67,7 @@ def latched_before(run: Run, time: float) -> tuple[Vector, ...]:
     return tuple(found)
 
 
-def _parameters_at_start(run: Run, stop: int, law: Any) -> Vector:
+def _parameters_at_start(run: Histories, stop: int, law: Any) -> Vector:
     """The law's parameters with what it had latched when the run began."""
     parameters = np.array(law.parameters)
     if run.began:

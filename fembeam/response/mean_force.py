@@ -21,7 +21,7 @@ from fembeam.response.contact_force import force_at
 from fembeam.support import require
 
 if TYPE_CHECKING:
-    from fembeam.model import Run
+    from fembeam.response.histories import Histories
 
 Vector = NDArray[np.float64]
 Cubics = tuple[Vector, Vector, Vector]  # t, δ, δ̇ where they start and where they end (3, p), where a cell ends (p,)
@@ -30,12 +30,12 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(6)
 BLOCK = 2**17  # cubics at once, in some 100 MB
 
 
-def mean_force(run: Run, stop: int) -> Vector:
+def mean_force(run: Histories, stop: int) -> Vector:
     """Mean contact force (k,) of a stop over the cells of the samples, N; `Run.force` explains it."""
     t = run.t
     require(len(t) > 1, "the mean force needs samples", len(t), "Run.force", "give simulate a dt")
-    if run.stored_means is not None:
-        return run.stored_means[stop]
+    if run.readout.means is not None:
+        return run.readout.means[stop]
     stop %= len(run.stops)
     contact = run.readout.model.contact_rows[stop]
     edges = np.concatenate([t[:1], (t[1:] + t[:-1]) / 2, t[-1:]])
@@ -50,13 +50,13 @@ def mean_force(run: Run, stop: int) -> Vector:
     return np.asarray(impulse / np.diff(edges))
 
 
-def _missed(run: Run, stop: int, found: Vector) -> Vector:
+def _missed(run: Histories, stop: int, found: Vector) -> Vector:
     """What impulses found from sample to sample (k - 1,) lack of those of the run; 0 where it does not tell."""
     kept = run.losses.impulses
     return 0.0 * found if kept is None else np.diff(kept[:, stop]) - found
 
 
-def _of_log(run: Run, stop: int, law: Any, motion: Vector, edges: Vector) -> Vector:
+def _of_log(run: Histories, stop: int, law: Any, motion: Vector, edges: Vector) -> Vector:
     """The log's impulses in each cell (k,): of contacts within a cell whole, of others in shares."""
     log, t = run.contacts, motion[0]
     end, impulses = _to_the_last_sample(run, stop, motion)
@@ -79,7 +79,7 @@ def _of_log(run: Run, stop: int, law: Any, motion: Vector, edges: Vector) -> Vec
     return impulse
 
 
-def _to_the_last_sample(run: Run, stop: int, motion: Vector) -> tuple[Vector, Vector]:
+def _to_the_last_sample(run: Histories, stop: int, motion: Vector) -> tuple[Vector, Vector]:
     """Ends and impulses of the log's contacts, of the one under way at the last sample up to there."""
     log, (t, delta, _) = run.contacts, motion
     mine, ended = log.stop == stop, log.t_out <= t[-1]

@@ -31,7 +31,7 @@ from fembeam.support import require
 
 if TYPE_CHECKING:
     from fembeam.model.equations import ModalEquations
-    from fembeam.model.histories import Histories
+    from fembeam.response.histories import Histories
     from fembeam.scene import Matrices
 
 Vector = NDArray[np.float64]

@@ -20,7 +20,7 @@ from fembeam.support import require
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from fembeam.model import Run
+    from fembeam.response.histories import Histories
 
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -125,7 +125,7 @@ def response_spectrum(
 
 
 def floor_spectrum(
-    run: Run, z: float, omega: ArrayLike | None, zeta: ArrayLike, body: int = 0, **options: Any
+    run: Histories, z: float, omega: ArrayLike | None, zeta: ArrayLike, body: int = 0, **options: Any
 ) -> ResponseSpectrum:
     """The spectrum of the absolute acceleration at z; `Run.floor_spectrum` explains it."""
     require(len(run.t) > 1, "a floor spectrum needs output samples", len(run.t), "Run.floor_spectrum",

@@ -22,7 +22,7 @@ from scipy.sparse import linalg as sparse_linalg
 import reduction
 from fembeam.beams import bending_root, hermite_rows
 from fembeam.response.body_reactions import BodyHeld
-from fembeam.response.readout import coordinates
+from fembeam.response.histories import coordinates
 from fembeam.scene import BodyMatrices, Spring, contact_rows, loads, support_loads, told, unsupported
 from fembeam.structures import COMPONENTS
 from fembeam.support import Part, Printed, is_finite, is_whole, require
@@ -30,7 +30,8 @@ from fembeam.support import Part, Printed, is_finite, is_whole, require
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from fembeam.model import Model, Run
+    from fembeam.model import Model
+    from fembeam.response.histories import Histories
     from fembeam.scene import Matrices, Scene
 
 Vector = NDArray[np.float64]
@@ -156,7 +157,7 @@ class Reactions(Printed):
         return np.asarray(sum(one.force for one in self))
 
 
-def reactions(run: Run) -> Reactions:
+def reactions(run: Histories) -> Reactions:
     """The reactions at the samples; `Run.reactions` explains them."""
     parts, rows = run.readout.reactions
     q_dot = run._at_samples(run.q_dot)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 import solvers
 from fembeam.model import Model, Run, load_period
-from fembeam.response import Readout, latched_before
+from fembeam.response import latched_before
 from fembeam.scene import Scene, signals_of
 from fembeam.study.quantities import Quantity, label
 from fembeam.study.realisations import child, renewed
@@ -175,14 +175,13 @@ def cut(run: Run, start: float, end: float) -> Run:
     else:
         kept = slice(int(np.searchsorted(run.t, start - half)), int(np.searchsorted(run.t, end + half)))
         t = run.t[kept] - start
-    part = replace(
+    return replace(
         run, t=t, q=run.q[kept], q_dot=run.q_dot[kept],
         contacts=solvers.ContactLog(**columns, names=log.names), ledger=partial(_ledger_of, run, kept),
         lost=lambda: run.losses.part(kept), borders=partial(_passed, run, start, end),
-        began=latched_before(run, start), stored_forces=run._forces[:, kept],
+        began=latched_before(run, start),
+        kept={"forces": run._forces[:, kept], "t": run.t[kept]},  # signals have the times of the run
     )  # fmt: skip
-    part.__dict__["readout"] = Readout(run.model, run.t[kept])  # signals have the times of the run
-    return part
 
 
 def _passed(run: Run, start: float, end: float) -> Any:

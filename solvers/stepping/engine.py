@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,7 @@ class Engine:
     def __init__(self, method: Any, system: System, z: Array, forcing: Forcing, duration: float) -> None:
         self.method, self.duration, self.system = method, duration, system
         self.problem = problem_of(system, forcing)
-        self.back, self.loop = system.blocks.T, march_of(isinstance(self.problem, PlanarProblem))
+        self.back = system.blocks.T
         if method.events == HENON:
             self.problem.knots[:, 1:] = math.inf  # kinks are not looked for
         self.state: State = new_state(z, len(system.contacts), sum(c.friction is not None for c in system.contacts))
@@ -57,13 +58,15 @@ class Engine:
         self.atol = absolute_tolerance(method, self.problem, z, fastest)
         if not method.adaptive:
             self.state.now[[H_FLIGHT, H_CONTACT]] = method.steps
+        self.rate, loop = rhs, march_of(isinstance(self.problem, PlanarProblem))
+        self.loop: Any = partial(loop, method.step)
 
     def start(self, log: Array) -> None:
         """Find the segment of every stop and evaluate the first rate."""
         state = self.state
         begin_contacts(self.problem, state)
         log_begin(self.problem, state, log)
-        state.count[CALLS] += rhs(
+        state.count[CALLS] += self.rate(
             *(self.problem, 0.0, state.x, state.segment, state.entry_rate, state.rate, self.space.work[0])
         )
 
@@ -76,10 +79,9 @@ class Engine:
         method = self.method
         if self.state.now[T] == 0.0 and not np.isfinite(self.state.rate).all():
             return LAW_NOT_FINITE  # loads and starts were looked at before
-        dt_flight, dt_contact = (math.inf, math.inf) if method.adaptive else method.steps
+        steps = (math.inf, math.inf) if method.adaptive else method.steps
         code = self.loop(
-            *(method.step, self.problem, self.state, self.space, self.duration, budget),
-            *(dt_flight, dt_contact, method.rtol, self.atol),
+            *(self.problem, self.state, self.space, self.duration, budget, steps, (method.rtol, self.atol)),
             *(method.adaptive, method.events, log, out, due),
         )
         return GAINED if code in (DONE, RUNNING) and self._gained() else code

@@ -35,6 +35,15 @@ IGNORED, HENON, LOCATED = range(3)
 """What a method does about events: pieces follow at the end of a step; Hénon's step onto an entry; all located."""
 
 
+@kernel
+def in_contact(segment):
+    """How many stops are in contact."""
+    count = 0
+    for s in range(segment.size):
+        count += 1 if segment[s] > 0 else 0
+    return count
+
+
 @inner
 def polynomial(coefficients, theta):
     """Value at θ of the nested form; coefficients (δ₀, r₀ ... r₆)."""

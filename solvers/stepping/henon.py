@@ -27,7 +27,7 @@ from solvers.stepping.events import HENON
 from solvers.stepping.stability import Radius, taylor_radius
 
 
-@inner
+@kernel
 def hermite(h, x, rate, x_new, rate_new, dense):
     """Dense output of a step that has only its ends: the cubic Hermite interpolant."""
     for i in range(x.size):

@@ -57,6 +57,7 @@ from solvers.stepping.events import (
     point_at,
     rate_at,
 )
+from solvers.stepping.shared import shared
 
 SWITCHED = -1  # beside the status codes: an event has changed the right-hand side
 
@@ -180,7 +181,13 @@ def landing_tolerance(problem, state, stop):
     return 4.0 * surface_tolerance(problem, stop, state.x)
 
 
-@inner
+@kernel
+def _past(problem, stop, direction, level, x):
+    """How far a state is beyond a level, and how fast that grows."""
+    return direction * (indentation(problem, stop, x) - level), direction * indentation_rate(problem, stop, x)
+
+
+@shared
 def land(step, problem, state, space, h, longest, stop, direction, level, border, rtol, atol):
     """Repeat the step with the duration that ends on ``level``, or on a ``border`` that is not -1.
 
@@ -194,8 +201,7 @@ def land(step, problem, state, space, h, longest, stop, direction, level, border
             *(space.x_new, space.rate_new, space.dense, space.work, rtol, atol),
         )
         state.count[CALLS] += calls
-        distance = direction * (indentation(problem, stop, space.x_new) - level)
-        slope = direction * indentation_rate(problem, stop, space.x_new)
+        distance, slope = _past(problem, stop, direction, level, space.x_new)
         if border >= 0:
             distance, slope, tolerance = border_apart(problem, state, space, h, stop, border)
         if abs(distance) <= tolerance:
@@ -208,7 +214,7 @@ def land(step, problem, state, space, h, longest, stop, direction, level, border
     return -0.5 * longest
 
 
-@inner
+@shared
 def _if_accurate(h, error):
     """A landing of duration h, or minus the step to try: where a law bends a shorter step may be the worse one."""
     return h if error <= 1.0 else -max(0.2, 0.9 * error**-0.125) * h if np.isfinite(error) else -0.2 * h

@@ -1,6 +1,7 @@
 """The main loop of the stepping methods: try a step, look for events, locate them, accept, record.
 
-A method is one compiled ``step`` of declared signature, so a new method does not recompile the loop.
+On decoupled modes it is compiled, and a method is one compiled ``step`` of declared signature, so that a new method
+does not recompile the loop; on matrices loop and method are run as Python, see `shared`.
 """
 
 from __future__ import annotations
@@ -36,15 +37,15 @@ from solvers.compiled.state import (
     STEP_TOO_SMALL,
     State,
     T,
-    in_contact,
 )
 from solvers.problem import Array
 from solvers.stepping.borders import border_ahead, border_space, renew_border, renew_together
 from solvers.stepping.energy_gain import modal_gains
-from solvers.stepping.events import HENON, LOCATED, NONE, UNRESOLVED, entry_by_sign
+from solvers.stepping.events import HENON, LOCATED, NONE, UNRESOLVED, entry_by_sign, in_contact
 from solvers.stepping.henon import hermite
 from solvers.stepping.henon import land as henon_landing
 from solvers.stepping.located import NEAR_END, SWITCHED, accept, find, first_kink, land, look
+from solvers.stepping.shared import shared
 
 _LEAST_STEP = 1e-290  # s, at t = 0, where every step would still move the clock
 _MOST_NODES = 16.0  # of a signal on a step: a period of its fastest part has ten and more
@@ -76,15 +77,15 @@ SPACE = types.NamedTuple(
 )
 
 
-@inner
-def _renew_rate(problem, state, space):
+@shared
+def _renew(rate_of, problem, state, space):
     """Evaluate the state's rate anew, after an event."""
-    state.count[CALLS] += rhs(
+    state.count[CALLS] += rate_of(
         *(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, space.work[0])
     )
 
 
-@merged
+@shared
 def _first_event(problem, state, space, h, adaptive):
     """(θ, stop, direction, level, border) of what comes first in a step of duration h; no border: -1."""
     theta, stop, direction, level = find(problem, state, space)
@@ -140,24 +141,29 @@ def _entry_by_henon(problem, state, space, h):
     return duration, stop
 
 
-def _march(
-    step, problem, state, space, t_end, budget, dt_flight, dt_contact, rtol, atol, adaptive, events, log, out, due
+@shared
+def march(
+    step, rate_of, gained, problem, state, space, t_end, budget, steps, tolerances, adaptive, events, log, out, due
 ):
-    """Advance the state to ``t_end`` or for ``budget`` steps; returns a status code."""
-    now, count = state.now, state.count
+    """Advance the state to ``t_end`` or for ``budget`` steps; returns a status code.
+
+    ``rate_of`` writes the rate of a state as `rhs` does, ``gained`` says whether the run gains energy; ``steps`` are
+    the longest in flight and in contact, s, ``tolerances`` (rtol, atol).
+    """
+    now, count, (dt_flight, dt_contact), (rtol, atol) = state.now, state.count, steps, tolerances
     not_finite, by_hand = False, False
     nearest = 0.0  # a kink nearer than this has been reached: there rounding switches the law to and fro
     for _ in range(budget):
         # --- end of the run, and what can stop it early
         code = look(problem, state, space, t_end, log, events)
         if code == SWITCHED:
-            _renew_rate(problem, state, space)
+            _renew(rate_of, problem, state, space)
             continue
         if code != RUNNING:
             return code
 
         # --- try a step
-        phase = H_CONTACT if in_contact(state) else H_FLIGHT
+        phase = H_CONTACT if in_contact(state.segment) > 0 else H_FLIGHT
         nearest = nearest if phase == H_CONTACT else 0.0
         h = min(now[phase], dt_contact if phase == H_CONTACT else dt_flight, t_end - now[T])
         if adaptive:
@@ -181,7 +187,7 @@ def _march(
             theta, stop, direction, level, border = _first_event(problem, state, space, h, adaptive)
             if border >= 0 and theta == 0.0:  # the step begins on the border and goes across
                 renew_border(problem, state, space, stop, border, log)
-                _renew_rate(problem, state, space)
+                _renew(rate_of, problem, state, space)
                 continue
             if theta == UNRESOLVED:
                 now[phase] = h / 32.0
@@ -217,8 +223,8 @@ def _march(
         if border >= 0 and now[T] < t_end:
             renew_together(problem, state, space, h, stop, border, log)
         if stop >= 0:
-            _renew_rate(problem, state, space)
-        if modal_gains(problem, state, space):
+            _renew(rate_of, problem, state, space)
+        if gained(problem, state, space):
             return GAINED
 
         # --- adapt
@@ -229,15 +235,22 @@ def _march(
     return RUNNING
 
 
+def _march_modes(step, problem, state, space, t_end, budget, steps, tolerances, adaptive, events, log, out, due):
+    """`march` on decoupled modes."""
+    return march(
+        step, rhs, modal_gains, problem, state, space, t_end, budget, steps, tolerances, adaptive, events, log, out, due
+    )
+
+
 @lru_cache(maxsize=2)
 def march_of(planar: bool) -> Any:
     """The compiled loop for a type of problem."""
-    problem = PLANAR_PROBLEM if planar else PROBLEM
+    problem, pair = PLANAR_PROBLEM if planar else PROBLEM, types.UniTuple(REAL, 2)
     step = types.Tuple([REAL, types.int64])(
         *[problem, REAL, REAL, VECTOR, VECTOR, INTEGERS, VECTOR], *[VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL]
     )
-    known = types.FunctionType(step), problem, STATE, SPACE, REAL, types.int64, REAL, REAL
-    return entry(types.int64(*known, REAL, REAL, types.boolean, types.int64, MATRIX, MATRIX, VECTOR))(_march)
+    known = types.FunctionType(step), problem, STATE, SPACE, REAL, types.int64, pair, pair
+    return entry(types.int64(*known, types.boolean, types.int64, MATRIX, MATRIX, VECTOR))(_march_modes)
 
 
 def new_space(

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,17 +28,18 @@ from solvers.compiled.kernels import (
     add_loads,
     contact_forces,
     contact_gradient,
-    copy,
     indentation,
     indentation_rate,
-    inner,
+    inlined,
     kernel,
     rhs,
 )
 from solvers.problem import Array, System, require_step
 from solvers.stepping.constant_step import ConstantStep
 from solvers.stepping.critical_step import newmark_oscillator
+from solvers.stepping.events import in_contact
 from solvers.stepping.henon import hermite
+from solvers.stepping.shared import shared
 from solvers.stepping.stability import Radius, alpha_radius
 
 MOST_SWEEPS = 60
@@ -66,85 +68,175 @@ def contact_force(problem, s, entry_rate, delta, delta_dot, by_force, rate_by_fo
 
 
 @kernel
-def _accelerate(n, i, a, h, beta, gamma, x):
-    """Add the share of an acceleration to the end of the step."""
-    x[i] += beta * h * h * a
-    x[n + i] += gamma * h * a
+def _predict(n, h, constants, x, rate, x_new):
+    """The end of the step with (1-α_m) a₊ + α_m a = 0."""
+    beta, gamma, share = constants[2], constants[3], constants[0] / (1.0 - constants[0])
+    for i in range(n):
+        a = rate[n + i]
+        x_new[i] = x[i] + h * x[n + i] + h * h * (0.5 - beta * (1.0 + share)) * a
+        x_new[n + i] = x[n + i] + h * (1.0 - gamma * (1.0 + share)) * a
 
 
-@inner
-def _touch(problem, h, segment, entry_rate, x_new, rate_new, work):
+@kernel
+def _blend(n, constants, before, force):
+    """(1-α_f) r₊ + α_f r in place of r₊."""
+    kept, alpha_f = 1.0 - constants[1], constants[1]
+    for i in range(n, 2 * n if alpha_f != 0.0 else n):
+        force[i] = kept * force[i] + alpha_f * before[i]
+
+
+@kernel
+def _accelerate(n, h, constants, change, x_new):
+    """Add a change of a₊ to the end of the step."""
+    beta, gamma = constants[2], constants[3]
+    for i in range(n):
+        x_new[i] += beta * h * h * change[n + i]
+        x_new[n + i] += gamma * h * change[n + i]
+
+
+@kernel
+def _push(problem, s, h, entry_rate, x_new, rate_new, work):
+    """Let a stop push the end of the step until its force is that of its law there; law calls."""
+    n, row, force, reply, compliance = problem.k.size, problem.first[s], work[0], work[3], 0.0
+    beta, gamma = work[4, 2], work[4, 3]
+    for i in range(n):
+        compliance -= problem.read[row, i] * reply[n + i]
+    F, calls = contact_force(
+        *(problem, s, entry_rate, indentation(problem, s, x_new), indentation_rate(problem, s, x_new)),
+        *(beta * h * h * compliance, gamma * h * compliance, force[s], work[2]),
+    )
+    for i in range(n):
+        a = reply[n + i] * (F - force[s])
+        x_new[i] += beta * h * h * a
+        x_new[n + i] += gamma * h * a
+        rate_new[n + i] += a
+    force[s] = F
+    return calls
+
+
+@shared
+def _touch(reply, problem, h, segment, entry_rate, x_new, rate_new, work):
     """Add what the stops in contact do to the end of a step, by turns until their forces agree; law calls."""
-    n, stops, active, calls = problem.k.size, problem.law.size, 0, 0
-    force, effective, batch = work[0], work[1], work[2]
-    kept, beta, gamma = 1.0 - work[3][1], work[3][2], work[3][3]
-    for s in range(stops):
-        active += 1 if segment[s] > 0 else 0
+    active, force, calls = in_contact(segment), work[0], 0
+    if active == 0:
+        return 0
+    for s in range(problem.law.size):
         force[s] = 0.0
-    for _ in range(MOST_SWEEPS if active else 0):
+    for _ in range(MOST_SWEEPS):
         largest, change = 0.0, 0.0
-        for s in range(stops):
-            if segment[s] == 0:
-                continue
-            row, compliance = problem.first[s], 0.0
-            for i in range(n):
-                compliance -= problem.read[row, i] * kept * problem.push[row, n + i] / effective[i]
-            F, used = contact_force(
-                *(problem, s, entry_rate[s], indentation(problem, s, x_new)),
-                *(indentation_rate(problem, s, x_new), beta * h * h * compliance, gamma * h * compliance),
-                *(force[s], batch),
-            )
-            calls += used
-            for i in range(n):
-                a = kept * problem.push[row, n + i] * (F - force[s]) / effective[i]
-                _accelerate(n, i, a, h, beta, gamma, x_new)
-                rate_new[n + i] += a
-            largest, change = max(largest, abs(F)), max(change, abs(F - force[s]))
-            force[s] = F
+        for s in range(problem.law.size):
+            if segment[s] > 0:
+                before = force[s]
+                reply(problem, h, s, work)
+                calls += _push(problem, s, h, entry_rate[s], x_new, rate_new, work)
+                largest, change = max(largest, abs(force[s])), max(change, abs(force[s] - before))
         if active == 1 or change <= 1e-12 * largest:
             break
     return calls
 
 
 @kernel
-def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
-    """One step on decoupled modes; the last row of ``work`` holds (α_m, α_f, β, γ).
+def _keep(n, rate, change):
+    """The change of a₊, beside what writes its rates anew."""
+    for i in range(n, 2 * n):
+        change[i] = rate[i]
 
-    Returns (error estimate 0, law calls). ``dense`` gets the cubic Hermite interpolant.
-    """
-    n = problem.k.size
-    alpha_m, alpha_f, beta, gamma = work[3][0], work[3][1], work[3][2], work[3][3]
-    effective, kept, calls = work[1], 1.0 - alpha_f, 0
-    if alpha_f != 0.0:
-        calls += rhs(problem, t, x, segment, entry_rate, dense[0], work[2])
-    for i in range(n):  # predict
-        x_new[i] = x[i] + h * x[n + i] + h * h * (0.5 - beta) * rate[n + i]
-        x_new[n + i] = x[n + i] + h * (1.0 - gamma) * rate[n + i]
-        rate_new[i] = rate_new[n + i] = 0.0
-        effective[i] = (1.0 - alpha_m) + kept * (gamma * h * problem.c[i] + beta * h * h * problem.k[i])
-    add_loads(problem, t + h, x_new, rate_new)
-    for i in range(n):  # without contact
-        a = kept * (rate_new[n + i] - problem.c[i] * x_new[n + i] - problem.k[i] * x_new[i]) - alpha_m * rate[n + i]
-        if alpha_f != 0.0:
-            a += alpha_f * dense[0, n + i]
-        _accelerate(n, i, a / effective[i], h, beta, gamma, x_new)
-        rate_new[n + i] = a / effective[i]
-    calls += _touch(problem, h, segment, entry_rate, x_new, rate_new, work)
-    copy(rate_new[n : 2 * n], effective, n)
-    copy(x[2 * n :], x_new[2 * n :], x.size - 2 * n)
-    calls += rhs(problem, t + h, x_new, segment, entry_rate, rate_new, work[2])
-    if alpha_m != 0.0 or alpha_f != 0.0:
-        copy(effective, rate_new[n : 2 * n], n)
-    for i in range(2 * n, x.size):  # the energy balance by the trapezoidal rule
+
+@kernel
+def _finish(n, h, constants, x, rate, x_new, rate_new, change, dense):
+    """The new acceleration, the energy balance by the trapezoidal rule, the interpolant."""
+    share = constants[0] / (1.0 - constants[0])
+    for i in range(n, 2 * n):
+        rate_new[i] = change[i] - share * rate[i]
+    for i in range(2 * n, x.size):
         x_new[i] = x[i] + 0.5 * h * (rate[i] + rate_new[i])
     hermite(h, x, rate, x_new, rate_new, dense)
+
+
+@shared
+def newmark(
+    balance, flight, solve, reply, problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol
+):
+    """One step; the last row of ``work`` holds (α_m, α_f, β, γ).
+
+    ``balance`` writes r and the rates of the energy balance and returns the law calls, ``flight`` writes r without
+    contact, ``solve`` puts S⁻¹ r in place of r, all of them behind n entries; ``reply`` writes (1-α_f) S⁻¹ w of a stop
+    to ``work[3]``. Returns (error estimate 0, law calls). ``dense`` gets the cubic Hermite interpolant.
+    """
+    n, constants, calls = problem.k.size, work[4], 0
+    if constants[1] != 0.0:
+        calls += balance(problem, t, x, segment, entry_rate, dense[0], work[2])
+    _predict(n, h, constants, x, rate, x_new)
+    flight(problem, t + h, x_new, rate_new)
+    _blend(n, constants, dense[0], rate_new)
+    solve(problem, h, work, rate_new)
+    _accelerate(n, h, constants, rate_new, x_new)
+    calls += _touch(reply, problem, h, segment, entry_rate, x_new, rate_new, work)
+    _keep(n, rate_new, work[1])
+    calls += balance(problem, t + h, x_new, segment, entry_rate, rate_new, work[2])
+    _finish(n, h, constants, x, rate, x_new, rate_new, work[1], dense)
     return 0.0, calls
+
+
+# --- on decoupled modes, where M is 1 and K, C and S have diagonals only
+
+
+@inlined
+def _flight(problem, t, x, force):
+    """Loads, damping and stiffness."""
+    n = problem.k.size
+    for i in range(2 * n):
+        force[i] = 0.0
+    add_loads(problem, t, x, force)
+    for i in range(n):
+        force[n + i] = force[n + i] - problem.c[i] * x[n + i] - problem.k[i] * x[i]
+
+
+@inlined
+def _solve(problem, h, work, force):
+    """Divide by S, which is kept in ``work[1]``."""
+    n, alpha_m, kept, beta, gamma = problem.k.size, work[4, 0], 1.0 - work[4, 1], work[4, 2], work[4, 3]
+    for i in range(n):
+        work[1, i] = (1.0 - alpha_m) + kept * (gamma * h * problem.c[i] + beta * h * h * problem.k[i])
+        force[n + i] /= work[1, i]
+
+
+@inlined
+def _reply(problem, h, s, work):
+    """Divide the push of a stop by S."""
+    n, row = problem.k.size, problem.first[s]
+    for i in range(n):
+        work[3, n + i] = (1.0 - work[4, 1]) * problem.push[row, n + i] / work[1, i]
+
+
+@kernel
+def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
+    """`newmark` on decoupled modes."""
+    return newmark(
+        rhs,
+        _flight,
+        _solve,
+        _reply,
+        problem,
+        t,
+        h,
+        x,
+        rate,
+        segment,
+        entry_rate,
+        x_new,
+        rate_new,
+        dense,
+        work,
+        rtol,
+        atol,
+    )
 
 
 class _Family(ConstantStep):
     """What the methods of this module share."""
 
-    work_rows: ClassVar[int] = 4
+    work_rows: ClassVar[int] = 5
 
     @property
     def radius(self) -> Radius:
@@ -165,12 +257,9 @@ class _Family(ConstantStep):
         _, _, beta, gamma = self.constants
         return newmark_oscillator(beta, gamma, M, C, K, G)
 
-    @property
-    def matrix_step(self) -> Any:
+    def matrix_step(self, equations: Any) -> Any:
         """The step on matrices."""
-        from solvers.stepping.sparse import newmark_step
-
-        return newmark_step
+        return partial(newmark, equations.balance, equations.flight, equations.solve, equations.reply)
 
 
 @dataclass(frozen=True)

@@ -11,33 +11,47 @@ Kutta, Zeitschrift für Mathematik und Physik 46 (1901) 435.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, ClassVar
 
 from solvers.compiled.kernels import kernel, rhs
 from solvers.problem import System, require_step
 from solvers.stepping.constant_step import ConstantStep
 from solvers.stepping.henon import hermite
+from solvers.stepping.shared import shared
 from solvers.stepping.stability import Radius, taylor_radius
 
 
 @kernel
-def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
-    """One step; returns (error estimate 0, law calls). ``dense`` gets the cubic Hermite interpolant."""
-    size = x.size
+def _add_stage(start, stage, weight, reach, x, x_new, trial):
+    """Add a stage to the end of the step, from ``start``; ``trial`` is where the next one is evaluated."""
+    for i in range(x.size):
+        x_new[i] = start[i] + weight * stage[i]
+        trial[i] = x[i] + reach * stage[i]
+
+
+@shared
+def runge_kutta(rate_of, problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
+    """One step with the rates f = ``rate_of``; returns (error estimate 0, law calls).
+
+    ``dense`` gets the cubic Hermite interpolant.
+    """
     trial, stage, batch = work[0], work[1], work[2]
     calls = 0
-    for i in range(size):
-        x_new[i] = x[i] + h / 6.0 * rate[i]
-        trial[i] = x[i] + 0.5 * h * rate[i]
+    _add_stage(x, rate, h / 6.0, 0.5 * h, x, x_new, trial)
     for j in range(1, 4):
-        calls += rhs(problem, t + (h if j == 3 else 0.5 * h), trial, segment, entry_rate, stage, batch)
+        calls += rate_of(problem, t + (h if j == 3 else 0.5 * h), trial, segment, entry_rate, stage, batch)
         weight, reach = (h / 6.0, 0.0) if j == 3 else (h / 3.0, h if j == 2 else 0.5 * h)
-        for i in range(size):
-            x_new[i] += weight * stage[i]
-            trial[i] = x[i] + reach * stage[i]
-    calls += rhs(problem, t + h, x_new, segment, entry_rate, rate_new, batch)
+        _add_stage(x_new, stage, weight, reach, x, x_new, trial)
+    calls += rate_of(problem, t + h, x_new, segment, entry_rate, rate_new, batch)
     hermite(h, x, rate, x_new, rate_new, dense)
     return 0.0, calls
+
+
+@kernel
+def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
+    """`runge_kutta` on decoupled modes."""
+    return runge_kutta(rhs, problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol)
 
 
 @dataclass(frozen=True)
@@ -87,9 +101,6 @@ class RK4(ConstantStep):
         """Sparse matrices are stepped on as they are."""
         return system.sparse
 
-    @property
-    def matrix_step(self) -> Any:
+    def matrix_step(self, equations: Any) -> Any:
         """The step on matrices."""
-        from solvers.stepping.sparse import runge_kutta_step
-
-        return runge_kutta_step
+        return partial(runge_kutta, equations.rate)

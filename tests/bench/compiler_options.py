@@ -6,7 +6,8 @@ A copy of the packages with one option switched off and this tree each get a pro
 minute, one after the other, and then run the twelve starts of `reference` in turns, with 2, 10 and 30 modes, and three
 modes under noise. Printed are medians over the starts of the ratios of shortest processor times, so that other work on
 the machine matters little, and whether all ends are the same bit for bit. ``--against`` compares this tree with
-another one instead. Without packed arguments (``tuples``) parts cannot be called at addresses: compare with ``parts``.
+another one instead, ``--cases RK4:2 Newmark:10 --rounds 20`` by runs of other methods, name and modes. Without packed
+arguments (``tuples``) parts cannot be called at addresses: compare with ``parts``.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ HOME = Path(__file__).resolve().parent.parent.parent
 PACKAGES = "fembeam", "contacts", "reduction", "solvers"
 CASES = ["2", "10", "30", "noise"]
 ROUNDS = 200
+SETTINGS = {"DormandPrince": {"rtol": 1e-8}, "HenonRK2": {"dt_flight": 2e-6, "dt_contact": 1e-6}}
 _NO_PARTS = (
     ("parts.py", "import c_function", "import c_function, inner"),
     ("parts.py", "return _call_at(place, result, plain)", "return inner(function)"),
@@ -76,6 +78,12 @@ def runs_of(case: str) -> list[Callable[[], Any]]:
     import fembeam
     import solvers
 
+    if ":" in case:
+        name, modes = case.split(":")
+        of = problem(int(modes))
+        setting = SETTINGS.get(name, {"dt": 1e-5 if of.n < 10 else 1e-6})
+        run = peers.constant_step(of, {"kind": getattr(solvers, name), **setting})
+        return [lambda start=start: run(start)[0] for start in of.starts[:4]]
     if case != "noise":
         of = problem(int(case))
         run = peers.exponential(of, {"rtol": 1e-8})
@@ -125,12 +133,12 @@ class Worker:
         return found
 
 
-def compare(trees: list[Path]) -> str:
+def compare(trees: list[Path], cases: list[str], rounds: int) -> str:
     """One line: of every case the time of the first tree over that of the second."""
     workers, cells = [Worker(tree) for tree in trees], []
-    for case in CASES:
+    for case in cases:
         best, same = [[float("inf")] * 12 for _ in trees], True
-        for turn in range(ROUNDS + 1):
+        for turn in range(rounds + 1):
             order = (0, 1) if turn % 2 else (1, 0)
             found = [part for _, part in sorted((i, workers[i].ask(case)) for i in order)]
             if turn:  # the first is not warm
@@ -148,16 +156,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("options", nargs="*", choices=[*OPTIONS, []])
     parser.add_argument("--against", type=Path)
+    parser.add_argument("--cases", nargs="+", default=CASES)
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.serve:
         serve()
         return
+    chosen = arguments.cases, arguments.rounds
     if arguments.against:
-        print("this tree over the other  ", compare([HOME, arguments.against.resolve()]))
+        print("this tree over the other  ", compare([HOME, arguments.against.resolve()], *chosen))
     for option in arguments.options:
         with tempfile.TemporaryDirectory() as place:
-            print(f"without {option:8s}", compare([without(option, place), HOME]), flush=True)
+            print(f"without {option:8s}", compare([without(option, place), HOME], *chosen), flush=True)
 
 
 if __name__ == "__main__":

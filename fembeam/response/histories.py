@@ -10,12 +10,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.model.placed_shapes import PlacedShapes
+from fembeam.response.contact_force import forces
+from fembeam.response.mean_force import mean_force
+from fembeam.response.placed_shapes import PlacedShapes
+from fembeam.response.readout import Readout
+from fembeam.response.section_forces import extremes, frame_forces_of, rows_of
 from fembeam.scene import split, unit_of
+from fembeam.structures import COMPONENTS, UP, Six
 from fembeam.support import is_whole, require
 
 if TYPE_CHECKING:
-    from fembeam.response import Extremes, Readout
+    from collections.abc import Mapping
+
+    from fembeam.model import Model
+    from fembeam.response.section_forces import Extremes
+    from solvers.problem import ContactLog, Losses, Transitions
 
 Vector = NDArray[np.float64]
 
@@ -28,7 +37,7 @@ def directed(z: Any, direction: Any) -> Any:
 
 
 class Histories:
-    """Histories of the beams, contacts and impactors of a `Run`, whose fields these are."""
+    """Histories of the beams, contacts and impactors: a `Run` is one, and has these fields."""
 
     t: Vector
     q: Vector
@@ -43,16 +52,25 @@ class Histories:
     names: tuple[str, ...]
     given: tuple[bool, ...]
     sampled: bool
+    contacts: ContactLog
+    began: tuple[Vector, ...]
+    model: Model | None
+    kept: Mapping[str, Any]
 
     if TYPE_CHECKING:  # made by the run when first read
 
         @property
-        def readout(self) -> Readout:
-            """As in `Run`."""
+        def transitions(self) -> Transitions:
+            """Borders that laws with memory passed."""
 
         @property
-        def _forces(self) -> Vector:
-            """As in `Run`."""
+        def losses(self) -> Losses:
+            """Energy that each stop and element dissipated."""
+
+    @cached_property
+    def readout(self) -> Readout:
+        """Loads, damping, section forces and reactions, from the model or from the file."""
+        return Readout(self.model, self.t, self.kept)
 
     def _at_samples(self, values: Vector) -> Vector:
         """Values (k, …) at the samples; ValueError for a run without any, whose q and q̇ are the final state."""
@@ -79,8 +97,6 @@ class Histories:
         instant's value, not a mean over the sample. Under a short contact it holds what the kept modes carry of the
         force, Σ φ_i(z) φ_i(z_s) F, and grows with their number.
         """
-        from fembeam.response import coordinates
-
         return self._motion(coordinates(self), z, direction, body, absolute, 2)
 
     def motion(self, place: Any, body: int = 0) -> Vector:
@@ -92,8 +108,6 @@ class Histories:
 
     def _motion(self, rates: Vector, z: Any, direction: Any, body: int, absolute: bool, order: int) -> Vector:
         """A derivative of u at z (k,) or (k, j), with that of the frame's motion if absolute."""
-        from fembeam.response import frame_motion
-
         if is_whole(direction):  # (z, body, absolute) by position, as where places are numbers
             direction, body, absolute = None, direction, absolute or body is True
         shapes, at = self._beam(body), z
@@ -146,8 +160,6 @@ class Histories:
         positive where it stretches the lower fibre, Q = M'; Q2 and M2 of bending across; T in N m. In the plane N, Q
         and M. At a point load those of the side ahead. Accuracy: see `moment`.
         """
-        from fembeam.response import frame_forces_of
-
         self._beam(body)
         forces = frame_forces_of(self, body)
         values = self._q_of(body) @ forces.rows(place).T
@@ -162,8 +174,6 @@ class Histories:
         z : places (j,) in m; None: all nodes of the mesh. Of other bodies a list of (place, direction) for
             displacement, of (member, distance) for section forces.
         """
-        from fembeam.response import extremes, rows_of
-
         shapes = self._beam(body)
         if isinstance(shapes, PlacedShapes):
             given: Any = z
@@ -180,8 +190,6 @@ class Histories:
 
     def _sections(self, body: int) -> list[Any]:
         """All nodes of the mesh of a frame, as (member, distance)."""
-        from fembeam.response import frame_forces_of
-
         return frame_forces_of(self, body).sections()
 
     def _beam(self, body: int) -> Any:
@@ -193,8 +201,6 @@ class Histories:
 
     def _field(self, quantity: str, z: ArrayLike, body: int) -> Vector:
         """A field over time: (k,) at one z, (k, j) at z (j,)."""
-        from fembeam.response import rows_of
-
         if isinstance(self._beam(body), PlacedShapes):
             shapes, _, offset = rows_of(self, quantity, z if isinstance(z, list) else [z], body)
             along = self._q_of(body) @ shapes.T + offset
@@ -291,6 +297,28 @@ class Histories:
         r = np.linalg.norm(d, axis=1)[:, None]
         return np.asarray(np.sign(self.circles[stop, 0]) * d / np.where(r > 0.0, r, 1.0))
 
+    def force(self, stop: int | str = 0, mean: bool = False) -> Vector:
+        """Contact force (k,) of a stop, N or N m, from its law and the entry rate latched at the time; of an element F.
+
+        ``stop``: its number, or its name as in ``run.force("valve")``. Of an annular stop (k, 2), its components on the
+        place along both directions; with ``mean`` the size N (k,).
+
+        ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
+        are seen: the trapezoidal rule over the samples gives impulses as exactly as the run has them, those of the log
+        to the last sample and, from sample to sample, of what always acts. Between two samples the law is evaluated on
+        a cubic to divide the impulse at their middle. ValueError for a run without samples.
+        """
+        if mean:
+            return mean_force(self, self._stop(stop))
+        number = self._stop(stop)
+        forces = self._forces[self._rows[number]]
+        return self._at_samples(forces.T if self.circles[number, 0] else forces[0])
+
+    @cached_property
+    def _forces(self) -> Vector:
+        """Forces (r, k) on all rows of contacts."""
+        return forces(self) if self.readout.forces is None else self.readout.forces
+
     def _normal_force(self, stop: int) -> Vector:
         """Contact force (k,) along which δ shrinks: of any stop, N of a circular clearance."""
         forces = self._forces[self._rows[stop]]
@@ -308,3 +336,28 @@ class Histories:
         require(whole and -count <= stop < count, f"stop must be below {count}, the number of stops", stop, "Run",
                 "count from 0")  # fmt: skip
         return stop
+
+
+def coordinates(run: Histories) -> Vector:
+    """Modal accelerations q'' (k, n) at the samples, m √kg/s², with the contact forces of the laws there.
+
+    Not from differences of the samples: contacts shorter than a sample would be lost, and digits with them.
+    """
+    read = run.readout
+    driven = run._forces.T @ run.directions + read.loads.T @ read.load_vectors
+    return np.asarray(driven - run.q_dot @ read.damping.T - run.q @ read.stiffness.T)
+
+
+def frame_motion(run: Histories, order: int = 0, along: Six = UP) -> Vector:
+    """The frame's displacement y (k,) at the samples, or a derivative up to the second; zeros for a frame at rest.
+
+    ``along`` a direction: Σ n_i y_i.
+    """
+    base, found = run.readout.base, np.zeros(len(run.t))
+    if base is None:
+        return found
+    for number, direction in enumerate(run.readout.moved):
+        part = along[COMPONENTS.index(direction)]
+        motion = run.readout.loads[base + number] if order == 2 else run.readout.frame[2 * number + order]
+        found = found + part * np.array(motion) if part else found
+    return found
