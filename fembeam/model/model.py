@@ -89,7 +89,7 @@ class Model(Printed, ModalEquations):
         return replace(self, scene=scene, matrices=spun) if spun else scene.reduce(**self.reduction_options)
 
     def strike(self, speed: float, stop: int = 0) -> solvers.ContactLog:
-        """Contacts with one stop when the model swings into it in its first mode, nothing else acting.
+        """Contacts with one stop when the model swings into it in its first mode, nothing else acting, no friction.
 
         Tells what to expect before a study: contact time ``t_out - t_in`` of the first contact and peak force, and so
         how many periods of the highest mode a contact lasts.
@@ -102,7 +102,7 @@ class Model(Printed, ModalEquations):
         require_positive("speed", speed, "Model.strike", "give the speed of arrival in m/s")
         require(0 <= stop < len(self.scene.stops), f"stop must be below {len(self.scene.stops)}", stop, "Model.strike",
                 "count from 0")  # fmt: skip
-        contact = self.system.contacts[stop]
+        contact = initial_states.smooth(self.system.contacts[stop])
         start = np.zeros((2, len(self.omega)))
         if contact.map == "annulus":
             start[:, 0] = initial_states.onto_circle(contact, speed)

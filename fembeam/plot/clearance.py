@@ -59,7 +59,7 @@ def orbit_in_clearance(
     d = run.place_in_clearance(number)
     kept = np.flatnonzero((run.t >= lo) & (run.t <= hi))
     require(len(kept) > 1, "the window must hold at least 2 samples", (lo, hi), "orbit_in_clearance", "widen it")
-    t, rates = run.t[kept], run.q_dot[kept] @ run.directions[run._rows[number]].T
+    t, rates = run.t[kept], run.q_dot[kept] @ run.directions[run._rows[number]][:2].T
     fine = np.linspace(t[0], t[-1], FINER * (len(t) - 1) + 1)
     path = 1e3 * CubicHermiteSpline(t, d[kept], rates)(fine)
     size = 1e3 * abs(radius)

@@ -8,6 +8,7 @@ holds what they need of a run besides its coordinates, and what its file keeps. 
 
 from fembeam.response.backbone import backbone
 from fembeam.response.contact_force import forces, latched_before
+from fembeam.response.friction import losses_by_friction, read_back, sliding, states
 from fembeam.response.mean_force import mean_force
 from fembeam.response.readout import Readout, coordinates, frame_motion
 from fembeam.response.saved_readout import READOUT_FINITE, READOUT_UNITS, expected_readout, packed, unpacked
