@@ -36,43 +36,45 @@ def sliding(run: Histories, stop: int) -> tuple[Vector, Vector]:
 
 def states(run: Run, stop: int) -> tuple[Vector, Vector, Vector]:
     """What the slider of a stop did: times (j,) from which on, codes, and s where it sticks (NaN: undrawn)."""
-    log, passed = run.friction_log, run.transitions
+    log, passed, k_t = run.friction_log, run.transitions, run.rubs[stop, 1]
     mine = np.flatnonzero(log.contact == stop)
     mine = mine[np.argsort(log.t_in[mine], kind="stable")]
     events = np.flatnonzero(passed.contact == stop)
-    found: list[tuple[float, float, float]] = []
-    for entry in mine.tolist():
-        t_in, t_out = float(log.t_in[entry]), float(log.t_out[entry])
-        own = [i for i in events.tolist() if t_in <= passed.t[i] and not passed.t[i] > t_out]
-        found += [(t_in, *_first(run, stop, entry, own)), *(_after(run, stop, i) for i in own)]
-        if not np.isnan(t_out):
-            found.append((t_out, FREE, np.nan))
-    times, codes, places = np.array(found).reshape(-1, 3).T
-    return times, codes, places
+    stuck = passed.event[events] == "stick"
+    time, force, way, speed = (column[events] for column in (passed.t, passed.force, passed.delta, passed.delta_dot))
+    slider = way - force / k_t
+    slips = np.where(force != 0.0, np.sign(force), np.sign(speed))
+    codes, places = _begun(run, stop, mine, (time, stuck, slips, slider))
+    ended = mine[~np.isnan(log.t_out[mine])]
+    over = np.full(len(ended), FREE), np.full(len(ended), np.nan)
+    after = np.where(stuck, STICK, slips), np.where(stuck, slider, np.nan)
+    times = np.concatenate((log.t_in[mine], time, log.t_out[ended]))
+    kinds = np.repeat([0, 1, 2], [len(mine), len(time), len(ended)])
+    order = np.lexsort((kinds, times))
+    both = (np.concatenate(parts)[order] for parts in zip((codes, places), after, over, strict=True))
+    return times[order], *both
 
 
-def _first(run: Run, stop: int, entry: int, events: list[int]) -> tuple[float, float]:
-    """Code and s as a contact begins: told by the event that ended this, by the end, or by what the run began with."""
-    log, passed = run.friction_log, run.transitions
-    if log.t_in[entry] == 0.0 and len(run.began) > stop and run.began[stop][-2] != FREE:
-        return float(run.began[stop][-2]), float(run.began[stop][-1])
-    if events:
-        at, k_t = events[0], run.rubs[stop, 1]
-        if passed.event[at] == "slip":
-            return STICK, float(passed.delta[at] - passed.force[at] / k_t)
-        return float(np.sign(passed.force[at]) or np.sign(log.speed_in[entry])), np.nan
-    if np.isnan(log.t_out[entry]):
-        return _at_end(run, stop)
-    return (float(np.sign(log.speed_in[entry])), np.nan) if log.slip[entry] > 0.0 else (STICK, np.nan)
+def _begun(run: Run, stop: int, mine: Any, events: tuple[Vector, ...]) -> tuple[Vector, Vector]:
+    """Code and s as each contact begins: told by the event that ended this, by the end, or by what the run began with.
 
-
-def _after(run: Run, stop: int, event: int) -> tuple[float, float, float]:
-    """Time, code and s after an event."""
-    passed, k_t = run.transitions, run.rubs[stop, 1]
-    time, force = float(passed.t[event]), float(passed.force[event])
-    if passed.event[event] == "stick":
-        return time, STICK, float(passed.delta[event] - force / k_t)
-    return time, float(np.sign(force) or np.sign(passed.delta_dot[event])), np.nan
+    One without an event slips all the way, if its slider has moved at all.
+    """
+    log, (time, stuck, slips, slider) = run.friction_log, events
+    t_in, t_out = log.t_in[mine], log.t_out[mine]
+    first, ends = np.searchsorted(time, t_in), np.where(np.isnan(t_out), np.inf, t_out)
+    known = first < np.searchsorted(time, ends, side="right")
+    at = np.where(known, first, len(time))
+    was_stuck = ~np.append(stuck, True)[at]  # it slips from then on
+    moved = np.where(known | (log.slip[mine] > 0.0), np.sign(log.speed_in[mine]), STICK)
+    was_slip = np.where(np.append(slips, 0.0)[at] != 0.0, np.append(slips, 0.0)[at], moved)
+    codes = np.where(known & was_stuck, STICK, np.where(known, was_slip, moved))
+    places = np.where(known & was_stuck, np.append(slider, np.nan)[at], np.nan)
+    if len(mine) and np.isnan(t_out[-1]) and not known[-1]:
+        codes[-1], places[-1] = _at_end(run, stop)
+    if len(mine) and t_in[0] == 0.0 and len(run.began) > stop and run.began[stop][-2] != FREE:
+        codes[0], places[0] = run.began[stop][-2:]
+    return codes, places
 
 
 def _at_end(run: Run, stop: int) -> tuple[float, float]:

@@ -39,7 +39,7 @@ from fembeam.scene.parts import (
 )
 from fembeam.scene.places import At, Place, is_pair, is_place, said, split, told
 from fembeam.scene.rotors import Disk, Unbalance
-from fembeam.scene.rubbing import Friction
+from fembeam.scene.rubbing import Friction, spin_of
 from fembeam.scene.scene import FEATURES, Scene
 from fembeam.scene.signals import PLACES, for_duration, persistent_drive, signals_of, support_motion, with_signals
 from fembeam.scene.source import Source
