@@ -51,8 +51,8 @@ def states(run: Run, stop: int) -> tuple[Vector, Vector, Vector]:
     times = np.concatenate((log.t_in[mine], time, log.t_out[ended]))
     kinds = np.repeat([0, 1, 2], [len(mine), len(time), len(ended)])
     order = np.lexsort((kinds, times))
-    both = (np.concatenate(parts)[order] for parts in zip((codes, places), after, over, strict=True))
-    return times[order], *both
+    all_codes, all_places = (np.concatenate(parts)[order] for parts in zip((codes, places), after, over, strict=True))
+    return times[order], all_codes, all_places
 
 
 def _begun(run: Run, stop: int, mine: Any, events: tuple[Vector, ...]) -> tuple[Vector, Vector]:
