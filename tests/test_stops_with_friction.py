@@ -351,3 +351,20 @@ def test_bad_scenes_are_refused():
 def test_names_and_prints_of_scenes_without_friction_stay():
     assert "friction" not in repr(fb.Stop(0.2, LAW))
     assert "friction=Friction(mu=0.3" in repr(hole().stops[0])
+
+
+def test_figures_tell_stick_from_slip(tube):
+    labels = ["clearance 0.2 mm", "free", "slips", "sticks"]
+    path = fb.plot.orbit_in_clearance(tube).axes[0].lines
+    assert [line.get_label() for line in path] == labels
+    r = [np.hypot(*line.get_data()) for line in path]
+    assert np.nanmax(r[2]) > 0.2 > np.nanmin(r[1])
+    assert np.nanmax(r[3]) > 0.2
+    axis = fb.plot.forces_in_clearance(tube, window=(0.01, 0.06)).axes[0]
+    normal, friction = axis.lines
+    assert normal.get_ydata().max() == pytest.approx(np.linalg.norm(tube.force()[100:], axis=1).max(), rel=0.1)
+    assert np.all(friction.get_ydata() <= 0.3 * normal.get_ydata() * (1.0 + 1e-9))
+    with pytest.raises(ValueError, match="axes must be polar"):
+        fb.plot.forces_in_clearance(tube, axes=fb.plot.orbit_in_clearance(tube).axes[0])
+    with pytest.raises(ValueError, match="the window must hold at least 2 samples"):
+        fb.plot.forces_in_clearance(tube, window=(3.0, 4.0))
