@@ -253,18 +253,19 @@ class _Turning:
         both = self.contact.direction @ np.linalg.solve(self.dynamic, self.contact.direction.T)
         return complex(both[0, 0], both[1, 0])
 
-    def share(self, r: float) -> float:
+    def share(self, r: Any) -> Any:
         """c/r of the force of friction."""
         return self.contact.gap / r if self.lever else 1.0
 
-    def force(self, r: float) -> float:
-        """N."""
+    def force(self, r: Any) -> Any:
+        """N, of radii (k,) too."""
         delta = self.side * (r - self.contact.gap)
-        return float(np.squeeze(self.contact.law.force(delta, 0.0, self.entry_rate))) if delta > 0.0 else 0.0
+        found = self.contact.law.force(np.maximum(delta, 0.0), 0.0, self.entry_rate)
+        return np.where(delta > 0.0, found, 0.0) if np.ndim(r) else float(np.squeeze(found)) * (delta > 0.0)
 
-    def resisted(self, r: float) -> complex:
-        """The whirl without contact that is needed for this radius, in the direction of the place."""
-        return r + self.compliance * self.force(r) * complex(self.side, self.slip * self.share(r))
+    def resisted(self, r: Any) -> Any:
+        """The whirl without contact that is needed for a radius, in the direction of the place."""
+        return r + self.compliance * self.force(r) * (self.side + 1j * self.slip * self.share(r))
 
     def radii(self) -> tuple[float, ...]:
         """All radii in contact, ascending; those closer together than the trials are not told apart."""
@@ -273,10 +274,10 @@ class _Turning:
         deltas = np.append(0.0, np.geomspace(LEAST * c, deepest * (1.0 - LEAST), TRIED))
         tried = np.sort(c + self.side * deltas)
 
-        def apart(r: float) -> float:
-            return abs(self.resisted(r)) - free
+        def apart(r: Any) -> Any:
+            return np.abs(self.resisted(r)) - free
 
-        signs = np.sign([apart(float(r)) for r in tried])
+        signs = np.sign(apart(tried))
         turns = np.flatnonzero(signs[1:] * signs[:-1] < 0.0)
         return tuple(float(brentq(apart, tried[i], tried[i + 1], xtol=1e-16 * c, rtol=1e-14)) for i in turns)
 
