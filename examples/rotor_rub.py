@@ -1,9 +1,9 @@
-"""An unbalanced overhung rotor rubs in its housing: from which coefficient of friction on does it start a dry whirl?
+"""An unbalanced overhung rotor rubs in its housing: the coefficient of friction from which on it starts a dry whirl.
 
 Near its critical speed the unbalance presses the rotor against the wall, where it slips all the way round. Seen from
-the shaft that is an equilibrium. Friction drags the rotor backwards; where it gives the backward whirl on the stiff wall
-more than damping takes, an eigenvalue has a positive real part and small disturbances grow. Asserted: runs on both sides
-of the threshold decay and grow at the rate of that eigenvalue.
+the shaft that is an equilibrium. Friction drags the rotor backwards; where it gives the backward whirl on the stiff
+wall more than damping takes, an eigenvalue has a positive real part and small disturbances grow. Asserted: runs on
+both sides of the threshold decay and grow at the rate of that eigenvalue.
 
     python examples/rotor_rub.py [FIGURE.png]
 """
