@@ -31,7 +31,7 @@ def shaken(mu):
     """An L-shaped pipe in its plane; its corner in a guide."""
     law = KelvinVoigt(stiffness=2e5, damping=3e2)
     rub = {"friction": fb.Friction(mu, stiffness=1.6e5), "tangent": "x"}
-    scene = fb.Scene(
+    model = fb.Scene(
         fb.Frame.polyline({"A": (0.0, 0.0), "B": (0.0, RISE), "C": (LENGTH, RISE)}, SECTION),
         supports=[fb.Clamped("A")],
         masses=[fb.LumpedMass("C", mass=6.0)],
@@ -39,8 +39,7 @@ def shaken(mu):
         damping=fb.Rayleigh(alpha=1.0, beta=2e-4),
         base={"x": ground(1, 4.0), "y": ground(2, 4.0)},
         gravity=9.81,
-    )
-    model = scene.reduce(modes=6, residual=True)
+    ).reduce(modes=6, residual=True)
     return model.simulate(4.0, 5e-4, model.equilibrium(), solver=solvers.DormandPrince(1e-8))
 
 
@@ -60,7 +59,8 @@ def unbalanced(run):
 
 
 rubbed, smooth = shaken(0.4), shaken(1e-3)
-assert (error := unbalanced(rubbed)) < 1e-4, f"forces and inertia differ by {error:.2g}"
+error = unbalanced(rubbed)
+assert error < 1e-4, f"forces and inertia differ by {error:.2g}"
 held = sum(rubbed.friction(i)[-1] ** 2 / 3.2e5 for i in (0, 1))  # by the tangential springs
 assert np.isclose(rubbed.friction_loss[-1].sum(), rubbed.energy.friction[-1] - held, rtol=1e-6)
 for name, run in (("with friction", rubbed), ("almost none", smooth)):
