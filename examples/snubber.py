@@ -29,13 +29,12 @@ def ground(seed, size):
 
 def shaken(mu):
     """An L-shaped pipe in its plane; its corner in a guide."""
-    law = KelvinVoigt(stiffness=2e5, damping=3e2)
-    rub = {"friction": fb.Friction(mu, stiffness=1.6e5), "tangent": "x"}
+    rub = {"law": KelvinVoigt(stiffness=2e5, damping=3e2), "friction": fb.Friction(mu, stiffness=1.6e5), "tangent": "x"}
     model = fb.Scene(
         fb.Frame.polyline({"A": (0.0, 0.0), "B": (0.0, RISE), "C": (LENGTH, RISE)}, SECTION),
         supports=[fb.Clamped("A")],
         masses=[fb.LumpedMass("C", mass=6.0)],
-        stops=[fb.Stop("C", law, gap, direction=way, **rub) for gap, way in ((5e-3, "-y"), (8e-3, "y"))],
+        stops=[fb.Stop("C", gap=gap, direction=way, **rub) for gap, way in ((5e-3, "-y"), (8e-3, "y"))],
         damping=fb.Rayleigh(alpha=1.0, beta=2e-4),
         base={"x": ground(1, 4.0), "y": ground(2, 4.0)},
         gravity=9.81,
