@@ -348,6 +348,14 @@ def test_bad_scenes_are_refused():
         frame().reduce(modes=1).simulate(0.01)
 
 
+def test_what_does_not_follow_friction_says_so(tube, corner):
+    for run in (tube, corner):
+        with pytest.raises(ValueError, match="derivatives are of stops on lines, without friction"):
+            run.sensitivity("damping.zeta")
+        with pytest.raises(ValueError, match="RK4 takes contacts without friction"):
+            run.model.simulate(0.01, solver=solvers.RK4(1e-5))
+
+
 def test_names_and_prints_of_scenes_without_friction_stay():
     assert "friction" not in repr(fb.Stop(0.2, LAW))
     assert "friction=Friction(mu=0.3" in repr(hole().stops[0])
