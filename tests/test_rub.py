@@ -95,6 +95,9 @@ def test_runs_from_a_rub_stay_in_it():
         np.testing.assert_allclose(run.sliding_speed(), found.sliding_speed, rtol=1e-4)
         np.testing.assert_allclose(np.linalg.norm(run.force()[1:], axis=1),
                                    np.hypot(found.force, found.friction * 2e-4 / found.radius), rtol=1e-4)  # fmt: skip
+        if "rz" in run.shapes.components:
+            twist = run.displacement("B", "rz")
+            assert np.ptp(twist) < 1e-3 * np.abs(twist).max()
         assert run.losses.friction[0] == pytest.approx(0.1 * found.power, rel=1e-3)
 
 
