@@ -348,6 +348,17 @@ def test_bad_scenes_are_refused():
         frame().reduce(modes=1).simulate(0.01)
 
 
+@pytest.mark.skipif(not getattr(solvers.Exponential, "takes_friction", False), reason="Exponential refuses friction")
+def test_the_main_method_gives_the_same(corner, tube, rolled):
+    for run in (corner, tube, rolled):
+        other = run.model.simulate(float(run.t[-1]), run.t, run.made.start, solver=solvers.Exponential(1e-11))
+        np.testing.assert_allclose(other.q, run.q, rtol=0.0, atol=1e-6 * np.abs(run.q).max())
+        size = 1e-4 * np.abs(run.friction()).max()
+        np.testing.assert_allclose(other.friction(), run.friction(), rtol=0.0, atol=size)
+        assert other.losses.friction == pytest.approx(run.losses.friction, rel=1e-6)
+        assert len(other.friction_log) == len(run.friction_log)
+
+
 def test_what_does_not_follow_friction_says_so(tube, corner):
     for run in (tube, corner):
         with pytest.raises(ValueError, match="derivatives are of stops on lines, without friction"):
@@ -368,6 +379,7 @@ def test_figures_tell_stick_from_slip(tube):
     r = [np.hypot(*line.get_data()) for line in path]
     assert np.nanmax(r[2]) > 0.2 > np.nanmin(r[1])
     assert np.nanmax(r[3]) > 0.2
+    assert any("μ = 0.3" in text.get_text().replace("\n", " ") for text in tube.model.scene.figure().axes[0].texts)
     axis = fb.plot.forces_in_clearance(tube, window=(0.01, 0.06)).axes[0]
     normal, friction = axis.lines
     assert normal.get_ydata().max() == pytest.approx(np.linalg.norm(tube.force()[100:], axis=1).max(), rel=0.1)

@@ -146,19 +146,16 @@ def _apart(matrix: Vector, J: Vector) -> float:
 def _turning_load(model: Model, J: Vector, omega: float) -> Vector:
     """f₀ (n,), the load at t = 0; ValueError unless it turns with Ω."""
 
-    def load(t: float) -> Vector:
+    def load(angle: float) -> Vector:
+        t = angle / omega
         found = (np.asarray(vector) * float(np.squeeze(signal(t))) for vector, signal in model.system.loads)
         return np.sum([*found, np.zeros(len(J))], axis=0)
 
-    start = load(0.0)
-    times = [0.5 * math.pi / abs(omega), 1.1 / abs(omega)]
-    wanted = [
-        (start + J @ J @ start) + math.cos(omega * t) * (-J @ J @ start) + math.sin(omega * t) * (J @ start)
-        for t in times
-    ]
-    size = np.abs(start).max(initial=0.0)
-    off = max(np.abs(load(t) - one).max(initial=0.0) for t, one in zip(times, wanted, strict=True))
-    off = max(off, np.abs(start + J @ J @ start).max(initial=0.0))  # what does not turn
+    start, sign = load(0.0), math.copysign(1.0, omega)
+    size, off = np.abs(start).max(initial=0.0), 0.0
+    for angle in (sign * 0.5 * math.pi, sign * 1.1, sign * 4.0):  # from t = 0 on
+        wanted = math.cos(angle) * start + math.sin(angle) * J @ start
+        off = max(off, np.abs(load(angle) - wanted).max(initial=0.0))
     require(size > 0.0 and off < ROUND * size, "the loads must be an unbalance, and turn with the spin",
             [signal for _, signal in model.system.loads], WHERE, "drive it by Unbalance alone")  # fmt: skip
     return start
