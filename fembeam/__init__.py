@@ -27,8 +27,8 @@ __version__ = "0.1.0"
 _OFFERED = {
     "beams": "Section Taper Beam ModalDamping Rayleigh",
     "structures": "Frame Joint Member Scale Structure",
-    "scene": "AnnularStop Clamped Dashpot Disk Element Fixed Guided Impactor LumpedMass Pinned PointForce PointMoment "
-    "Scene Spring Stop Unbalance",
+    "scene": "AnnularStop Clamped Dashpot Disk Element Fixed Friction Guided Impactor LumpedMass Pinned PointForce "
+    "PointMoment Scene Spring Stop Unbalance",
     "excitation": "Harmonic Multisine BandNoise RollOff Record Pulse SineSweep Step",
     "model": "Model Attractor Orbit Branch Run load",
     "response": "response_spectrum",
@@ -39,10 +39,10 @@ _MODULES = ["plot", "study"]
 
 __all__ = [
     "AnnularStop", "Attractor", "BandNoise", "Beam", "Branch", "Clamped", "Dashpot", "Disk", "Element", "Fixed",
-    "Frame", "Guided", "Harmonic", "Impactor", "Joint", "LumpedMass", "Member", "ModalDamping", "Model", "Multisine",
-    "Orbit", "Pinned", "PointForce", "PointMoment", "Pulse", "Rayleigh", "Record", "RollOff", "Run", "Scale", "Scene",
-    "Section", "SineSweep", "Spring", "Step", "Stop", "Structure", "Taper", "Unbalance", "load", "moments", "pdf",
-    "plot", "psd", "response_spectrum", "study",
+    "Frame", "Friction", "Guided", "Harmonic", "Impactor", "Joint", "LumpedMass", "Member", "ModalDamping", "Model",
+    "Multisine", "Orbit", "Pinned", "PointForce", "PointMoment", "Pulse", "Rayleigh", "Record", "RollOff", "Run",
+    "Scale", "Scene", "Section", "SineSweep", "Spring", "Step", "Stop", "Structure", "Taper", "Unbalance", "load",
+    "moments", "pdf", "plot", "psd", "response_spectrum", "study",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
@@ -58,6 +58,7 @@ if TYPE_CHECKING:
         Disk,
         Element,
         Fixed,
+        Friction,
         Guided,
         Impactor,
         LumpedMass,

@@ -54,7 +54,7 @@ def test_every_part_takes_a_name(part):
     assert "name" not in repr(part)
     assert pickle.loads(pickle.dumps(named)) == named
     with pytest.raises(TypeError):
-        type(part)(0.1, *[1.0] * 8)  # by keyword only
+        type(part)(0.1, *[1.0] * 12)  # by keyword only
     for wrong in ("", "  ", 3, "two\nlines"):
         message = f"name must be text of one line, not empty, got {wrong!r} in {type(part).__name__} at z = {part.z}"
         with pytest.raises(ValueError, match=re.escape(message)):

@@ -161,7 +161,7 @@ def _suggested_modes(scene: Scene, shortest: float) -> dict[str, int]:
 def _limits(model: Model) -> dict[str, float]:
     """Largest stable steps of methods with constant steps, which take stops on lines alone."""
     found: dict[str, float] = {}
-    if any(one.is_circle for one in model.contact_rows):
+    if any(one.is_circle or one.friction for one in model.contact_rows):
         return found
     for method in (solvers.RK4(1e-6), solvers.HenonRK2(1e-6, 1e-6)):
         limit = method.stable_dt(model.system)

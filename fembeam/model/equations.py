@@ -43,15 +43,28 @@ def _placed(part: Any) -> tuple[Any, ...]:
 
 
 def _contact(directions: Vector, one: ContactRow) -> solvers.Contact:
-    """A contact of a scene on its rows of coordinates."""
+    """A contact of a scene on its rows of coordinates; of a place whose modes do not turn it the spin is all."""
+    rub: dict[str, Any] = {} if one.friction is None else {"friction": one.friction}
     if not one.is_circle:
-        return solvers.Contact(directions[0], one.law, one.gap, one.always, one.name)
+        rub |= {"map": "oblique", "tangent": _tangent(directions, one)} if rub else {}
+        return solvers.Contact(directions[0], one.law, one.gap, one.always, one.name, **rub)
     radius, *centre = one.circle
-    both = np.linalg.matrix_rank(directions) == 2
+    both = np.linalg.matrix_rank(directions[:2]) == 2
     require(both, f"the modes must move the place of {one.name!r} along both directions", len(directions[0]), "Model",
             "keep more modes: of a round section two for each shape")  # fmt: skip
-    round_about: Any = {"map": "annulus", "centre": centre, "outer": radius < 0.0}
-    return solvers.Contact(directions, one.law, one.gap, one.always, one.name, **round_about)
+    round_about: Any = {"map": "annulus", "centre": centre, "outer": radius < 0.0, **rub}
+    if one.radius:
+        turning = directions[2] if directions[2].any() else None
+        round_about |= {"radius": one.radius, "spin": one.spin, "rotation": turning}
+    return solvers.Contact(directions[:2], one.law, one.gap, one.always, one.name, **round_about)
+
+
+def _tangent(directions: Vector, one: ContactRow) -> Vector:
+    """The tangential row of an oblique stop; ValueError where the modes do not move its place both ways."""
+    both = np.linalg.matrix_rank(directions) == 2
+    require(both, f"the modes must move the place of {one.name!r} along its direction and its tangent",
+            len(directions[0]), "Model", "keep more modes")  # fmt: skip
+    return np.asarray(directions[1])
 
 
 class ModalEquations:
@@ -164,7 +177,7 @@ class ModalEquations:
     def directions(self) -> Vector:
         """(r, n): rows of all contacts on the coordinates: w of each, δ = -w·q - gap; of a circular clearance W (2, n).
 
-        `rows_of` says which rows are those of a contact.
+        With friction one more, see `ContactRow`. `rows_of` says which rows are those of a contact.
         """
         rows = [row for one in self.contact_rows for row in self.basis.project(one.row.T).T]
         return np.array(rows).reshape(len(rows), len(self.omega))

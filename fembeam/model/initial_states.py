@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,7 +64,7 @@ def state(model: Model, displacement: Field | Sequence[Field], velocity: Field |
 def split_start(model: Model, start: ArrayLike) -> tuple[Vector, Vector, tuple[Vector, ...]]:
     """q, q̇ and, where given, what each law has latched, of a start (2n,) or the (2n + l,) of `Run.end`."""
     x, n = np.asarray(start, dtype=float), len(model.omega)
-    sizes = [len(getattr(one.law, "memory", ())) for one in model.contact_rows]
+    sizes = [one.latched for one in model.contact_rows]
     require(x.shape in ((2 * n,), (2 * n + sum(sizes),)), f"start must have shape ({2 * n},), [q, q_dot]", x.shape,
             "Model.simulate", "use model.state(displacement, velocity)")  # fmt: skip
     latched = np.split(x[2 * n :], np.cumsum(sizes)[:-1]) if x.size > 2 * n else ()
@@ -159,6 +160,14 @@ def equilibrium(model: Model, loads: Mapping[float, float]) -> Vector:
     return start
 
 
+def smooth(contact: Any) -> Any:
+    """The same contact without friction."""
+    if contact.friction is None:
+        return contact
+    kept = "annulus" if contact.map == "annulus" else "line"
+    return replace(contact, friction=None, map=kept, tangent=None, rotation=None, radius=None, spin=0.0)
+
+
 def onto_circle(contact: Any, speed: float) -> tuple[float, float]:
     """Value and rate of the first coordinate that bring a place onto its circle with δ̇ = speed, all others at rest.
 
@@ -231,8 +240,9 @@ def _pushed(model: Model, delta: Vector) -> tuple[Vector, Vector, list[tuple[sli
     for row, own in zip(model.contact_rows, model.rows_of, strict=True):
         i = own.start
         if row.is_circle:
-            force[own], block = _round(row, -delta[own])
-            circles += [(own, block)] if block.any() else []
+            pair = slice(i, i + 2)
+            force[pair], block = _round(row, -delta[pair])
+            circles += [(pair, block)] if block.any() else []
         elif row.always:
             force[i], slope[i] = float(row.force(delta[i])), max(tangent(row.law, delta[i])[0], 0.0)
         elif delta[i] > 0:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     from fembeam.model.branch import Branch
     from fembeam.model.orbit import Attractor, Orbit
+    from fembeam.model.rub import Rub
     from fembeam.model.run import Run
     from fembeam.response import FrequencyResponse
     from fembeam.scene import Matrices, Scene
@@ -89,7 +90,7 @@ class Model(Printed, ModalEquations):
         return replace(self, scene=scene, matrices=spun) if spun else scene.reduce(**self.reduction_options)
 
     def strike(self, speed: float, stop: int = 0) -> solvers.ContactLog:
-        """Contacts with one stop when the model swings into it in its first mode, nothing else acting.
+        """Contacts with one stop when the model swings into it in its first mode, nothing else acting, no friction.
 
         Tells what to expect before a study: contact time ``t_out - t_in`` of the first contact and peak force, and so
         how many periods of the highest mode a contact lasts.
@@ -102,7 +103,7 @@ class Model(Printed, ModalEquations):
         require_positive("speed", speed, "Model.strike", "give the speed of arrival in m/s")
         require(0 <= stop < len(self.scene.stops), f"stop must be below {len(self.scene.stops)}", stop, "Model.strike",
                 "count from 0")  # fmt: skip
-        contact = self.system.contacts[stop]
+        contact = initial_states.smooth(self.system.contacts[stop])
         start = np.zeros((2, len(self.omega)))
         if contact.map == "annulus":
             start[:, 0] = initial_states.onto_circle(contact, speed)
@@ -270,6 +271,55 @@ class Model(Printed, ModalEquations):
         from fembeam.model.orbit import orbit
 
         return orbit(self, period, start, shots)
+
+    def rub(self, spin: float | None = None, near: float | None = None, entry_rate: float | None = None) -> Rub:
+        """The synchronous rub of an unbalanced round rotor in one `AnnularStop`: an equilibrium of the turning frame.
+
+        It whirls with the spin Ω, in full contact, and slips all the way; N by the law at rest, F_t = σμN. Of one disk
+
+            |(k - mΩ² + N/r) + i (cΩ + σμ (c/r) N/r)| r = m e Ω²
+
+        Parameters
+        ----------
+        spin : Ω, rad/s, not 0; None: that of the shaft. Of a structure without a spin that of its turning loads.
+        near : m, which of several radii; None: the largest.
+        entry_rate : m/s, speed of entry of the contact since it began; for laws whose damping goes by it.
+
+        Returns
+        -------
+        Rub : radius, force, friction, eigenvalues, growth, stable; state, a start. Spins at which `growth` passes 0 are
+            thresholds of dry whirl.
+
+        Raises
+        ------
+        ValueError : a rotor that is not round, loads that do not turn with it, other stops or elements.
+        solvers.OrbitError : no such rub at this spin.
+
+        Notes
+        -----
+        Eigenvalues are of the model's coordinates with steady slip; multipliers of the same motion as an orbit are
+        exp(2π λ/Ω). Indentations up to 1000 clearances (or radii of free whirl) are looked at.
+
+        References
+        ----------
+        J. Jiang, H. Ulbrich, Stability analysis of sliding whirl in a nonlinear Jeffcott rotor with cross-coupling
+        stiffness coefficients, Nonlinear Dynamics 24 (2001) 269-283.
+
+        Examples
+        --------
+        >>> import fembeam as fb
+        >>> from contacts import KelvinVoigt
+        >>> shaft = fb.Frame.straight(0.5, fb.Section.circle(2.1e11, 7850.0, 0.04), spin=200.0, bending_only=True)
+        >>> hole = fb.AnnularStop("B", KelvinVoigt(2e6, 300.0), 2e-4, friction=fb.Friction(0.1, 2e6), radius=0.02)
+        >>> scene = fb.Scene(shaft, [fb.Clamped("A")], [fb.Disk("B", 12.0, 0.04, 0.075)], stops=[hole],
+        ...                  forces=[fb.Unbalance("B", 1e-3)], damping=fb.ModalDamping(0.02))
+        >>> found = scene.reduce(modes=2).rub(190.0)
+        >>> found.stable, found.radius > 2e-4
+        (True, True)
+        """
+        from fembeam.model.rub import rub
+
+        return rub(self, spin, near, entry_rate)
 
     def attractors(
         self, omega: float | None = None, starts: int | Sequence[ArrayLike] = 12, longest: int = 8, seed: int = 0

@@ -16,7 +16,8 @@ import solvers
 from fembeam.response import Histories
 from fembeam.scene import ON, Source
 from fembeam.support import Part, Printed, is_finite
-from solvers.problem import Losses, counted
+from solvers.problem import FrictionLog, Losses, counted
+from solvers.problem.event_list import NO_EVENTS
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
@@ -44,7 +45,8 @@ class Run(Histories, Printed):
     t, q, q_dot : (k,) s, (k, n) and (k, n) modal coordinates and rates.
     contacts : log of contacts: stop, name, t_in, t_out, speed_in, speed_out, peak_indentation, peak_force, impulse,
         energy_loss, entry_rate_clipped (arrays).
-    energy : energy balance at t: input, damping, contact, stored, residual in J; made by ``ledger`` when first read.
+    energy : energy balance at t: input, damping, contact, stored, residual in J, of friction also friction and spin;
+        made by ``ledger`` when first read.
     end : (2n + l,) [q, q̇] at the time reached and what laws have latched: a start from which another run goes on.
     status : how it ended, a sentence.
     cost : steps, rejections, law_calls, events, seconds.
@@ -78,6 +80,9 @@ class Run(Histories, Printed):
     given: tuple[bool, ...] = ()  # (m,) whether it was given that name, or it was made
     acting: tuple[Any, ...] = ()  # (m,) of each contact z, or (place, direction); both directions of an annular stop
     circles: Vector = field(default_factory=lambda: np.zeros((0, 3)))  # (m, 3): radius, < 0 outer; centre; else zeros
+    rubs: Vector = field(default_factory=lambda: np.zeros((0, 4)))  # (m, 4): μ, k_t, R (< 0 outer), Ω; else zeros
+    rubbing: Callable[[], FrictionLog] | None = field(default=None, repr=False)  # makes `friction_log`
+    reached: float = 0.0  # s, the time of `end`
     made: Made | None = None  # start, duration and solver; None of a run read from a file
     sampled: bool = True  # else t, q, q_dot are the final state alone, and no history
 
@@ -105,6 +110,25 @@ class Run(Histories, Printed):
         """Energy that each stop and element dissipated, see `solvers.problem.Losses`."""
         return self.lost()
 
+    @cached_property
+    def friction_log(self) -> FrictionLog:
+        """What friction did in every contact that has it, see `solvers.problem.FrictionLog`.
+
+        Speeds and angles of entry and exit, largest |F_t|, impulse, way of slip, loss; stick and slip between are in
+        `transitions`.
+        """
+        return FrictionLog.of_events(NO_EVENTS) if self.rubbing is None else self.rubbing()
+
+    @cached_property
+    def friction_loss(self) -> Vector:
+        """(k, m) J lost by friction at each stop up to the samples, 0 without; its slope is the work rate of wear.
+
+        Exact at every sample outside of a contact; within one the samples tell how it grows.
+        """
+        from fembeam.response import losses_by_friction
+
+        return self._at_samples(losses_by_friction(self))
+
     @property
     def scene_file(self) -> SceneFile:
         """The scene, reduction and studies this run was made from; ValueError for a run made in Python."""
@@ -131,6 +155,7 @@ class Run(Histories, Printed):
         status = solution.status.value
         if not solution.status.good:
             status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
+        reached = made.duration if made and solution.status.good else float(solution.t[-1]) if len(solution.t) else 0.0
         return cls(
             *(solution.t, solution.q, solution.q_dot, solution.contacts, solution.ledger, status, solution.cost),
             *(model.shapes, stops.reshape(-1, 3), model.directions, masses, repr(model.scene)),
@@ -145,6 +170,9 @@ class Run(Histories, Printed):
             acting=tuple(one.z if one.direction is None else (one.z, one.direction) for one in rows),
             sampled=sampled,
             circles=np.array([one.circle for one in rows], dtype=float).reshape(-1, 3),
+            rubs=np.array([one.rub for one in rows], dtype=float).reshape(-1, 4),
+            rubbing=solution.rubbing,
+            reached=reached,
             made=made,
         )
 
@@ -239,12 +267,13 @@ class Run(Histories, Printed):
         return to_vtu(self, path, sample, stride)
 
     def to_csv(self, folder: str | os.PathLike[str], stride: int = 1, **chosen: Any) -> list[Path]:
-        """Write every `stride`-th sample as `histories.csv`, and the log as `contacts.csv`.
+        """Write every `stride`-th sample as `histories.csv`, the log as `contacts.csv`, of friction `friction.csv`.
 
         Parameters
         ----------
         chosen : ``places=`` z in m (j,), else tip and mid-beam. ``quantities=`` from displacement, velocity,
-            acceleration, each also "absolute …", slope, moment, shear, stress; indentation, force, work (of stops);
+            acceleration, each also "absolute …", slope, moment, shear, stress; indentation, force, work, friction,
+            friction loss (of stops);
             reactions (of supports, springs, dashpots). Else displacement, velocity, indentation, force.
         """
         from fembeam.model.run_csv import write

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 CONTACT_UNITS = {"t_in": "s", "t_out": "s", "energy_loss": "J"}
 CONTACT_QUANTITIES = {"speed_in": "speed", "speed_out": "speed", "peak_indentation": "indentation",
                       "peak_force": "force", "impulse": "impulse"}  # fmt: skip
+FRICTION_UNITS = {"t_in": "s", "t_out": "s", "angle_in": "rad", "angle_out": "rad", "speed_in": "m/s",
+                  "speed_out": "m/s", "peak_friction": "N", "impulse": "N s", "slip": "m",
+                  "energy_loss": "J"}  # fmt: skip
 DIGITS = "%.12g"
 Output = Literal[
     "displacement",
@@ -40,25 +43,34 @@ Output = Literal[
     "stress",
     "indentation",
     "force",
+    "friction",
     "work",
+    "friction loss",
     "reactions",
 ]
 UNITS = {  # of what `histories` can be asked for
     **dict.fromkeys(get_args(Output), "m"),
     **{"velocity": "m/s", "absolute velocity": "m/s", "acceleration": "m/s²", "absolute acceleration": "m/s²"},
     **{"slope": "rad", "moment": "N m", "shear": "N", "stress": "N/m²", "force": "N", "work": "J"},
+    **{"friction": "N", "friction loss": "J"},
 }
 USUAL = ("displacement", "velocity", "indentation", "force")
-ELSEWHERE = ("indentation", "force", "work", "reactions")  # not at places: of stops and of supports
+OF_STOPS = ("indentation", "force", "friction", "work", "friction loss")
+ELSEWHERE = (*OF_STOPS, "reactions")  # not at places: of stops and of supports
 
 
 def write(run: Run, folder: Path, stride: int = 1, **chosen: Any) -> list[Path]:
-    """Write `histories.csv` and `contacts.csv`; see `Run.to_csv`."""
+    """Write `histories.csv` and `contacts.csv`, with friction `friction.csv`; see `Run.to_csv`."""
     kept = histories(run, stride, **chosen)
     folder.mkdir(parents=True, exist_ok=True)
     units = ((name, _unit_of_column(run, name), column) for name, column in run.contacts.named_arrays().items())
     log = {f"{name} [{unit}]" if unit else name: column for name, unit, column in units}
-    return [_write(folder / "histories.csv", kept), _write(folder / "contacts.csv", log)]
+    written = [_write(folder / "histories.csv", kept), _write(folder / "contacts.csv", log)]
+    if not run.rubs.any():
+        return written
+    rubbed = {f"{name} [{FRICTION_UNITS[name]}]" if name in FRICTION_UNITS else name: column
+              for name, column in run.friction_log.named_arrays().items()}  # fmt: skip
+    return [*written, _write(folder / "friction.csv", rubbed)]
 
 
 def _unit_of_column(run: Run, name: str) -> str:
@@ -92,6 +104,7 @@ def histories(
         for what in of_stops:
             columns |= _of_stop(run, what, stop, key)
         columns |= {f"work {key} [J]": run.losses.history[:, stop]} if "work" in asked else {}
+        columns |= _of_friction(run, stop, key, asked) if run.rubs[stop, 1] else {}
     for i, one in enumerate(run.reactions() if "reactions" in asked else ()):
         about = one.name if one.part.name is not None else f"{i} ({one.name})"
         if isinstance(one, BodyReaction):
@@ -107,8 +120,15 @@ def _of_stop(run: Run, what: str, stop: int, key: str) -> dict[str, Vector]:
     values, unit = getattr(run, what)(stop), run.unit(what, stop)
     if values.ndim == 1:
         return {f"{what} {key} [{unit}]": values}
-    ways = [direction if isinstance(direction, str) else _vector(direction) for direction in run.acting[stop][1]]
-    return {f"{what} {key} {way} [{unit}]": values[:, i] for i, way in enumerate(ways)}
+    given = run.acting[stop][1] if run.circles[stop, 0] else ("", "along")  # N, and the force along the tangent
+    ways = [direction if isinstance(direction, str) else _vector(direction) for direction in given]
+    return {f"{what} {key} {way}".rstrip() + f" [{unit}]": values[:, i] for i, way in enumerate(ways)}
+
+
+def _of_friction(run: Run, stop: int, key: str, asked: Sequence[str]) -> dict[str, Vector]:
+    """F_t and the loss by friction of a stop."""
+    found = {f"friction {key} [N]": run.friction(stop)} if "friction" in asked else {}
+    return found | ({f"friction loss {key} [J]": run.friction_loss[:, stop]} if "friction loss" in asked else {})
 
 
 def _vector(direction: Any) -> str:
@@ -233,7 +253,19 @@ def parts(run: Run) -> list[Part]:
     force, speed = run.unit("force"), run.unit("speed")
     found: list[Part] = [repr(run), (("", *(f"{name} / {length}" for name in ("mean", "std", "min", "max"))), moved)]
     head = "", "contacts", f"largest force / {force}", f"mean peak force / {force}", f"mean entry speed / {speed}"
-    return [*found, *([(head, rows)] if rows else []), *_elements(run)]
+    return [*found, *([(head, rows)] if rows else []), *_rubbing(run), *_elements(run)]
+
+
+def _rubbing(run: Run) -> list[Part]:
+    """What friction did at every stop that has it."""
+    rows, log = [], run.friction_log
+    for stop in np.flatnonzero(run.rubs[:, 1]).tolist():
+        mine = log.contact == stop
+        largest = float(log.peak_friction[mine].max(initial=0.0))
+        impact, friction = float(run.losses.impact[stop]), float(run.losses.friction[stop])
+        rows.append((run.name(stop), largest, float(run.losses.slip[stop]), impact, friction))
+    head = "", "largest friction / N", "slip / m", "loss by impact / J", "loss by friction / J"
+    return [(head, rows)] if rows else []
 
 
 def _elements(run: Run) -> list[Part]:

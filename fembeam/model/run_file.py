@@ -18,7 +18,7 @@ from fembeam.model.run import Run
 from fembeam.response import READOUT_UNITS, PlacedShapes, Shapes, packed, tuples, unpacked
 from fembeam.scene import Source
 from fembeam.support import versions, written_whole
-from solvers.problem import Losses, Transitions, columns_of, optional
+from solvers.problem import FrictionLog, Losses, Transitions, columns_of, optional
 
 FORMAT = 4
 HDF5 = (".h5", ".hdf5")
@@ -42,6 +42,8 @@ UNITS = {
     "kinds": "(of rotation, always acting) of each contact: rad for m, N m for N where it is of rotation",
 }
 
+RUBS = "of each contact with friction: μ, k_t / N/m, R / m (negative outside a circle), Ω / rad/s; or zeros"
+FRICTION_LOG = "rows of contact, t_in, t_out / s, angles / rad, speeds / m/s, peak / N, N s, slip / m, loss / J"
 CIRCLES = "m, of each contact: radius of a circular clearance, negative of an outer one, and its centre; or zeros"
 
 
@@ -70,7 +72,10 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         "given": run.given,
         "scene": run.scene,
         "cost": {f.name: getattr(run.cost, f.name) for f in fields(run.cost)},
-        "units": UNITS | ({"circles": CIRCLES} if run.circles.any() else {}),
+        "units": UNITS
+        | ({"circles": CIRCLES} if run.circles.any() else {})
+        | ({"rubs": RUBS, "friction_log": FRICTION_LOG} if run.rubs.any() else {}),
+        "reached": run.reached,
         "versions": versions(),
         "acting": run.acting,
         "bodies": [shapes.words for shapes in (run.shapes, *run.others)],
@@ -96,6 +101,9 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         **{f"file_{i}": np.frombuffer(content, dtype=np.uint8) for i, content in enumerate(carried)},
     }
     arrays |= {"circles": run.circles} if run.circles.any() else {}
+    if run.rubs.any():
+        arrays |= {"rubs": run.rubs, "friction_log": np.array(list(run.friction_log.arrays().values()), dtype=float).T}
+        arrays["losses"] = np.column_stack((arrays["losses"], lost.friction, lost.spin))
     about["readout"], read = packed(run.readout)
     about["events"], arrays["transitions"] = _packed(run.transitions)
     return json.dumps(about, default=float), arrays | read
@@ -222,7 +230,7 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         raise ValueError("its words and its arrays are of other bodies and stops")
     numbered = zip(about["bodies"], ("", *(f"_{j}" for j in range(1, bodies))), strict=True)
     shapes = [_shapes_of(words, arrays[f"nodes{i}"], arrays[f"shapes{i}"]) for words, i in numbered]
-    work, stored, slip = arrays["losses"].T
+    work, stored, slip, *rubbed = arrays["losses"].T
     names = _names(about, len(arrays["stops"]))
     log = (arrays[f"contact_{name}"] for name in columns_of(solvers.ContactLog))
     energy = {name.removeprefix("energy_"): array for name, array in arrays.items() if name.startswith("energy_")}
@@ -238,7 +246,7 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         impactor_masses=arrays["impactor_masses"],
         scene=about["scene"],
         borders=partial(Transitions, *_unpacked(about["events"], arrays["transitions"]), names=names),
-        lost=partial(Losses, work, stored, slip, arrays["work"], names=names),
+        lost=partial(Losses, work, stored, slip, arrays["work"], names=names, **_rubbed(rubbed)),
         end=arrays["end"],
         kept=unpacked(about["readout"], arrays, [getattr(one, "nodes", None) for one in shapes]),
         others=tuple(shapes[1:]),
@@ -247,11 +255,25 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         on=arrays["on"],
         kinds=arrays["kinds"],
         circles=arrays.get("circles", np.zeros((len(arrays["stops"]), 3))),
+        rubs=arrays.get("rubs", np.zeros((len(arrays["stops"]), 4))),
+        rubbing=partial(_friction_log, arrays["friction_log"], names) if "friction_log" in arrays else None,
+        reached=float(about.get("reached", 0.0)),
         acting=tuples(about["acting"]),
         sampled=about["sampled"],
         names=names,
         given=tuple(map(bool, about["given"])),
     )
+
+
+def _rubbed(columns: list[Any]) -> dict[str, Any]:
+    """Losses by friction and works of spins by name, if there are any."""
+    return dict(zip(("friction", "spin"), columns, strict=False))
+
+
+def _friction_log(table: Any, names: tuple[str, ...]) -> FrictionLog:
+    """The log of friction of its table."""
+    contact, *others = table.T.copy()
+    return FrictionLog(contact.astype(int), *others, names=names)
 
 
 def _names(about: dict[str, Any], contacts: int) -> tuple[str, ...]:

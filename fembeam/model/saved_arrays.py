@@ -1,7 +1,8 @@
 """Consistency of the arrays of a saved run; a truncated or edited file is refused with the reason.
 
 k samples, n coordinates, m contacts, r rows of them (two of a circular clearance), b nodes of a beam, c entries of the
-log: t (k,), q, q_dot (k, n), force (r, k), stops (m, 3), circles (m, 3) if there are any, kinds (m, 2), on (m, 3),
+log: t (k,), q, q_dot (k, n), force (r, k), stops (m, 3), circles (m, 3) if there are any, with friction rubs (m, 4) and
+friction_log (f, 11), losses then (m, 5), r a row more for each but circles without radius; kinds (m, 2), on (m, 3),
 directions (r, n), impactor_masses (i,),
 nodes (b,), shapes (2b, n), contact_* (c,), energy_* (k,) but energy_initial; what `fembeam.response.readout` reads a
 run with; mean_force (m, k), transitions (r, 9), losses (m, 3), work (k, m) and end (2n + l,).
@@ -16,12 +17,12 @@ import numpy as np
 
 from fembeam.response import READOUT_FINITE, expected_readout
 from fembeam.scene import ON
-from solvers.problem import Transitions, columns_of
+from solvers.problem import FrictionLog, Transitions, columns_of
 
 Shape = tuple[int, ...]
-TRANSITION_COLUMNS = len(columns_of(Transitions))
+TRANSITION_COLUMNS, FRICTION_COLUMNS = len(columns_of(Transitions)), len(columns_of(FrictionLog))
 BOOLEAN = ("kinds", "contact_entry_rate_clipped")
-FINITE = {"transitions", "end", "shapes", "directions", "impactor_masses", "circles", *READOUT_FINITE}
+FINITE = {"transitions", "end", "shapes", "directions", "impactor_masses", "circles", "rubs", *READOUT_FINITE}
 
 
 def outline(shape: Shape, dtype: np.dtype[Any]) -> Any:
@@ -52,7 +53,7 @@ def check(arrays: Mapping[str, Any]) -> None:
         _need(np.isfinite(arrays[name]).all(), f"{name} must be finite")
     _need(np.isfinite(arrays["stops"][:, 1:]).all(), "stops must be finite but for places by name")
     _need(np.all(arrays["impactor_masses"] > 0), "impactor_masses must be positive")
-    rows = len(arrays["stops"]) + np.count_nonzero(arrays["circles"][:, 0] if "circles" in arrays else ())
+    rows = _rows(arrays)
     _need(len(arrays["directions"]) == rows, f"directions must have {rows} rows, there are {len(arrays['directions'])}")
     beams = sum(name.split("_")[0] == "nodes" for name in arrays)
     most = [beams, len(ON), max(beams, len(arrays["impactor_masses"]))]
@@ -60,16 +61,28 @@ def check(arrays: Mapping[str, Any]) -> None:
     _need(whole, f"on must hold whole numbers from 0, below {most}")
     contact, m = arrays["transitions"][:, 0], len(arrays["stops"])
     _need(np.all((contact >= 0) & (contact < m)), f"transitions must name contacts, 0 to {m - 1}")
+    rubbing = arrays["friction_log"][:, 0] if "friction_log" in arrays else contact
+    _need(np.all((rubbing >= 0) & (rubbing < m)), f"friction_log must name contacts, 0 to {m - 1}")
     _check_log(arrays)
+
+
+def _rows(arrays: Mapping[str, Any]) -> int:
+    """Rows of all contacts: two of a circle; with friction one more, but of a circle without radius."""
+    none = np.zeros((len(arrays["stops"]), 4))
+    circle, rubs = arrays.get("circles", none)[:, 0] != 0.0, arrays.get("rubs", none)
+    return int(np.sum(1 + circle + ((rubs[:, 1] != 0.0) & (~circle | (rubs[:, 2] != 0.0)))))
 
 
 def expected(arrays: Mapping[str, Any]) -> dict[str, Shape]:
     """{name: shape} that follow from q, stops, the nodes and the entries of the log."""
     (k, n), m, entries = arrays["q"].shape, len(arrays["stops"]), arrays["contact_stop"].size
-    r = arrays["directions"].shape[0] if "circles" in arrays else m
+    rubs = "rubs" in arrays
+    r = arrays["directions"].shape[0] if "circles" in arrays or rubs else m
     shapes: dict[str, Shape] = {"t": (k,), "q_dot": (k, n), "force": (r, k), "stops": (m, 3), "directions": (r, n)}
     shapes |= {"circles": (m, 3)} if "circles" in arrays else {}
-    shapes |= {"kinds": (m, 2), "on": (m, 3), "mean_force": (m, k), "losses": (m, 3), "work": (k, m)}
+    if rubs:
+        shapes |= {"rubs": (m, 4), "friction_log": (len(arrays["friction_log"]), FRICTION_COLUMNS)}
+    shapes |= {"kinds": (m, 2), "on": (m, 3), "mean_force": (m, k), "losses": (m, 5 if rubs else 3), "work": (k, m)}
     shapes["transitions"] = len(arrays["transitions"]), TRANSITION_COLUMNS
     shapes["end"] = (max(2 * n, arrays["end"].size),)
     shapes["impactor_masses"] = (min(arrays["impactor_masses"].size, n),)

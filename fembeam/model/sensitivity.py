@@ -317,6 +317,7 @@ def of_run(run: Run, parameter: str | None, start: ArrayLike | None) -> Sensitiv
         raise ValueError("a run read from a file has no model to be derived from; simulate it again")
     require((parameter is None) != (start is None), "give a parameter or a direction of the start", (parameter, start),
             "Run.sensitivity", "e.g. 'stops[0].gap'")  # fmt: skip
+    _check_stops(model, "Run.sensitivity")
     times = run.t if run.sampled else np.array([made.duration])
     x, n = made.start, len(model.omega)
     options = {"method": made.solver, "memory": run.began or None}
@@ -327,6 +328,13 @@ def of_run(run: Run, parameter: str | None, start: ArrayLike | None) -> Sensitiv
     varied = _Varied(model, path_of(model.scene, parameter))
     found = sensitivity(model.system, x[:n], x[n:], made.duration, times, varied.systems, varied.start(x), **options)
     return _warned(Sensitivity(varied.path, varied.value, run, found, 0.0, varied.models, varied.systems))
+
+
+def _check_stops(model: Model, where: str) -> None:
+    """Raise ValueError for stops whose derivatives are not known: circular clearances, and those with friction."""
+    beyond = [one.name for one in model.contact_rows if one.is_circle or one.friction]
+    require(not beyond, "derivatives are of stops on lines, without friction", beyond, where,
+            "take differences of runs")  # fmt: skip
 
 
 def _direction(model: Model, start: Any) -> Vector:
@@ -366,6 +374,7 @@ def of_amplitude(orbit: Orbit, z: Any, parameter: str) -> float:
 def of_orbit(orbit: Orbit, parameter: str, times: Vector | None = None) -> Sensitivity:
     """See `Orbit.sensitivity`; at ``times`` (s since ``found.phase``, ascending) instead of those of the run."""
     model, found = orbit.model, orbit.found
+    _check_stops(model, "Orbit.sensitivity")
     varied, n = _Varied(model, path_of(model.scene, parameter)), len(model.omega)
     later, system = varied.systems.map(lambda one: delayed(one, found.phase)), delayed(found.system, found.phase)
     known = found.state[:n], found.state[n:], found.period

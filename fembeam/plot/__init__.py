@@ -11,7 +11,7 @@ from fembeam.model import places
 from fembeam.plot.animation import animate, frame
 from fembeam.plot.basins import basins
 from fembeam.plot.campbell import campbell
-from fembeam.plot.clearance import orbit_in_clearance
+from fembeam.plot.clearance import forces_in_clearance, orbit_in_clearance
 from fembeam.plot.contact_histograms import contacts
 from fembeam.plot.laws import equivalent, hysteresis, identification, loops, restitutions
 from fembeam.plot.linear import floor_spectrum, frequency_response, response_spectrum
@@ -29,9 +29,9 @@ from fembeam.plot.variation import minimum, variation
 
 __all__ = [
     "animate", "backbone", "basins", "batches", "bifurcation", "branch", "campbell", "contacts", "deflected",
-    "densities", "equivalent", "floor_spectrum", "frame", "frequency_response", "hysteresis", "identification",
-    "loops", "minimum", "mode_count", "mode_shapes", "natural", "one_legend", "orbit", "orbit_in_clearance", "peak",
-    "peak_curve", "peaks", "places", "random_densities", "random_spectra", "response_spectrum", "responses",
-    "restitutions", "rig", "sampling_of", "segment_for", "smallest_model", "spectra_of", "spectrum", "speed_accuracy",
-    "stability_map", "stationary", "styled", "time_history", "variation",
+    "densities", "equivalent", "floor_spectrum", "forces_in_clearance", "frame", "frequency_response", "hysteresis",
+    "identification", "loops", "minimum", "mode_count", "mode_shapes", "natural", "one_legend", "orbit",
+    "orbit_in_clearance", "peak", "peak_curve", "peaks", "places", "random_densities", "random_spectra",
+    "response_spectrum", "responses", "restitutions", "rig", "sampling_of", "segment_for", "smallest_model",
+    "spectra_of", "spectrum", "speed_accuracy", "stability_map", "stationary", "styled", "time_history", "variation",
 ]  # fmt: skip

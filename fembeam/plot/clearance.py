@@ -1,4 +1,4 @@
-"""The path of a place in its clearance circle."""
+"""The path of a place in its clearance circle, and the forces there over the angle of the place."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.rig_words import length
 from fembeam.plot.run_signals import sampling_of
-from fembeam.plot.style import BLUE, GREY, RED, styled
+from fembeam.plot.style import BLUE, GREEN, GREY, RED, Vector, styled
+from fembeam.response import states
 from fembeam.structures import direction_of, named
 from fembeam.support import require
 
@@ -27,7 +28,7 @@ ROUND = np.linspace(0.0, 2.0 * np.pi, 361)
 def orbit_in_clearance(
     run: Run, stop: int | str = 0, window: tuple[float, float] | None = None, axes: Axes | None = None
 ) -> Figure:
-    """The path of a place in the circle of its annular stop, red while it is in contact.
+    """The path of a place in the circle of its annular stop, red while it is in contact; with friction green in stick.
 
     Parameters
     ----------
@@ -59,22 +60,88 @@ def orbit_in_clearance(
     d = run.place_in_clearance(number)
     kept = np.flatnonzero((run.t >= lo) & (run.t <= hi))
     require(len(kept) > 1, "the window must hold at least 2 samples", (lo, hi), "orbit_in_clearance", "widen it")
-    t, rates = run.t[kept], run.q_dot[kept] @ run.directions[run._rows[number]].T
+    t, rates = run.t[kept], run.q_dot[kept] @ run.directions[run._rows[number]][:2].T
     fine = np.linspace(t[0], t[-1], FINER * (len(t) - 1) + 1)
     path = 1e3 * CubicHermiteSpline(t, d[kept], rates)(fine)
     size = 1e3 * abs(radius)
     touching = np.sign(radius) * (np.linalg.norm(path, axis=1) - size) > 0.0
+    parts = [(BLUE, "free", ~touching), (RED, "in contact", touching)]
+    if run.rubs[number, 1]:
+        stuck = _sticks(run, number, fine) & touching
+        parts[1:] = [(RED, "slips", touching & ~stuck), (GREEN, "sticks", stuck)]
     figure, (axis,) = sheet(1, 1, (5.0, 5.0), axes)
     axis.plot(size * np.cos(ROUND), size * np.sin(ROUND), "--", color=GREY, label=f"clearance {length(abs(radius))}")
-    for colour, label, shown in ((BLUE, "free", ~touching), (RED, "in contact", touching)):
+    for colour, label, shown in parts:
         own = np.where((shown | np.append(shown[1:], False))[:, None], path, np.nan)
         axis.plot(*own.T, color=colour, linewidth=0.9, label=label)
     x, y = (_way(direction) for direction in run.acting[number][1])
     of_centre = " from the centre" if any(centre) else ""
     axis.set(xlabel=f"{x}{of_centre} / mm", ylabel=f"{y}{of_centre} / mm")
     axis.set_aspect("equal", adjustable="datalim")
-    legend(axis, axes is None, "outside lower center", **({"ncols": 3} if axes is None else {}))
+    legend(axis, axes is None, "outside lower center", **({"ncols": len(parts) + 1} if axes is None else {}))
     heading([axis], f"Path at {run.name(number)}", axes is None, run=run)
+    return figure
+
+
+def _sticks(run: Run, stop: int, t: Vector) -> Any:
+    """Whether the slider of a stop sticks at times."""
+    times, codes, _ = states(run, stop)
+    return np.append(codes, np.nan)[np.searchsorted(times, t, side="right") - 1] == 0.0
+
+
+@styled
+def forces_in_clearance(
+    run: Run, stop: int | str = 0, window: tuple[float, float] | None = None, axes: Axes | None = None
+) -> Figure:
+    """Forces of an annular stop at the samples in polar form: N, with friction |F_t|, over the angle of its place.
+
+    Parameters
+    ----------
+    run : with at least 2 samples. stop : number or name of an annular stop.
+    window : (from, to) in s; None: all of the run.
+    axes : polar ones to draw into; None makes a figure.
+
+    Raises
+    ------
+    ValueError : a stop on a line, a window without samples, axes that are not polar.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> from contacts import Hertz
+    >>> tube = fb.Frame.straight(1.0, fb.Section.circle(2.1e11, 7800.0, 0.01), bending_only=True)
+    >>> loads = [fb.PointForce("B", fb.Harmonic(2.0, 40.0, phase), direction=n) for n, phase in [("x", 0.0), ("y", 1)]]
+    >>> scene = fb.Scene(tube, [fb.Clamped("A")], stops=[fb.AnnularStop("B", Hertz(1e8), 1e-3)], forces=loads)
+    >>> run = scene.reduce(modes=2).simulate(duration=1.0, dt=1e-3)
+    >>> [line.get_label() for line in forces_in_clearance(run).axes[0].lines]
+    ['N']
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    sampling_of(run)
+    number = run._stop(stop)
+    lo, hi = (float(run.t[0]), float(run.t[-1])) if window is None else window
+    d, kept = run.place_in_clearance(number), (run.t >= lo) & (run.t <= hi)
+    require(int(np.count_nonzero(kept)) > 1, "the window must hold at least 2 samples", (lo, hi), "forces_in_clearance",
+            "widen it")  # fmt: skip
+    polar = axes is None or axes.name == "polar"
+    require(polar, "axes must be polar", axes, "forces_in_clearance", "make them with projection='polar'")
+    figure, found = sheet(1, 1, (5.0, 5.2), axes, subplot_kw={"projection": "polar"})
+    axis: Any = found[0]
+    angle, normal = np.arctan2(d[:, 1], d[:, 0]), run._normal_force(number)
+    drawn = {"N": (RED, normal)} | ({"$|F_t|$": (GREEN, np.abs(run.friction(number)))} if run.rubs[number, 1] else {})
+    for label, (colour, force) in drawn.items():
+        shown = kept & (normal > 0.0)
+        axis.plot(angle[shown], force[shown], ".", color=colour, markersize=2.5, label=label)
+    x, y = (_way(direction) for direction in run.acting[number][1])
+    axis.set_xticks(0.5 * np.pi * np.arange(4), [x, y, f"-{x}", f"-{y}"])
+    axis.set_ylim(0.0)
+    axis.set_rlabel_position(67.5)
+    axis.yaxis.set_major_locator(MaxNLocator(4))
+    axis.tick_params(axis="y", labelsize=8, labelcolor=GREY)
+    axis.grid(linewidth=0.4)
+    legend(axis, axes is None, "outside lower center", **({"ncols": 2} if axes is None else {"loc": "lower right"}))
+    heading([axis], f"Forces at {run.name(number)} / N", axes is None, run=run)
     return figure
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fembeam.plot.figure import heading
 from fembeam.plot.rig_symbols import BLACK, COLOURS, circle
-from fembeam.plot.rig_words import WIDE, gap_words, length, motion_words, signal_words
+from fembeam.plot.rig_words import WIDE, friction_words, gap_words, length, motion_words, signal_words
 from fembeam.plot.style import BLUE, GREEN
 from fembeam.scene import AnnularStop, Pinned
 from fembeam.support import require
@@ -158,12 +158,13 @@ class _Panel:
         to, colour = one.coordinate.to, COLOURS["element" if one.always else "stop"]
         if to is not None and (to[0] or self.number) == self.number:
             self._plot(axis, np.array([self.places[repr(one.z)], self.places[repr(to[1])]]), colour, 1.0, "--")
+        rubs = f", {words}" if (words := friction_words(one)) else ""
         if isinstance(one, AnnularStop):
             self._ring(axis, one, colour)
-            return f"{self._label(one)}, clearance {length(one.clearance)}"
+            return f"{self._label(one)}, clearance {length(one.clearance)}{rubs}"
         if not one.always:
             self._arrow(axis, one, -one.push * np.array(one.coordinate.along), colour)
-            return f"{self._label(one)}, {gap_words(one.gap, one.coordinate.rotation)}"
+            return f"{self._label(one)}, {gap_words(one.gap, one.coordinate.rotation)}{rubs}"
         if to is None:
             self._to_frame(axis, one, colour, ZIGZAG)
         return self._label(one)

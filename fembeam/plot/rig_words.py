@@ -65,6 +65,7 @@ def _facts(part: Any) -> Iterator[str]:
         case Stop() | Element():
             yield gap_words(part.gap, part.coordinate.rotation) if part.gap or not part.always else ""
             yield law_words(part.law)
+            yield friction_words(part)
             yield f"to {part.coordinate.to_words}" if part.name and part.coordinate.to else ""
         case PointForce() | PointMoment():
             yield signal_words(part.signal, "N m" if isinstance(part, PointMoment) else "N")
@@ -103,6 +104,20 @@ def gap_words(gap: float, rotation: bool) -> str:
         return "no gap"
     size = f"{abs(gap):.4g} rad" if rotation else length(abs(gap))
     return f"gap {size}" if gap > 0.0 else f"pressed on by {size}"
+
+
+def friction_words(part: Any) -> str:
+    """The coefficient of friction of a stop that has one.
+
+    Examples
+    --------
+    >>> from contacts import Hertz
+    >>> from fembeam import Friction
+    >>> friction_words(Stop("C", Hertz(1e9), direction="-y", friction=Friction(0.3, 5e5), tangent="x"))
+    'μ = 0.3'
+    """
+    friction = getattr(part, "friction", None)
+    return "" if friction is None else f"μ = {friction.mu:.4g}"
 
 
 def length(value: float) -> str:

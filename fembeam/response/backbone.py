@@ -22,9 +22,9 @@ NODES = 48  # of Gauss and Legendre on each piece between the places where stops
 def backbone(model: Model, z: float, amplitudes: Vector) -> Vector:
     """Ω (k,) in rad/s at which the lowest mode vibrates freely with max |u(z)| of so many m (k,), > 0.
 
-    NaN where this does not hold: gravity or preload, bodies that touch each other, annular stops, a mode at rest at z,
-    forces that attract, laws with memory. Errors below 1e-6 for smooth laws; where other modes take part the backbone
-    of the structure lies beside.
+    NaN where this does not hold: gravity or preload, bodies that touch each other, annular stops, friction, a mode at
+    rest at z, forces that attract, laws with memory. Errors below 1e-6 for smooth laws; where other modes take part the
+    backbone of the structure lies beside.
 
     References
     ----------
@@ -32,7 +32,7 @@ def backbone(model: Model, z: float, amplitudes: Vector) -> Vector:
     """
     shape = float(model.phi(z)[0])
     apart = all(row.on[0] == "frame" and row.body == 0 and not row.remembers for row in model.contact_rows)
-    apart = apart and not any(row.is_circle for row in model.contact_rows)
+    apart = apart and not any(row.is_circle or row.friction for row in model.contact_rows)
     loaded = any(row.force(-row.gap) != 0.0 for row in model.contact_rows)
     if model.scene.gravity != 0.0 or loaded or not apart or model.omega[0] == 0.0 or shape == 0.0:
         return np.full(len(amplitudes), np.nan)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.path import renew
+from fembeam.response.friction import FREE, friction_force, on_rows
 
 if TYPE_CHECKING:
     from fembeam.response.histories import Histories
@@ -26,6 +27,9 @@ def forces(run: Histories) -> Vector:
     found: list[Vector] = []
     for stop, contact in enumerate(run.readout.model.contact_rows):
         force = _force_of(run, stop, contact)
+        if contact.friction is not None:
+            found += on_rows(run, stop, force, friction_force(run, stop, force))
+            continue
         found += [-force * along for along in run._outward(stop).T] if contact.is_circle else [force]
     return np.array(found).reshape(len(found), len(run.t))
 
@@ -57,10 +61,13 @@ def force_at(run: Histories, stop: int, contact: ContactRow, t: Vector, delta: V
 def latched_before(run: Histories, time: float) -> tuple[Vector, ...]:
     """What each law has latched before a time of the run; empty without laws with memory."""
     rows, found = run.readout.model.contact_rows, []
-    for stop, contact in enumerate(rows) if any(row.remembers for row in rows) else ():
+    for stop, contact in enumerate(rows) if any(row.latched for row in rows) else ():
         law: Any = contact.law
         parameters = _parameters_at_start(run, stop, law)
         log = run.transitions
+        if contact.friction is not None:  # undrawn: what it has latched lies in the whole run
+            found.append(np.array([FREE, 0.0]))
+            continue
         for at in np.flatnonzero((log.contact == stop) & (log.t < time)):
             renew(law, int(log.border[at]), log.delta[at], log.delta_dot[at], parameters)
         found.append(parameters[list(getattr(law, "memory", ()))])

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from fembeam.model import Model
     from fembeam.response.section_forces import Extremes
-    from solvers.problem import ContactLog, Losses, Transitions
+    from solvers.problem import ContactLog, FrictionLog, Losses, Transitions
 
 Vector = NDArray[np.float64]
 
@@ -45,6 +45,7 @@ class Histories:
     stops: Vector
     directions: Vector
     circles: Vector
+    rubs: Vector
     impactor_masses: Vector
     kinds: NDArray[np.bool_]
     shapes: Any  # Shapes, of a body with places by name PlacedShapes
@@ -56,8 +57,14 @@ class Histories:
     began: tuple[Vector, ...]
     model: Model | None
     kept: Mapping[str, Any]
+    end: Vector | None
+    reached: float
 
     if TYPE_CHECKING:  # made by the run when first read
+
+        @property
+        def friction_log(self) -> FrictionLog:
+            """What friction did in every contact."""
 
         @property
         def transitions(self) -> Transitions:
@@ -270,7 +277,7 @@ class Histories:
     def _deformation_rate(self, stop: int) -> Vector:
         """δ̇ (k,), likewise."""
         if self.circles[stop, 0]:
-            rates = self.q_dot @ self.directions[self._rows[stop]].T
+            rates = self.q_dot @ self.directions[self._rows[stop]][:2].T
             return np.asarray(np.sum(self._outward(stop) * rates, axis=1))
         return -self.q_dot @ self.directions[self._rows[stop].start]
 
@@ -281,15 +288,38 @@ class Histories:
                 "ask for its indentation")  # fmt: skip
         return self._at_samples(self._in_circle(number))
 
+    def friction(self, stop: int | str = 0) -> Vector:
+        """F_t(t) (k,) of a stop with friction, N: the force on its place against ξ, positive where ξ̇ > 0 in slip.
+
+        ξ goes along the tangent of a stop; in a circular clearance it is c θ + R (φ + Ω t), with the torque -R F_t on
+        the place. ValueError for a stop without friction.
+        """
+        from fembeam.response import read_back
+
+        return self._at_samples(read_back(self, self._rubbing(stop)))
+
+    def sliding_speed(self, stop: int | str = 0) -> Vector:
+        """ξ̇(t) (k,) of a stop with friction, m/s, whether it is open or in contact; ValueError for another stop."""
+        from fembeam.response import sliding
+
+        return self._at_samples(sliding(self, self._rubbing(stop))[1])
+
+    def _rubbing(self, stop: int | str) -> int:
+        """The number of a stop that has friction, checked."""
+        number = self._stop(stop) % len(self.stops)
+        require(self.rubs[number, 1] > 0.0, "the stop must have friction", stop, "Run", "give it a Friction")
+        return number
+
     @cached_property
     def _rows(self) -> list[slice]:
-        """Which rows of `directions` are those of each contact: two of a circular clearance."""
-        ends = np.cumsum([0, *np.where(self.circles[:, 0] != 0.0, 2, 1)]).tolist()
+        """Which rows of `directions` are those of each contact: two of a circular clearance, with friction one more."""
+        circle, rubs = self.circles[:, 0] != 0.0, self.rubs[:, 1] != 0.0
+        ends = np.cumsum([0, *(1 + circle + (rubs & (~circle | (self.rubs[:, 2] != 0.0))))]).tolist()
         return [slice(a, b) for a, b in pairwise(ends)]
 
     def _in_circle(self, stop: int) -> Vector:
         """D (k, 2) of a circular clearance."""
-        return np.asarray(self.q @ self.directions[self._rows[stop]].T - self.circles[stop, 1:])
+        return np.asarray(self.q @ self.directions[self._rows[stop]][:2].T - self.circles[stop, 1:])
 
     def _outward(self, stop: int) -> Vector:
         """Unit vectors (k, 2) along which δ of a circular clearance grows: ± d/r; zeros at the centre."""
@@ -301,7 +331,8 @@ class Histories:
         """Contact force (k,) of a stop, N or N m, from its law and the entry rate latched at the time; of an element F.
 
         ``stop``: its number, or its name as in ``run.force("valve")``. Of an annular stop (k, 2), its components on the
-        place along both directions; with ``mean`` the size N (k,).
+        place along both directions, of a stop with friction N and the force on the place along its tangent; with
+        ``mean`` the size N (k,). `friction` gives F_t.
 
         ``mean``: over each sample (halfway to its neighbours) instead of at it, so that contacts shorter than a sample
         are seen: the trapezoidal rule over the samples gives impulses as exactly as the run has them, those of the log
@@ -311,7 +342,7 @@ class Histories:
         if mean:
             return mean_force(self, self._stop(stop))
         number = self._stop(stop)
-        forces = self._forces[self._rows[number]]
+        forces = self._forces[self._rows[number]][:2]
         return self._at_samples(forces.T if self.circles[number, 0] else forces[0])
 
     @cached_property
@@ -322,7 +353,7 @@ class Histories:
     def _normal_force(self, stop: int) -> Vector:
         """Contact force (k,) along which δ shrinks: of any stop, N of a circular clearance."""
         forces = self._forces[self._rows[stop]]
-        return -np.sum(self._outward(stop).T * forces, axis=0) if self.circles[stop, 0] else forces[0]
+        return -np.sum(self._outward(stop).T * forces[:2], axis=0) if self.circles[stop, 0] else forces[0]
 
     def _stop(self, stop: int | str) -> int:
         """The number of a contact, checked, of one called by its name too."""

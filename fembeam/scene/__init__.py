@@ -1,7 +1,8 @@
 """The scene: supports, masses, springs, stops, elements, impactors, loads; full matrices, contact rows, signals.
 
-Imports: `beams`, `structures`, `excitation`, `support`, `reduction`; inside the methods `Scene.reduce` also
-`fembeam.model`, `Scene.figure` `fembeam.plot`, `Scene.check` `fembeam.inspection`. Begin with `scene`, then `assembly`.
+Imports: `beams`, `structures`, `excitation`, `support`, `reduction`, of `solvers` `Friction`; inside the methods
+`Scene.reduce` also `fembeam.model`, `Scene.figure` `fembeam.plot`, `Scene.check` `fembeam.inspection`. Begin with
+`scene`, then `assembly`.
 """
 
 from fembeam.scene.annular_stop import AnnularStop
@@ -38,6 +39,7 @@ from fembeam.scene.parts import (
 )
 from fembeam.scene.places import At, Place, is_pair, is_place, said, split, told
 from fembeam.scene.rotors import Disk, Unbalance
+from fembeam.scene.rubbing import Friction, spin_of
 from fembeam.scene.scene import FEATURES, Scene
 from fembeam.scene.signals import PLACES, for_duration, persistent_drive, signals_of, support_motion, with_signals
 from fembeam.scene.source import Source

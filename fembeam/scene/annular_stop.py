@@ -15,20 +15,25 @@ from fembeam.scene.local_coordinate import LocalCoordinate, local_coordinate
 from fembeam.scene.part import ScenePart
 from fembeam.scene.places import Second, told
 from fembeam.scene.rotors import carrier
+from fembeam.scene.rubbing import ACROSS, Friction, check_round, check_spin, completed
 from fembeam.structures import COMPONENTS, Direction, Frame, direction_of, turns
 from fembeam.support import is_finite, require, require_positive
 
-ACROSS = 1e-9  # of 1: products of directions that are at right angles, axes that lie along a global one
 USUAL = ("x", "y")
 
 
 @dataclass(frozen=True, repr=False)
 class AnnularStop(ScenePart):
-    """A circular clearance without friction: the place moves freely within a circle of radius c, `clearance`.
+    """A circular clearance: the place moves freely within a circle of radius c, `clearance`.
 
     With d the two displacements of the place less `centre`, and r = |d|:
 
         δ = r - c,    δ̇ = d·ḋ/r,    force on the place -N(δ, δ̇) d/r;    outer: δ = c - r, the force +N d/r
+
+    With `friction` a force F_t acts against the sliding of its surface, of radius R; with d at the angle θ from the
+    first to the second direction, the place turned by φ about their axis, and the spin Ω of the `Frame` it is on:
+
+        ξ = c θ + R (φ + Ω t),    force on the place -F_t (c/r) e_θ, torque -R F_t on φ;    outer: with -R for R
 
     Parameters
     ----------
@@ -40,12 +45,16 @@ class AnnularStop(ScenePart):
     on : what the circle sits on, (body, place) or a place of the same body; None: the frame. d is then the difference.
     directions : two displacements at right angles, names or vectors; None: the two global axes across the member that
         the place is on, where that lies along the third.
+    friction : `Friction`, of limit μN; N < 0 of a law that adheres counts as 0. radius : R > 0, m, of the shaft or tube
+        itself: what its rotation and its spin rub at. φ is 0 where the body, or the modes kept, have no torsion. None:
+        a place that does not turn, ξ = c θ. What the circle sits on does not turn.
     name : keyword, as of all parts.
 
     Raises
     ------
     ValueError : a clearance that is not positive, a place that begins outside the circle (outer: inside), a law with
-        memory, directions that are rotations or not at right angles; in a scene of one plane.
+        memory, directions that are rotations or not at right angles; in a scene of one plane; friction without a radius
+        on a shaft that spins, a radius without friction.
 
     Examples
     --------
@@ -61,6 +70,8 @@ class AnnularStop(ScenePart):
     outer: bool = False
     on: Second | None = None
     directions: tuple[Direction, Direction] | None = None
+    friction: Friction | None = None
+    radius: float | None = None
     always = False
     push = 0.0  # it has no one side
     word = "annular stop"
@@ -77,6 +88,7 @@ class AnnularStop(ScenePart):
         check_law(self.law, where)
         require(not getattr(self.law, "memory", ()), "law must have no memory", self.law, where,
                 "choose another one, or put Elements or two Stops there")  # fmt: skip
+        check_round(self, where)
         self._check_directions(where)
         self._check_place(where)
 
@@ -128,13 +140,22 @@ class AnnularStop(ScenePart):
         return f"{self.word} at {at}" + (f", on {to}" if (to := self.coordinate.to_words) else "")
 
 
-def round_clearances(body: Any, stops: tuple[Any, ...]) -> tuple[Any, ...]:
-    """Stops with the directions of annular ones filled in; ValueError where the body has none for them."""
-    places = [f"stops[{i}] ({one.titled}) of Scene" for i, one in enumerate(stops)]
-    return tuple(
-        _directed(body, one, where) if isinstance(one, AnnularStop) else one
-        for one, where in zip(stops, places, strict=True)
-    )
+def directed_stops(body: Any, stops: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Stops with the directions of annular ones, and tangents of friction; ValueError where the body has none."""
+    return tuple(_on_body(body, one, f"stops[{i}] ({one.titled}) of Scene") for i, one in enumerate(stops))
+
+
+def _on_body(body: Any, stop: Any, where: str) -> Any:
+    """One with what the body says of it."""
+    if isinstance(stop, AnnularStop):
+        found = _directed(body, stop, where)
+        check_spin(body, found, where)
+        return found
+    if stop.friction is None:
+        return stop
+    body.check_place(stop.z, where)
+    tangent = completed(body, stop, where)
+    return stop if tangent is stop.tangent else replace(stop, tangent=tangent)
 
 
 def _directed(body: Any, stop: AnnularStop, where: str) -> AnnularStop:

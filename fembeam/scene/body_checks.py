@@ -43,6 +43,8 @@ def check_feature(body: Any, feature: Any, name: str, where: str) -> None:
         write = f"add direction={'rz' if turn else 'x'!r} or so; {what} has {', '.join(have)}"
         require(feature.direction is not None, "a place by name needs a direction", None, where, write)
         require_components(direction_of(feature.direction, where), have, what, where)
+        if getattr(feature, "tangent", None) is not None:
+            require_components(direction_of(feature.tangent, where), have, what, where)
     if isinstance(feature, Disk):
         check_shaft(body, feature, where)
     if name == "masses":
@@ -111,9 +113,10 @@ def check_conflicts(scene: Scene) -> None:
     _check_moved(scene)
     known: dict[Any, int] = {}
     for index, stop in enumerate(scene.stops):
-        one: Any = (stop.z, stop.push, *((place.along, place.to) for place in stop.coordinates))
+        one: Any = (stop.z, stop.push, stop.coordinate.along, stop.coordinate.to)
         if isinstance(stop, AnnularStop):
-            one, ways = (*one, stop.centre, stop.outer), [named(place.along) for place in stop.coordinates]
+            one = (*one, stop.coordinates[1].along, stop.centre, stop.outer)
+            ways = [named(place.along) for place in stop.coordinates]
         else:
             ways = [named(direction_of(stop.direction, "Stop"))]
         at = f"{told(stop.z)}, {' and '.join(ways)}"
@@ -143,6 +146,9 @@ def check_plain(feature: Any, name: str, where: str) -> None:
     require(is_finite(feature.z), "z must be a number on a Beam, which has no names", feature.z, where, "in m")
     require(not isinstance(feature, Disk), "a Disk needs a shaft: a straight Frame in space", feature, where,
             "use Frame.straight, or a LumpedMass")  # fmt: skip
+    rubs = getattr(feature, "friction", None) is not None or getattr(feature, "tangent", None) is not None
+    require(not rubs, "friction acts along the surface of a stop, and a Beam bends in one plane", feature, where,
+            "make the Beam a Frame.straight, or leave the friction out")  # fmt: skip
     for key in ("offset", "inertia"):
         require(not isinstance(getattr(feature, key, 0.0), tuple), f"{key} must be one number on a Beam",
                 getattr(feature, key, 0.0), where, "give kg m², m")  # fmt: skip

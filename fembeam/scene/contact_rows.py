@@ -5,6 +5,8 @@
 Elements, which always act, are contacts with w = -W. A circular clearance has two rows, the coordinates of its place:
 
 d = W·u - centre, δ = |d| - c, and it pushes with -Wᵀ F d/|d|
+
+With friction there is a further row: along the tangent t of a stop, of the rotation φ in a circular clearance.
 """
 
 from __future__ import annotations
@@ -20,8 +22,10 @@ from scipy import sparse
 from fembeam.excitation import Harmonic
 from fembeam.scene.annular_stop import AnnularStop
 from fembeam.scene.body_assembly import BodyMatrices
+from fembeam.scene.body_checks import components_at
 from fembeam.scene.element import force_both_ways
 from fembeam.scene.local_coordinate import LocalCoordinate
+from fembeam.scene.rubbing import Friction, spin_of, turning_row
 from fembeam.scene.signals import support_motion
 
 if TYPE_CHECKING:
@@ -42,7 +46,8 @@ class ContactRow:
 
     Attributes
     ----------
-    row : w (1, N) sparse, on all free dofs; of a circular clearance W (2, N).
+    row : w (1, N) sparse, on all free dofs; of a circular clearance W (2, N); of an oblique stop w and t (2, N); of a
+        circular clearance with a radius a third row, of φ, zero where nothing turns.
     law, gap : as in `Stop`.
     push : +1 when it pushes its beam up, -1 down.
     body, z : the beam it pushes (0 the scene's own) and where.
@@ -51,6 +56,7 @@ class ContactRow:
     name : of the part, given or made; of an impactor on both sides with its side. given : whether it was given.
     direction : as given, of places by name; of a circular clearance both.
     circle : (radius, x, y) of a circular clearance, m: the radius negative where the place is outside; else zeros.
+    friction : as given, or None. radius : R of the place's own surface, m, 0 without. spin : Ω there, rad/s.
     """
 
     row: sparse.csr_matrix
@@ -66,6 +72,17 @@ class ContactRow:
     given: bool = False
     direction: Any = None
     circle: tuple[float, float, float] = LINE
+    friction: Friction | None = None
+    radius: float = 0.0
+    spin: float = 0.0
+
+    @property
+    def rub(self) -> tuple[float, float, float, float]:
+        """μ, k_t in N/m, R in m (negative of an outer circle) and Ω in rad/s; zeros without friction."""
+        if self.friction is None:
+            return (0.0, 0.0, 0.0, 0.0)
+        arm = -self.radius if self.circle[0] < 0.0 else self.radius
+        return self.friction.mu, float(self.friction.stiffness or 0.0), arm, self.spin
 
     @property
     def is_circle(self) -> bool:
@@ -74,13 +91,19 @@ class ContactRow:
 
     @property
     def gaps(self) -> tuple[float, ...]:
-        """Of each row: -row·u - gap is δ; of a circular clearance -d."""
-        return (self.gap,) if not self.is_circle else (-self.circle[1], -self.circle[2])
+        """Of each row: -row·u - gap is δ; of a circular clearance -d; of what friction adds 0."""
+        own = (self.gap,) if not self.is_circle else (-self.circle[1], -self.circle[2])
+        return (*own, *(self.row.shape[0] - len(own)) * (0.0,))
 
     @property
     def remembers(self) -> bool:
         """Whether its law has a memory: latched numbers that are renewed on borders."""
         return bool(getattr(self.law, "memory", ()))
+
+    @property
+    def latched(self) -> int:
+        """How many numbers it latches: those of its law, code and place of the slider of friction."""
+        return len(getattr(self.law, "memory", ())) + (0 if self.friction is None else 2)
 
     def force(self, delta: Any, rate: Any = 0.0, entry_rate: Any = 1.0) -> Any:
         """Force on arrays: of an element at both signs of δ, of others zero where δ <= 0."""
@@ -103,11 +126,14 @@ def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
             place = one.coordinate
             on = ("frame", 0) if place.to is None else ("body", place.to[0] or body)
             if isinstance(one, AnnularStop):
-                yield _circle(one, matrices, body, on)
+                yield _circle(one, matrices, part.beam, body, on)
                 continue
             row, name = one.push * place.row(matrices, body), _name(one, body)
             kind = place.rotation, one.always, *name, one.direction
-            yield ContactRow(row, one.law, one.gap, one.push, body, one.z, on, *kind)
+            rub = getattr(one, "friction", None)
+            if rub is not None:
+                row = sparse.vstack([row, one.coordinates[1].row(matrices, body)], format="csr")
+            yield ContactRow(row, one.law, one.gap, one.push, body, one.z, on, *kind, friction=rub)
         for impactor in part.impactors:
             row = impactor.coordinates[0].row(matrices, body) - matrices.impactor_row(count)
             label, given = _name(impactor, body)
@@ -119,13 +145,19 @@ def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
             count += 1
 
 
-def _circle(stop: AnnularStop, matrices: Matrices, body: int, on: tuple[str, int]) -> ContactRow:
+def _circle(stop: AnnularStop, matrices: Matrices, beam: Any, body: int, on: tuple[str, int]) -> ContactRow:
     """One circular clearance."""
-    rows = sparse.vstack([place.row(matrices, body) for place in stop.coordinates], format="csr")
+    rows = [place.row(matrices, body) for place in stop.coordinates]
+    rub: dict[str, Any] = {"friction": stop.friction}
+    if stop.radius is not None:
+        turning = turning_row(stop, components_at(beam, stop.z))
+        rows.append(0.0 * rows[0] if turning is None else turning.row(matrices, body))
+        rub |= {"radius": float(stop.radius), "spin": spin_of(beam, stop)}
     circle = -stop.clearance if stop.outer else stop.clearance, *stop.centre
     numbered = not getattr(matrices.beams[body].beam, "meshed", True)  # a number is a node, not m
     kind = False, False, stop.label_on(body, numbered), stop.name is not None, stop.directions, circle
-    return ContactRow(rows, stop.law, stop.clearance, stop.push, body, stop.z, on, *kind)
+    all_rows = sparse.vstack(rows, format="csr")
+    return ContactRow(all_rows, stop.law, stop.clearance, stop.push, body, stop.z, on, *kind, **rub)
 
 
 def _name(part: ScenePart, body: int) -> tuple[str, bool]:

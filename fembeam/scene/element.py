@@ -125,10 +125,10 @@ def force_both_ways(law: Any, d: Any, rate: Any = 0.0) -> NDArray[np.float64]:
     return np.asarray(law.batch(1.0)(d.ravel(), rate.ravel())).reshape(d.shape)
 
 
-def tangent(law: Any, d: float, rate: float = 0.0) -> tuple[float, float]:
+def tangent(law: Any, d: float, rate: float = 0.0, entry_rate: float = 1.0) -> tuple[float, float]:
     """∂F/∂d and ∂F/∂ḋ of a law at one deformation, of one with memory at the start of a run."""
     pointer = ctypes.POINTER(ctypes.c_double)
     arrays = [np.array(x, dtype=float, ndmin=1) for x in (d, rate, law.parameters, 0.0, 0.0, 0.0)]
     at = [x.ctypes.data_as(pointer) for x in arrays]
-    law.gradient.ctypes(1, *at[:2], 1.0, *at[2:])
+    law.gradient.ctypes(1, *at[:2], entry_rate, *at[2:])
     return float(arrays[3][0]), float(arrays[4][0])

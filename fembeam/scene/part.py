@@ -9,7 +9,7 @@ from typing import Any
 from fembeam.scene.places import Place, place_words, said, told
 from fembeam.support import is_whole, require, require_place
 
-UNSAID = ("direction", "motion", "name")  # of a part, when they are None: as in scenes of a straight beam
+UNSAID = ("direction", "motion", "name", "friction", "tangent", "radius")  # of a part, when they are None
 
 
 @dataclass(frozen=True, repr=False)

@@ -7,13 +7,14 @@ There `direction` says along what a part acts: "x", "-y", "rz" (a rotation), or 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 from fembeam.scene.impactor import check_law
 from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
 from fembeam.scene.part import ScenePart
 from fembeam.scene.places import Place, Second, sign_of
+from fembeam.scene.rubbing import Friction, check_oblique
 from fembeam.structures import COMPONENTS, Direction, Six, direction_of, turns
 from fembeam.support import require, require_finite, require_non_negative
 
@@ -249,9 +250,11 @@ class Stop(ScenePart):
     beam of the scene: `on=(body, z)`, body 1 the first of `Scene.bodies`; u is then the difference, u - u_body(z). A
     number for `on` is a second place on the same beam. With `of="rotation"` it limits the slope u_z, a hinge with
     freeplay: gap in rad, force a moment in N m, "below" stops u_z < 0, "above" u_z > 0.
+    `friction`, a `Friction` under the stop's own force, acts along `tangent` t, at right angles to the direction,
+    against ξ = t·u: an oblique contact of a frame or structure; in a plane frame t is the other way in the plane.
     `name` (keyword, as of all parts): what the contact log, tables and figures call it, unique in a scene.
     ValueError for a side that is neither "below" nor "above", a side beside a direction, an `of` that is neither, a gap
-    that is not finite.
+    that is not finite; for friction of a rotation, on a `Beam`, without a tangent, or with one that is not across.
 
     Examples
     --------
@@ -265,6 +268,8 @@ class Stop(ScenePart):
     (1.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     >>> both[0].label, Stop("lever", Hertz(1e9), direction="-x").label
     ('stop at 0.2 m, below', 'stop at lever, -x')
+    >>> Stop("C", Hertz(1e9), direction="-y", friction=Friction(0.3, stiffness=5e5), tangent="x").friction
+    Friction(mu=0.3, stiffness=500000.0)
     """
 
     law: Any
@@ -273,6 +278,8 @@ class Stop(ScenePart):
     on: Second | None = None
     of: Of = "displacement"
     direction: Direction | None = None
+    friction: Friction | None = None
+    tangent: Direction | None = None
     always = False
     word = "stop"
 
@@ -291,6 +298,11 @@ class Stop(ScenePart):
         check_law(self.law, where)
         acts_always = getattr(self.law, "memory", ()) and not getattr(self.law, "one_sided", False)
         require(not acts_always, "law must be one that opens", self.law, where, "make it an Element, which always acts")
+        if isinstance(self.tangent, list):
+            object.__setattr__(self, "tangent", tuple(self.tangent))
+        check_oblique(self, where)
+        remembers = self.friction is not None and bool(getattr(self.law, "memory", ()))
+        require(not remembers, "law of a stop with friction must have no memory", self.law, where, "choose another one")
 
     @property
     def push(self) -> float:
@@ -306,8 +318,10 @@ class Stop(ScenePart):
 
     @property
     def coordinates(self) -> tuple[LocalCoordinate, ...]:
-        """All that it acts on: the one."""
-        return (self.coordinate,)
+        """All that it acts on: the one, with friction also that along its tangent."""
+        if self.tangent is None:
+            return (self.coordinate,)
+        return self.coordinate, replace(self.coordinate, direction=direction_of(self.tangent, self.where))
 
     def _made(self, at: str) -> str:
         of, on = " of rotation" * (self.direction is None and self.coordinate.rotation), self.coordinate.to_words

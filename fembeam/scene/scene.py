@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from fembeam.beams import Beam, ModalDamping, Rayleigh
-from fembeam.scene.annular_stop import AnnularStop, round_clearances
+from fembeam.scene.annular_stop import AnnularStop, directed_stops
 from fembeam.scene.assembly import Matrices, assemble, buckling_load
 from fembeam.scene.body_checks import check_conflicts, check_end, check_ends, check_feature, check_plain, is_body
 from fembeam.scene.element import Element
@@ -134,7 +134,7 @@ class Scene:
             if name == "forces":
                 object.__setattr__(self, name, driven(self.beam, tuple(self.forces)))
             if name == "stops" and self.named:
-                object.__setattr__(self, name, round_clearances(self.beam, tuple(self.stops)))
+                object.__setattr__(self, name, directed_stops(self.beam, tuple(self.stops)))
             self._check_places(name)
         if not callable(getattr(self.damping, "modal_coefficients", None)):
             raise TypeError(f"damping must be ModalDamping or Rayleigh, got {self.damping!r} in Scene; "

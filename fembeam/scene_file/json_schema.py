@@ -170,7 +170,7 @@ def _named(table: Schema) -> Schema:
     """A part at a place by name: `at` for z, a direction."""
     places = {key: PLACE for key in PLACES if key in table["properties"] or key == "at"}
     properties = {key: value for key, value in table["properties"].items() if key != "z"} | places
-    properties |= {"direction": DIRECTION} if "direction" in properties else {}
+    properties |= {key: DIRECTION for key in ("direction", "tangent") if key in properties}
     return {**table, "properties": properties, "required": [{"z": "at"}.get(key, key) for key in table["required"]]}
 
 

@@ -13,7 +13,7 @@ import solvers
 from fembeam.beams import Section, Taper
 from fembeam.excitation import BandNoise, Harmonic, Interpolation, Multisine, Pulse, Quantity, Record, SineSweep, Step
 from fembeam.excitation.earthquake import earthquake
-from fembeam.scene import PLACES, Fixed
+from fembeam.scene import PLACES, Fixed, Friction
 from fembeam.scene_file.keys import Constructors
 from fembeam.scene_file.structures import fixed
 from fembeam.study.quantities import QUANTITIES
@@ -112,6 +112,7 @@ KEYS = {
     **{key: SIGNAL for key in PLACES.values()},
     "solver": Nested(_methods),
     "quantity": Nested(lambda: QUANTITIES, by_name=True),
+    "friction": Nested(lambda: {"coulomb": Friction}, default="coulomb"),
 }
 
 

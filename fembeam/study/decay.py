@@ -96,9 +96,10 @@ def _linearised(model: Model, q: Vector, q_dot: Vector, size: float) -> tuple[Ve
     """Equivalent stiffness and damping (n, n) of the elements under a motion, its amplitudes taken so many times."""
     n = len(model.omega)
     K, C = np.zeros((n, n)), np.zeros((n, n))
-    for w, one in zip(model.directions, model.contact_rows, strict=True):
+    for own, one in zip(model.rows_of, model.contact_rows, strict=True):
         if not one.always:
             continue
+        w = model.directions[own.start]
         delta, rate = -(q @ w) - one.gap, -(q_dot @ w)
         X = size * math.sqrt(2.0) * float(delta.std())
         if not STUCK * max(one.law.reach, float(np.abs(delta).max())) < X:

@@ -175,13 +175,30 @@ def cut(run: Run, start: float, end: float) -> Run:
     else:
         kept = slice(int(np.searchsorted(run.t, start - half)), int(np.searchsorted(run.t, end + half)))
         t = run.t[kept] - start
-    return replace(
+    part = replace(
         run, t=t, q=run.q[kept], q_dot=run.q_dot[kept],
         contacts=solvers.ContactLog(**columns, names=log.names), ledger=partial(_ledger_of, run, kept),
-        lost=lambda: run.losses.part(kept), borders=partial(_passed, run, start, end),
+        lost=partial(_lost_of, run, kept), rubbing=partial(_rubbed, run, start, end),
+        borders=partial(_passed, run, start, end), reached=end - start,
         began=latched_before(run, start),
         kept={"forces": run._forces[:, kept], "t": run.t[kept]},  # signals have the times of the run
     )  # fmt: skip
+    if run.rubs.any() and run.sampled:
+        part.__dict__["friction_loss"] = run.friction_loss[kept] - run.friction_loss[kept][:1]
+    return part
+
+
+def _lost_of(run: Run, kept: slice) -> Any:
+    """What contacts took in a part of a run; of friction `friction_loss` tells."""
+    part = run.losses.part(kept)
+    return replace(part, friction=np.nan, spin=np.nan) if run.rubs.any() else part
+
+
+def _rubbed(run: Run, start: float, end: float) -> Any:
+    """What friction did in the contacts that began from start to end, times counted from start."""
+    log = run.friction_log
+    columns = {name: column[(log.t_in >= start) & (log.t_in < end)] for name, column in log.arrays().items()}
+    return replace(log, **columns | {"t_in": columns["t_in"] - start, "t_out": columns["t_out"] - start})
 
 
 def _passed(run: Run, start: float, end: float) -> Any:

@@ -201,7 +201,7 @@ class MeanEnergy:
 
 @dataclass(frozen=True)
 class Power:
-    """Mean power that one stop or element takes, W: the work done on it over the time of the samples."""
+    """Mean power that one stop or element takes, W: work on it and loss by friction over the time of the samples."""
 
     stop: int | str = 0
     sampled: ClassVar[bool] = True
@@ -209,8 +209,25 @@ class Power:
     def __call__(self, run: Run) -> float:
         """Value of a run."""
         require(len(run.t) > 1, "the run must have samples", len(run.t), "Power", "give dt")
-        work = run.losses.history[:, run.number(self.stop)]
+        number = run.number(self.stop)
+        work = run.losses.history[:, number] + run.friction_loss[:, number]
         return float((work[-1] - work[0]) / (run.t[-1] - run.t[0]))
+
+
+@dataclass(frozen=True)
+class WearPower:
+    """Mean work rate by friction of one stop, W: μN|v| of its slip over the time of the samples, which wear goes by."""
+
+    stop: int | str = 0
+    sampled: ClassVar[bool] = True
+
+    def __call__(self, run: Run) -> float:
+        """Value of a run."""
+        require(len(run.t) > 1, "the run must have samples", len(run.t), "WearPower", "give dt")
+        number = run.number(self.stop)
+        require(run.rubs[number, 1] > 0.0, "the stop must have friction", self.stop, "WearPower", "give it a Friction")
+        lost = run.friction_loss[:, number]
+        return float((lost[-1] - lost[0]) / (run.t[-1] - run.t[0]))
 
 
 QUANTITIES: dict[str, Callable[..., Quantity]] = {
@@ -224,6 +241,7 @@ QUANTITIES: dict[str, Callable[..., Quantity]] = {
     "density": Density,
     "energy": MeanEnergy,
     "power": Power,
+    "wear_power": WearPower,
 }
 
 

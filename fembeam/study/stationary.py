@@ -57,7 +57,7 @@ class Response(Result):
     settling : end of the transient; None when `discard` was given.
     enough : whether the standard error asked for by `until` was reached; None when none was.
     seconds : wall seconds of integration.
-    names : of stops, elements and impactors, in the order of `power`.
+    names : of stops, elements and impactors, in the order of `power`. rubbing : which of them have friction.
     """
 
     signals: dict[str, Signal]
@@ -69,6 +69,7 @@ class Response(Result):
     seconds: float
     names: tuple[str, ...] = ()
     work: Batches = field(default_factory=lambda: Batches(1), repr=False)
+    rubbing: tuple[bool, ...] = ()
     INDEX: ClassVar[str] = "name"
 
     def __getitem__(self, name: str) -> Signal:
@@ -97,13 +98,25 @@ class Response(Result):
     def power(self, contact: int | None = None) -> Estimate:
         """Mean power (W) that a stop or element takes, numbered as in a `Run`; None: all of them together.
 
-        From the work done on it; the change of the energy stored averages to zero.
+        From the work done on it, and its loss by friction; the change of the energy stored averages to zero.
         """
+        mine, count = self._numbered(contact), len(self.names)
+        return self.work.estimate(lambda sums: sum(sums[1 + i] + sums[1 + count + i] for i in mine) / sums[0])
+
+    def wear(self, contact: int | None = None) -> Estimate:
+        """Mean work rate by friction (W) of a stop, μN|v| in slip, which wear goes by; None: of all of them together.
+
+        0 of stops without friction. What impacts take is `power` less this.
+        """
+        mine, count = self._numbered(contact), len(self.names)
+        return self.work.estimate(lambda sums: sum(sums[1 + count + i] for i in mine) / sums[0])
+
+    def _numbered(self, contact: int | None) -> list[int]:
+        """The numbers of a stop or element, or of all; ValueError for one that is none."""
         count = len(self.names)
         if contact is not None and not -count <= contact < count:
             raise ValueError(f"contact must be below {count}, the number of stops and elements, got {contact!r}")
-        mine = slice(1, None) if contact is None else slice(1 + contact % count, 2 + contact % count)
-        return self.work.estimate(lambda sums: sums[mine].sum() / sums[0])
+        return list(range(count)) if contact is None else [contact % count]
 
     def numbers(self) -> dict[str, Estimate]:
         """Every number with its standard error, by names such as "δ std", "stop 0 rate" or "valve rate"."""
@@ -112,7 +125,9 @@ class Response(Result):
         for stop, impacts in zip(self.names, self.impacts, strict=False):
             found |= {f"{stop} {name}": getattr(impacts, name) for name in ("rate", "probability")}
             found |= {f"{stop} {name}": impacts.mean(name) for name in impacts.largest}
-        return found | {f"{name} power": self.power(i) for i, name in enumerate(self.names)}
+        found |= {f"{name} power": self.power(i) for i, name in enumerate(self.names)}
+        rubs = (i for i, has in enumerate(self.rubbing) if has)
+        return found | {f"{self.names[i]} wear": self.wear(i) for i in rubs}
 
 
 def stationary(
@@ -335,7 +350,8 @@ class Sums:
     signals: dict[str, Signal] = field(default_factory=dict)
     impacts: list[Impacts] = field(default_factory=list)
     names: tuple[str, ...] = ()  # of all contacts
-    work: Batches = field(default_factory=lambda: Batches(1))  # rows: seconds, work done on each contact
+    work: Batches = field(default_factory=lambda: Batches(1))  # rows: seconds, work on each contact, loss by friction
+    rubbing: tuple[bool, ...] = ()
 
     def __post_init__(self) -> None:
         for option, given in (("bins", self.bins), ("levels", self.levels)):
@@ -366,9 +382,12 @@ class Sums:
         """Take in what each contact took between samples."""
         if not self.names:
             self.names = tuple(run.key(i) for i in range(len(run.stops)))
-            self.work = Batches(1 + len(self.names))
+            self.work = Batches(1 + 2 * len(self.names))
+            self.rubbing = tuple((run.rubs[:, 1] > 0.0).tolist())
+        lost = run.friction_loss if any(self.rubbing) else np.zeros((len(run.t), len(self.names)))
         for a, b in pairwise(borders) if self.names else ():
-            self.work.add([(b - a) * self.dt, *(run.losses.history[b] - run.losses.history[a])])
+            changes = (part[b] - part[a] for part in (run.losses.history, lost))
+            self.work.add([(b - a) * self.dt, *np.concatenate(list(changes))])
 
     def _signal(self, name: str, x: Vector, batches: int) -> Signal:
         """Empty sums for a signal, arranged by its first samples."""
@@ -380,4 +399,4 @@ class Sums:
     def response(self, plan: Segments, settled: Settling | None, enough: bool | None) -> Response:
         """The statistics so far."""
         seen = self.signals, self.impacts, plan.kept, plan.discarded, settled, enough, plan.seconds
-        return Response(*seen, self.names, self.work)
+        return Response(*seen, self.names, self.work, self.rubbing)
