@@ -241,7 +241,7 @@ class Contact:
     def motion(self, q: Array, q_dot: Array) -> tuple[float, float, Array, Array]:
         """δ in m and δ̇ in m/s of a state, and their derivatives ∂δ/∂q and ∂δ̇/∂q, both (n,); ∂δ̇/∂q̇ is ∂δ/∂q."""
         delta = float(self.indentation(q))
-        if self.map == "line":
+        if self.map != "annulus":
             return delta, float(-q_dot @ self.direction), -self.direction, np.zeros(self.direction.size)
         place, speed = self.direction @ q - self.centre, self.direction @ q_dot
         distance = np.linalg.norm(place)

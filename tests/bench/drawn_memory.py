@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from drawn import Scene, draw_law, draw_signal
+from drawn import Scene, Table, draw_law, draw_signal
 from drawn_starts import on_a_border
 from drawn_wider import reached, widened
 
@@ -152,7 +152,9 @@ def disturbed(scene: Scene, rng: np.random.Generator, by: float) -> Scene:
     omega = np.sqrt(np.diag(system.K))
     times = np.linspace(0.0, scene.duration, 64)
     largest = [np.linalg.norm(np.hstack((omega**2 * scene.q0, omega * scene.q_dot0)))]
-    largest += [np.abs(signal(times)).max() * np.linalg.norm(vector) for vector, signal in system.loads]
+    for vector, signal in system.loads:
+        values = signal.rows[:, 0] if isinstance(signal, Table) else signal(times)
+        largest.append(np.abs(values).max() * np.linalg.norm(vector))
     size = by * max(largest)
     tones = [(rng.standard_normal(n), fb.Harmonic(size, w, rng.uniform(0.0, 6.0))) for w in (0.0, *omega)]
     return replace(scene, system=System(system.M, system.C, system.K, system.contacts, [*system.loads, *tones]))

@@ -67,11 +67,17 @@ def in_other_coordinates(rng: np.random.Generator, scene: Scene) -> Scene:
     turned = [np.linalg.qr(rng.standard_normal((n, n)))[0] for _ in range(2)]
     T = turned[0] * 10.0 ** rng.uniform(-0.3, 0.3, n) @ turned[1]
     M, C, K = (T.T @ matrix @ T for matrix in (system.M, system.C, system.K))
-    contacts = [replace(contact, direction=T.T @ contact.direction) for contact in system.contacts]
+    contacts = [_in_coordinates(T, contact) for contact in system.contacts]
     loads = [(T.T @ vector, signal) for vector, signal in system.loads]
     q0, q_dot0 = np.linalg.solve(T, scene.q0), np.linalg.solve(T, scene.q_dot0)
     M, C, K = (0.5 * (matrix + matrix.T) for matrix in (M, C, K))
     return replace(scene, system=System(M, C, K, contacts, loads), q0=q0, q_dot0=q_dot0)
+
+
+def _in_coordinates(T: Any, contact: Contact) -> Contact:
+    """A contact whose rows read coordinates x, where q = T x."""
+    rows = {name: getattr(contact, name) for name in ("direction", "tangent", "rotation")}
+    return replace(contact, **{name: row @ T for name, row in rows.items() if row is not None})
 
 
 def with_other_start(rng: np.random.Generator, scene: Scene, time: float) -> Scene:

@@ -96,9 +96,7 @@ def significant(solution: Any, size: float) -> Any:
 
 def first_forces(scene: Scene) -> Any:
     """Size of every stop's force at the start: one that is left fast may pull much harder than it ever pushes."""
-    rows = np.array([c.direction for c in scene.system.contacts])
-    delta = -rows @ scene.q0 - [c.gap for c in scene.system.contacts]
-    rate = -rows @ scene.q_dot0
+    delta, rate = np.array([c.motion(scene.q0, scene.q_dot0)[:2] for c in scene.system.contacts]).T
     laws = [c.law for c in scene.system.contacts]
     begun = np.maximum(np.abs(rate), [made.entry_rate_floor for made in laws])
     found = [made.force(d, v, v0) for made, d, v, v0 in zip(laws, delta, rate, begun, strict=True)]
@@ -149,7 +147,7 @@ def _viscous_forces(scene: Scene, part: Any, depth: Any, entry: Any, fast: Any) 
 def _rounding_of_surfaces(scene: Scene) -> Any:
     """Way, m, of every stop from its start that is rounding of its gap and of what is read."""
     contacts = scene.system.contacts
-    sizes = [abs(c.gap) + np.abs(c.direction) @ np.abs(scene.q0) for c in contacts]
+    sizes = [abs(c.gap) + (np.abs(c.direction) @ np.abs(scene.q0)).sum() for c in contacts]
     return 1e-13 * np.array(sizes)
 
 
@@ -180,6 +178,7 @@ def handled(solution: Any) -> float:
     """All the energy of a run, J, that within its stops included."""
     e, log = solution.energy, solution.contacts
     total = e.initial + np.abs(e.input).max() + np.abs(e.stored).max() + np.abs(log.energy_loss).sum()
+    total += np.max(np.abs(e.friction)) + np.max(np.abs(e.spin))
     total += np.abs(log.peak_force * log.peak_indentation).max(initial=0.0)
     return max(float(total), 1e-300)
 
@@ -286,7 +285,8 @@ def amplified(
             if not np.all(np.isfinite(apart)):  # a contact that ended does so no more
                 return None
             amplification[name] = np.maximum(amplification.get(name, 1.0), apart / move)
-    mobility = np.array([c.direction @ np.linalg.solve(scene.system.M, c.direction) for c in scene.system.contacts])
+    rows = [np.atleast_2d(c.direction) for c in scene.system.contacts]
+    mobility = np.array([np.trace(row @ np.linalg.solve(scene.system.M, row.T)) for row in rows])
     shares = exact["work"] * mobility[exact["stop"]] / np.maximum(exact["scale"]["speed_in"], 1e-300) ** 2
     for name in ("speed_in", "speed_out", "energy_loss"):  # what is left of energies that cancel
         amplification[name] = np.maximum(amplification[name], shares)

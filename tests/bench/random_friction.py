@@ -1,0 +1,154 @@
+"""Random systems with friction: `Exponential` against `DormandPrince`, thousands of them; prints every failure.
+
+    python tests/bench/random_friction.py [count] [first seed] [processes]
+
+A system has one to four modes in each of two planes, and perhaps a rotation; one to three elements: holes and posts
+without and with friction, with a rotation or a spin, oblique stops with friction, stops on a line, springs and sliders
+beside them; it is free or under loads of every kind, from a start in the open, pressed, under way or at rest; see
+`drawn_friction`. Compared at rtol 1e-5 to 1e-11 are the motion, the logs of contacts and of friction, the transitions
+(which, when, at which ξ, ξ̇ and F_t), every line of the energy balance and what each element has taken, of runs with
+samples and without. What a difference is worth is told as in `random_scenes`.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from concurrent.futures import ProcessPoolExecutor
+from typing import Any
+
+import numpy as np
+from drawn import Scene
+from drawn_friction import draw
+from drawn_memory import disturbed
+from random_scenes import (
+    COARSER,
+    REFERENCE,
+    TooStiffError,
+    Verdict,
+    against,
+    handled,
+    numbers_of,
+    report,
+    run,
+    significant,
+)
+from random_scenes import shortened as cut_after_contacts
+
+from solvers import DormandPrince, SolverError
+
+MOST_TRANSITIONS = 30
+TINY = 1e-300
+
+
+def shortened(scene: Scene, seed: int) -> Scene:
+    """The system cut after a few contacts, within one, or after so many transitions, between two."""
+    scene = cut_after_contacts(scene, seed)
+    times = run(scene, DormandPrince(1e-7)).transitions.t
+    times = np.unique(times[times > 0.0])
+    if len(times) > MOST_TRANSITIONS:
+        scene.duration = 0.5 * float(times[MOST_TRANSITIONS - 1] + times[MOST_TRANSITIONS])
+    return scene
+
+
+def units(scene: Scene, solution: Any) -> dict[str, Any]:
+    """(elements,) sizes in a run: way and speed of ξ, force of friction, time of a contact; of others of δ and F."""
+    size, fast = np.abs(solution.q).max(axis=0), np.abs(solution.q_dot).max(axis=0)
+    way, speed = (np.array([(np.abs(c.rows) @ x).sum() for c in scene.system.contacts]) for x in (size, fast))
+    count, log = len(scene.system.contacts), solution.contacts
+    speed += [abs(c.spin * (c.radius or 0.0)) for c in scene.system.contacts]
+    force, time = np.zeros(count), np.zeros(count)
+    np.maximum.at(force, log.stop, np.abs(log.peak_force))
+    np.maximum.at(force, solution.transitions.contact, np.abs(solution.transitions.force))
+    end = np.where(np.isnan(log.t_out), scene.duration, log.t_out)
+    np.maximum.at(time, log.stop, end - log.t_in)
+    spacing = scene.duration / (1.0 + np.bincount(solution.transitions.contact.astype(int), minlength=count))
+    time = np.where(time > 0.0, np.minimum(time, spacing), spacing)
+    return {"way": way, "speed": speed, "force": force + TINY, "time": time}
+
+
+def turned(scene: Scene, contact: Any, way: Any) -> Any:
+    """ξ as a cosine and a sine of a turn each, which do not jump, in units of ξ; of other elements as it is."""
+    circle = np.array([abs(c.circle) for c in scene.system.contacts])[contact]
+    safe = np.where(circle > 0.0, circle, 1.0)
+    x, y = (circle * f(way / safe) for f in (np.cos, np.sin))
+    return np.where(circle > 0.0, x, way), np.where(circle > 0.0, y, 0.0)
+
+
+def numbers(solution: Any, scene: Scene, size: float, duration: float) -> dict[str, Any]:
+    """What `numbers_of` compares, with friction, transitions, losses and the energy balance."""
+    found, unit = numbers_of(solution, scene, size, duration), units(scene, solution)
+    of_friction(found, solution, scene, size, unit)
+    of_transitions(found, solution, scene, unit)
+    total, energy, lost = handled(solution), solution.energy, solution.losses
+    for name in ("input", "damping", "contact", "stored", "friction", "spin"):
+        put(found, f"energy {name}", np.atleast_1d(getattr(energy, name))[-1:], np.array([total]))
+    for name in ("work", "friction", "spin"):
+        put(found, f"losses {name}", np.broadcast_to(getattr(lost, name), unit["way"].shape), total)
+    return found
+
+
+def put(found: dict[str, Any], name: str, values: Any, scale: Any) -> None:
+    """Compare these in units of the scale."""
+    found[name], found["scale"][name] = np.asarray(values), np.maximum(scale, TINY) + np.zeros(np.shape(values))
+
+
+def of_friction(found: dict[str, Any], solution: Any, scene: Scene, size: float, unit: dict[str, Any]) -> None:
+    """Put in the log of friction, contact by contact."""
+    log, deep = solution.friction, solution.contacts
+    shown = significant(solution, size)
+    real = set(zip(deep.stop[shown].tolist(), deep.t_in[shown].tolist(), strict=True))
+    i = np.lexsort((log.t_in, log.contact))
+    i = np.array([k for k in i if (int(log.contact[k]), float(log.t_in[k])) in real], dtype=int)
+    c = log.contact[i].astype(int)
+    found["order"] = [*found["order"], *(("rubs", int(one)) for one in c)]
+    for name in ("angle_in", "angle_out"):
+        angle = getattr(log, name)[i]
+        put(found, f"friction {name} cos", np.cos(angle), 1.0)
+        put(found, f"friction {name} sin", np.sin(angle), 1.0)
+    mu = np.array([one.friction.mu if one.friction else 0.0 for one in scene.system.contacts])[c]
+    force = np.maximum(mu, 1e-3) * unit["force"][c]
+    scales = {"speed_in": unit["speed"][c], "speed_out": unit["speed"][c], "peak_friction": force}
+    scales |= {"impulse": force * unit["time"][c], "slip": unit["way"][c], "energy_loss": force * unit["way"][c]}
+    for name, scale in scales.items():
+        put(found, f"friction {name}", getattr(log, name)[i], scale)
+
+
+def of_transitions(found: dict[str, Any], solution: Any, scene: Scene, unit: dict[str, Any]) -> None:
+    """Put in the transitions, element by element."""
+    rows = solution.transitions
+    i = np.lexsort((rows.t, rows.border, rows.contact))
+    i = i[rows.t[i] > 1e-7 * scene.duration]
+    c = rows.contact[i].astype(int)
+    found["order"] = [*found["order"], *zip(c.tolist(), rows.border[i].tolist(), rows.event[i].tolist(), strict=True)]
+    along, across = turned(scene, c, rows.delta[i])
+    put(found, "border t", rows.t[i], unit["time"][c])
+    put(found, "border ξ cos", along, unit["way"][c])
+    put(found, "border ξ sin", across, unit["way"][c])
+    put(found, "border ξ̇", rows.delta_dot[i], unit["speed"][c])
+    put(found, "border F_t", rows.force[i], unit["force"][c])
+
+
+def judge(seed: int) -> tuple[str, Verdict]:
+    """Draw, run and compare."""
+    with warnings.catch_warnings(), np.errstate(over="ignore"):
+        warnings.simplefilter("error", RuntimeWarning)
+        scene, rtol = draw(seed)
+        words = f"seed {seed}: {scene.words}"
+        try:
+            scene = shortened(scene, seed)
+            known = run(scene, REFERENCE), run(scene, COARSER)
+        except (TooStiffError, SolverError, ValueError):
+            known = None, None
+        return words, against(scene, *known, rtol, seed, numbers, disturbed)
+
+
+def main(count: int = 500, first: int = 0, processes: int = 2) -> int:
+    """Run and print; returns the number of failures."""
+    with ProcessPoolExecutor(processes) as pool:
+        found = pool.map(judge, range(first, first + count), chunksize=2)
+        return report(([verdict] for verdict in found), 100, f"{count} systems")
+
+
+if __name__ == "__main__":
+    sys.exit(main(*(int(x) for x in sys.argv[1:])) > 0)
