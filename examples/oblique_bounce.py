@@ -46,7 +46,7 @@ def bounce(psi):
     """The run of one bounce that begins at the floor."""
     speeds = {("contact", "x"): psi * MU * SPEED / RATIO, ("contact", "y"): -SPEED}
     start = model.state({("contact", "y"): 1e-6}, speeds)
-    return model.simulate(0.002, 5e-6, start, solver=solvers.DormandPrince(1e-9))
+    return model.simulate(0.002, 5e-6, start, solver=solvers.Exponential(1e-10))
 
 
 def regime(run):

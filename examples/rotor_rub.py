@@ -15,7 +15,6 @@ from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
 import fembeam as fb
-import solvers
 from contacts import KelvinVoigt
 
 SPIN, CLEARANCE, RADIUS, WALL = 200.0, 2e-4, 0.02, KelvinVoigt(2e6, 300.0)
@@ -44,7 +43,7 @@ def disturbed(mu):
     """The rub, a run that begins a ten-thousandth beside it, and the rate at which it leaves or comes back, 1/s."""
     model = rotor(mu)
     rub = model.rub()
-    run = model.simulate(0.7, 2e-4, rub.state * (1.0 + 1e-4 * np.eye(8)[0]), solver=solvers.DormandPrince(1e-9))
+    run = model.simulate(0.7, 2e-4, rub.state * (1.0 + 1e-4 * np.eye(8)[0]))
     seen = run.place_in_clearance() @ [1.0, 1.0j] * np.exp(-1j * SPIN * run.t)  # from the shaft
     off = np.abs(seen - rub.radius * np.exp(1j * rub.angle))
     early, late = (off[(run.t > at) & (run.t < at + 0.05)].max() for at in (0.4, 0.65))
@@ -62,7 +61,7 @@ for factor, (rub, _, rate) in results.items():
 print(f"threshold at {SPIN:g} rad/s: μ = {at:.4f}; from {borders.min():.4f} at {spins[np.argmin(borders)]:g} rad/s on")
 
 whip = rotor(2.0 * at)
-grown = whip.simulate(0.5, 5e-5, whip.rub().state * (1.0 + 0.05 * np.eye(8)[0]), solver=solvers.DormandPrince(1e-7))
+grown = whip.simulate(0.5, 5e-5, whip.rub().state * (1.0 + 0.05 * np.eye(8)[0]))
 figure = Figure(figsize=(9.4, 4.0), layout="constrained")
 left, right = figure.subplots(1, 2)
 left.plot(spins, borders)

@@ -348,7 +348,6 @@ def test_bad_scenes_are_refused():
         frame().reduce(modes=1).simulate(0.01)
 
 
-@pytest.mark.skipif(not getattr(solvers.Exponential, "takes_friction", False), reason="Exponential refuses friction")
 def test_the_main_method_gives_the_same(corner, tube, rolled):
     for run in (corner, tube, rolled):
         other = run.model.simulate(float(run.t[-1]), run.t, run.made.start, solver=solvers.Exponential(1e-11))
