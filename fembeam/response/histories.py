@@ -343,7 +343,7 @@ class Histories:
             return mean_force(self, self._stop(stop))
         number = self._stop(stop)
         forces = self._forces[self._rows[number]][:2]
-        return self._at_samples(forces.T if self.circles[number, 0] else forces[0])
+        return self._at_samples(forces.T if len(forces) > 1 else forces[0])
 
     @cached_property
     def _forces(self) -> Vector:
