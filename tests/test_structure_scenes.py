@@ -328,6 +328,8 @@ BAD = [
     (lambda: fb.Scene(STRUCTURE, CLAMP, impactors=[fb.Impactor("tip", 1.0, -1.0, LAW)]), "needs a direction"),
     (lambda: fb.Scene(STRUCTURE, CLAMP).reduce(elements=4), "elements must be left out"),
     (lambda: fb.Scene(STRUCTURE, CLAMP).reduce(modes=17), r"modes must be at most 16 \(free dofs\)"),
+    (lambda: fb.Scene(STRUCTURE, CLAMP).reduce([0, 0]), "mode numbers must be whole, from 0, each once"),
+    (lambda: fb.Scene(STRUCTURE, CLAMP).reduce([0.7]), "mode numbers must be whole"),
     (lambda: fb.Scene(STRUCTURE, CLAMP).buckling_load(), "buckling_load is for a Beam"),
     (lambda: fb.Scene(space_truss()).reduce(modes=1).phi("top"), "needs a direction of x, y, z"),
     (lambda: fb.Scene(BEAM, [fb.Clamped("root")]), "z must be a number on a Beam, which has no names"),

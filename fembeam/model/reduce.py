@@ -235,7 +235,10 @@ def _numbers(modes: Any, interface: bool) -> tuple[int, ...]:
     require(whole or np.ndim(modes) == 1, "modes must be a whole number or a list of them", modes, "Scene.reduce",
             "ask for modes=2, or modes=[0, 2]")  # fmt: skip
     require(not whole or modes <= MOST_DOFS, f"modes must be at most {MOST_DOFS}", modes, "Scene.reduce", "take fewer")
-    listed = list(range(int(modes))) if whole else [int(i) for i in modes]
+    numbers = list(range(int(modes))) if whole else list(modes)
+    right = all(is_whole(i) and i >= 0 for i in numbers) and len(set(numbers)) == len(numbers)
+    require(right, "mode numbers must be whole, from 0, each once", modes, "Scene.reduce", "ask for modes=[0, 2]")
+    listed = [int(i) for i in numbers]
     enough = len(listed) > 0 or (interface and whole and modes == 0)
     require(enough, "modes must be a count above 0 or a list of mode numbers", modes, "Scene.reduce",
             "ask for modes=2, or modes=[0, 2]")  # fmt: skip
