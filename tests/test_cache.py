@@ -14,6 +14,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import every_method
+import numba
 import numpy as np
 import pytest
 from numba import njit
@@ -78,8 +79,10 @@ def test_compiling_is_told_in_one_line_and_loading_is_not(package):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no such locks")
 def test_processes_compile_one_after_the_other(package):
-    """Two at a time may give the files of two signatures one number, and the wrong code would be loaded ever after."""
-    held = "import solvers.compiled.cache as c, time\nfile = c.lock_folder(print)\nprint(1, flush=True)\ninput()\n"
+    """Who waited finds the code; other functions are compiled meanwhile."""
+    name = f"solvers.one.one {numba.float64(numba.float64)}"
+    held = f"import solvers.compiled.cache as c, time\nfile = c.lock_folder(print, c.lock_of({name!r}))\n"
+    held += "print(1, flush=True)\ninput()\n"
     entry = "from numba import float64\nfrom solvers.compiled.decorators import entry\n"
     (package / "one.py").write_text(entry + "@entry(float64(float64))\ndef one(x): return 2.0 * x\n")
     tell = "print(time.time(), flush=True)"
@@ -102,14 +105,14 @@ def test_processes_compile_one_after_the_other(package):
 
 FORKED = """
 import os, signal, solvers.compiled.cache as c, solvers.compiled.decorators as d
-with d._ONE_PROCESS.alone():
+with d._ONE_PROCESS.alone('own'):
     child = os.fork()
     if not child:
         os.close(1), os.close(2), signal.alarm(20)
         signal.pause()
     {}
 c._PATIENCE = 3.0
-print(c.lock_folder(print) is not None)
+print(c.lock_folder(print, c.lock_of('own')) is not None)
 os.kill(child, signal.SIGKILL)
 """
 
@@ -119,7 +122,8 @@ def test_a_forked_process_does_not_keep_the_lock(package):
     """What is forked while code is compiled has the file open too: the lock goes back all the same, also by a death."""
     assert ran(FORKED.format("pass"), package.parent)[0] == ["True"]
     left = ran(FORKED.format("print(child, flush=True); os._exit(0)"), package.parent)[0]
-    look = "import solvers.compiled.cache as c; c._PATIENCE = 3.0; print(c.lock_folder(print) is not None)"
+    look = "import solvers.compiled.cache as c; c._PATIENCE = 3.0; "
+    look += "print(c.lock_folder(print, c.lock_of('own')) is not None)"
     assert ran(look, package.parent)[0] == ["True"]
     os.kill(int(left[0]), signal.SIGKILL)
 
@@ -128,7 +132,7 @@ def test_waiting_for_the_lock_can_be_stopped(monkeypatch):
     """Ctrl-C then leaves nothing behind by which this process would never give the lock back."""
     one = decorators._OneProcess()
 
-    def interrupted(_):
+    def interrupted(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(decorators, "lock_folder", interrupted)

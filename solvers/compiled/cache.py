@@ -15,6 +15,7 @@ import tempfile
 import threading
 import time
 import warnings
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -33,6 +34,7 @@ DIGITS = 16  # of a digest
 UNUSED = 24 * 3600.0  # s without a start after which one beyond these is removed; until then a process may need it
 _LOOK, _LOOKS = 0.02, 100  # s between two looks whether another process still compiles, and how many in silence
 _PATIENCE = 300.0  # s to wait for it; one kernel takes seconds, so that a process that long at it is stopped or hangs
+_LOCKS = 16  # of functions that are compiled by themselves
 _LOCK = threading.RLock()  # numba's setting belongs to the process
 
 
@@ -143,7 +145,12 @@ def is_current(function: Callable[..., Any]) -> bool:
     return FOLDER is not None and path in _STAMPS
 
 
-def lock_folder(waiting: Callable[[], None]) -> IO[bytes] | None:
+def lock_of(work: str) -> str:
+    """Name of the lock of some work; different work may go on at the same time, but for a few that share one."""
+    return f"lock{zlib.crc32(work.encode()) % _LOCKS}"
+
+
+def lock_folder(waiting: Callable[[], None], name: str = "lock") -> IO[bytes] | None:
     """Keep other processes from the folder until the returned file is closed; ``waiting`` is called if one has it long.
 
     None where there is nothing to keep, or no locks: on Windows, on some network disks. Where another process keeps it
@@ -155,7 +162,7 @@ def lock_folder(waiting: Callable[[], None]) -> IO[bytes] | None:
     try:
         import fcntl
 
-        file = open(FOLDER / "lock", "ab")  # noqa: SIM115  closed by who asked
+        file = open(FOLDER / name, "ab")  # noqa: SIM115  closed by who asked
         began, looks = time.monotonic(), 0
         while time.monotonic() - began < _PATIENCE:
             with suppress(BlockingIOError):
@@ -196,9 +203,14 @@ class _Store(FunctionCache):
                 self.flush()
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep what was compiled."""
+        """Keep what was compiled.
+
+        numba counts the files of a function's signatures: two processes that keep one each at the same time would give
+        both the same number, and every later one would load the wrong code.
+        """
         if FOLDER is None:  # sources changed, or others would not give the lock back
             return
+        held = lock_folder(lambda: None, "store")
         try:
             super().save_overload(sig, data)
         except OSError as error:
@@ -207,6 +219,9 @@ class _Store(FunctionCache):
                 logging.getLogger("fembeam.solvers").warning(
                     f"the integrator is compiled but not kept, every start takes half a minute: {error}"
                 )
+        finally:
+            if held is not None:
+                unlock_folder(held)
 
 
 def store(function: Callable[..., Any]) -> FunctionCache | None:

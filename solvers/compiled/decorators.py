@@ -40,7 +40,7 @@ from numba.core import event
 from numba.core.ccallback import CFunc
 from numba.core.sigutils import normalize_signature
 
-from solvers.compiled.cache import is_current, lock_folder, store, unlock_folder
+from solvers.compiled.cache import is_current, lock_folder, lock_of, store, unlock_folder
 
 if config.DISABLE_JIT:
     raise RuntimeError("NUMBA_DISABLE_JIT is set, but time integration runs as machine code only: unset it")
@@ -100,11 +100,10 @@ _NOTICE = _CompilerNotice()
 
 
 class _OneProcess(event.Listener):
-    """Lets one process at a time compile what is kept, until its code is stored.
+    """Lets one process at a time compile a function that takes long, until its code is stored.
 
-    numba counts the files of a function's signatures: two processes that compile one each at the same time may give
-    both the same number, and every later one would load the wrong code. What modules compile when imported is looked
-    for in the cache only then, so that those that waited need not compile, too.
+    It is looked for in the cache only then, so that those that waited need not compile, too; other functions are
+    compiled meanwhile. What is compiled when first called has one lock in common.
     """
 
     def __init__(self) -> None:
@@ -124,10 +123,10 @@ class _OneProcess(event.Listener):
         if found.kind == "numba:compiler_lock":
             self.release()
 
-    def lock(self) -> None:
+    def lock(self, name: str = "lock") -> None:
         """Wait for other processes; released with the last of numba's locks."""
         with self._guard:
-            self._file = self._file or lock_folder(self._tell)
+            self._file = self._file or lock_folder(self._tell, name)
 
     def release(self) -> None:
         """One lock less."""
@@ -138,12 +137,12 @@ class _OneProcess(event.Listener):
                 self._file = None
 
     @contextmanager
-    def alone(self) -> Iterator[None]:
-        """Compile or load within, with no other process at it."""
+    def alone(self, work: str = "") -> Iterator[None]:
+        """Compile or load within, with no other process at the same work."""
         with self._guard:
             self._depth += 1
         try:
-            self.lock()  # which Ctrl-C may end
+            self.lock(lock_of(work))  # which Ctrl-C may end
             yield
         finally:
             self.release()
@@ -167,7 +166,7 @@ event.register("numba:compile", _ONE_PROCESS)
 
 
 @contextmanager
-def _compiling() -> Iterator[None]:
+def _compiling(function: Any, signature: Any) -> Iterator[None]:
     """Tell of compiling, and let the garbage collector rest.
 
     The compiler keeps most of what it makes; looking through that again and again takes a sixth of the time.
@@ -175,7 +174,8 @@ def _compiling() -> Iterator[None]:
     collects = gc.isenabled()
     gc.disable()
     try:
-        with _ONE_PROCESS.alone(), event.install_listener("numba:compile", _NOTICE):
+        work = f"{function.__module__}.{function.__qualname__} {signature}"
+        with _ONE_PROCESS.alone(work), event.install_listener("numba:compile", _NOTICE):
             yield
     finally:
         if collects:
@@ -187,7 +187,7 @@ def entry(signature: Any) -> Callable[[Any], Any]:
 
     def compiled(function: Any) -> Any:
         made = _compiled(function, **_OPTIONS)
-        with _compiling():
+        with _compiling(function, signature):
             made.compile(signature)
         made.disable_compile()
         return made
@@ -200,7 +200,7 @@ def c_function(signature: Any) -> Callable[[Any], Any]:
 
     def compiled(function: Any) -> Any:
         made = _stored(CFunc(function, normalize_signature(signature), {}, _OPTIONS), function)
-        with _compiling():
+        with _compiling(function, signature):
             made.compile()
         return made
 
