@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
+from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic
 from solvers import (
     RK4,
     CentralDifference,
@@ -260,6 +260,23 @@ def test_a_run_goes_on_from_the_middle_of_a_stick(method):
     both = part.losses.friction[0] + rest.losses.friction[0], part.losses.slip[0] + rest.losses.slip[0]
     assert both == pytest.approx((whole.losses.friction[0], whole.losses.slip[0]), rel=1e-7)
     assert np.isnan(part.friction.t_out).tolist() == [True]
+
+
+@every_method
+def test_a_slip_from_the_entry_sticks_within_the_first_step(method):
+    """N = 0 at the entry, and Ṅ begins below what slip needs and grows; times are of `DormandPrince`."""
+    run = bounce(wall(Polynomial([4e5, 0.0, 4e12])), 0.27, method)
+    assert run.transitions.event.tolist() == ["stick", "slip"]
+    apart = run.transitions.t - run.contacts.t_in[0]
+    np.testing.assert_allclose(apart, [2.59798711e-5, 7.30534583e-4], rtol=0.0, atol=1e-11)
+
+
+@every_method
+@pytest.mark.parametrize("v_t", [0.1, 0.4, 1.5])
+def test_a_force_that_grows_without_bound_begins_in_stick(method, v_t):
+    """A dashpot of δ^{1/4} has Ṅ = ∞ at the entry."""
+    run = bounce(wall(Viscoelastic(1e7, 500.0)), v_t, method)
+    assert run.transitions.event.tolist() == ["slip"]
 
 
 @every_method

@@ -4,6 +4,8 @@
     slip σ     σξ̇ - μṄ/k_t, its own speed     falls to zero: stick, s = ξ - σμN/k_t
     entry      stick if N jumps or k_t |ξ̇| <= μṄ, s = ξ; else slip the way of ξ̇
 
+With μ = 0 the slider always slips, and turns where ξ̇ does.
+
 A *point* of an element is its motion there, as the places below name it; Ṅ = N_δ δ̇ + N_δ̇ δ̈. Where N <= 0 the limit is 0
 and the slider follows.
 """
@@ -34,6 +36,8 @@ from solvers.problem.friction import ARM, CODE, FREE, MU, PEAK, SCRATCH, SLIDER,
 DELTA, RATE, ACCELERATION, WAY, SPEED, WAY_ACCELERATION = range(6)  # places in a point: δ, δ̇, δ̈, ξ, ξ̇, ξ̈
 POINT = 6
 STUCK, SLIPPED = range(2)  # codes of events, see `problem.friction.Rubbing`
+_NONE = 1e-8  # limit μN, in units of the largest |F_t| of the contact, that counts as none
+_INSIDE = 1e-200  # m, where forces like δ^{1/4} grow without bound, and those like δ^{3/2} do not grow
 
 
 @inner
@@ -96,17 +100,29 @@ def normal_rate(problem, s, rate, acceleration, entry_rate):
 
 
 @inner
-def slider_margin(problem, s, segment, entry_rate, point):
-    """Margin of a slider's segment at a point: N in stick, m/s in slip."""
+def pressed_margin(problem, s, segment, entry_rate, point):
+    """Margin of a slider's segment at a point, N in stick, m/s in slip; of slip as if N > 0."""
     own = slider_of(problem, s)
-    code, speed = own[CODE], point[SPEED]
+    normal = normal_force(problem, s, segment, entry_rate, point[DELTA], point[RATE])
+    if own[CODE] == 0.0:
+        return own[MU] * max(normal, 0.0) - abs(friction_force(radius_of(problem, s), own, point[WAY], normal))
+    if own[MU] == 0.0:
+        return own[CODE] * point[SPEED]
+    growing = normal_rate(problem, s, point[RATE], point[ACCELERATION], entry_rate)
+    return own[CODE] * point[SPEED] - own[MU] / own[STIFFNESS] * growing
+
+
+@inner
+def slider_margin(problem, s, segment, entry_rate, point):
+    """The same; slip does not end while its limit is none, but with μ = 0, which turns it."""
+    own, speed = slider_of(problem, s), point[SPEED]
+    code = own[CODE]
     if segment == 0 or code == FREE:
         return 1.0
-    normal = normal_force(problem, s, segment, entry_rate, point[DELTA], point[RATE])
-    if code == 0.0:
-        return own[MU] * max(normal, 0.0) - abs(friction_force(radius_of(problem, s), own, point[WAY], normal))
-    growing = own[MU] / own[STIFFNESS] * normal_rate(problem, s, point[RATE], point[ACCELERATION], entry_rate)
-    return code * speed - growing if normal > 0.0 else abs(speed) + abs(growing)
+    margin = pressed_margin(problem, s, segment, entry_rate, point)
+    if code == 0.0 or own[MU] == 0.0 or own[MU] * own[SCRATCH + 2] > _NONE * own[PEAK]:
+        return margin
+    return abs(speed) + abs(code * speed - margin)
 
 
 @inner
@@ -115,11 +131,13 @@ def begin_slider(problem, s, t, x, entry_rate, under_way):
     own = slider_of(problem, s)
     way, speed = slide_of(problem, s, t, x)
     own[SLIDER], own[CODE], own[PEAK] = way, 0.0, 0.0
-    if under_way:
-        return
-    rate = indentation_rate(problem, s, x)
-    normal = normal_force(problem, s, 1, entry_rate, 0.0, rate)
-    if normal <= 0.0 and own[STIFFNESS] * abs(speed) > own[MU] * normal_rate(problem, s, rate, 0.0, entry_rate):
+    slips = own[MU] == 0.0
+    if not under_way and not slips:
+        rate = indentation_rate(problem, s, x)
+        slips = normal_force(problem, s, 1, entry_rate, 0.0, rate) <= 0.0
+        normal_force(problem, s, 1, entry_rate, _INSIDE, rate)
+        slips &= own[STIFFNESS] * abs(speed) > own[MU] * normal_rate(problem, s, rate, 0.0, entry_rate)
+    if slips:
         own[CODE] = math.copysign(1.0, speed)
 
 
@@ -148,6 +166,9 @@ def renew_slider(problem, s, entry_rate, segment, t, x, out):
     way, speed = slide_of(problem, s, t, x)
     force = slider_force(problem, s, segment, entry_rate, t, x)
     out[0], out[1], out[2] = way, speed, force
+    if own[MU] == 0.0 and own[CODE] != 0.0:
+        own[CODE] = -own[CODE]
+        return SLIPPED
     if own[CODE] == 0.0:
         undrawn = abs(drawn(radius, own, way)) <= way_tolerance(problem, s, t, x)[0]
         own[CODE] = math.copysign(1.0, speed if undrawn else force)

@@ -24,7 +24,16 @@ from solvers.compiled.kernels import (
     rubs,
 )
 from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
-from solvers.compiled.sliding import POINT, SPEED, WAY, move_point, point_of, slider_margin, way_tolerance
+from solvers.compiled.sliding import (
+    POINT,
+    SPEED,
+    WAY,
+    move_point,
+    point_of,
+    pressed_margin,
+    slider_margin,
+    way_tolerance,
+)
 from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
 from solvers.stepping.events import NONE, bisection, golden_section, motion_of, point_at, polynomial
 
@@ -53,10 +62,11 @@ def _present_of_slider(problem, state, space, s, t, x, rate):
     scale[2], scale[3] = max(scale[2], 4.0 * way), max(scale[3], speed)
     present = slider_margin(problem, s, state.segment[s], state.entry_rate[s], point)
     space.present[s, 0], space.rounding[s, 0] = present, 1e-15 * abs(present)
+    present = pressed_margin(problem, s, state.segment[s], state.entry_rate[s], point)
     for i in range(4):
         copy(point, moved, POINT)
         moved[i if i < 2 else WAY if i == 2 else SPEED] += scale[i]
-        value = slider_margin(problem, s, state.segment[s], state.entry_rate[s], moved)
+        value = pressed_margin(problem, s, state.segment[s], state.entry_rate[s], moved)
         space.rounding[s, 0] += abs(value - present)
 
 

@@ -96,11 +96,12 @@ def significant(solution: Any, size: float) -> Any:
 
 def first_forces(scene: Scene) -> Any:
     """Size of every stop's force at the start: one that is left fast may pull much harder than it ever pushes."""
-    delta, rate = np.array([c.motion(scene.q0, scene.q_dot0)[:2] for c in scene.system.contacts]).T
+    with np.errstate(invalid="ignore"):  # of a place at the centre of its circle, where δ̇ is not defined
+        delta, rate = np.array([c.motion(scene.q0, scene.q_dot0)[:2] for c in scene.system.contacts]).T
     laws = [c.law for c in scene.system.contacts]
     begun = np.maximum(np.abs(rate), [made.entry_rate_floor for made in laws])
     found = [made.force(d, v, v0) for made, d, v, v0 in zip(laws, delta, rate, begun, strict=True)]
-    return np.abs(np.array(found, dtype=float))
+    return np.nan_to_num(np.abs(np.array(found, dtype=float)))
 
 
 def numbers_of(solution: Any, scene: Scene, size: float, duration: float) -> dict[str, Any]:

@@ -32,12 +32,14 @@ from solvers.compiled.sliding import (
     WAY,
     move_point,
     point_of,
+    pressed_margin,
     slider_margin,
     way_tolerance,
 )
 from solvers.compiled.state import T, rate_tolerance, surface_tolerance
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.friction import SPARE, SPEEDS, TANGENTIAL, WAYS, nearest_way
+from solvers.exponential.contact.crossings import FORCE
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL_SLOPES, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
@@ -97,11 +99,28 @@ def slider_margins_at_nodes(problem, tables, state, scratch, s, node_set, h):
 
 
 @merged
-def _moved_margin(problem, state, scratch, s, place, by):
-    """Margin at the start of the step with one number of the point changed."""
-    copy(scratch.point[0], scratch.point[1], POINT)
-    scratch.point[1, place] += by
-    return margin_of(problem, state, s, scratch.point[1])
+def _change(problem, state, scratch, s, place, by):
+    """How much the margin at the last node changes with one number of the point there, kept among the spare ones."""
+    point = scratch.slid[s, SPARE]
+    before = pressed_margin(problem, s, state.segment[s], state.entry_rate[s], point)
+    known = point[place]
+    point[place] += by
+    after = pressed_margin(problem, s, state.segment[s], state.entry_rate[s], point)
+    point[place] = known
+    return abs(after - before)
+
+
+@merged
+def _margin_at_start(problem, tables, state, scratch, s):
+    """Margin at the start of the step; of slip on N = 0, as at an entry, that with which N begins to grow.
+
+    Where a law has been cut at N = 0 its slope there is not known, but at the first node.
+    """
+    margin = slider_margin_in(problem, state, scratch, s, state.now[T], state.x, 0.0)
+    if slider_of(problem, s)[CODE] == 0.0 or scratch.law_force[place_of(problem, s), 0] <= 0.0:
+        return margin
+    pressed = pressed_margin(problem, s, state.segment[s], state.entry_rate[s], scratch.point[0])
+    return min(pressed, scratch.margin[0]) if pressed != margin and tables.bend[s] == FORCE else pressed
 
 
 @part(RUB_MARGINS, types.void, *[types.int64] * 3)
@@ -112,16 +131,16 @@ def slider_margins_on_step(problem, tables, state, scratch, s, node_set, level):
     """
     h, ends, n, r = tables.contact_step[level], scratch.ends, problem.k.size, row_of(problem, s)
     ends[1] = slider_margin_in(problem, state, scratch, s, state.now[T] + h, scratch.x_new, 0.0)
-    ends[0] = slider_margin_in(problem, state, scratch, s, state.now[T], state.x, 0.0)
     slider_margins_at_nodes(problem, tables, state, scratch, s, node_set, h)
+    copy(scratch.point[1], scratch.slid[s, SPARE], POINT)
+    ends[0] = _margin_at_start(problem, tables, state, scratch, s)
     largest = max(abs(ends[0]), abs(ends[1]), largest8(size8(load8(scratch.margin, 0))))
     way, speed = way_tolerance(problem, s, state.now[T], state.x)
     rest = _REST * scratch.reference_speed[s]
     delta, rate = surface_tolerance(problem, s, state.x), max(rate_tolerance(problem, s, state.x), rest)
-    noise = abs(_moved_margin(problem, state, scratch, s, DELTA, delta) - ends[0])
-    noise += abs(_moved_margin(problem, state, scratch, s, RATE, rate) - ends[0])
-    noise += abs(_moved_margin(problem, state, scratch, s, WAY, way) - ends[0])
-    noise += abs(_moved_margin(problem, state, scratch, s, SPEED, max(speed, rest)) - ends[0])
+    noise = _change(problem, state, scratch, s, DELTA, delta) + _change(problem, state, scratch, s, RATE, rate)
+    noise += _change(problem, state, scratch, s, WAY, way)
+    noise += _change(problem, state, scratch, s, SPEED, max(speed, rest))
     law = tables.power_law[s]
     elastic = law[EXPONENT] > 0.0 and law[FACTOR] == 0.0 and law[DAMPING] == 0.0
     differenced = slider_of(problem, s)[CODE] != 0.0 and not elastic
@@ -130,9 +149,9 @@ def slider_margins_on_step(problem, tables, state, scratch, s, node_set, level):
         weight = tables.ripple_weight[r + a]
         for place in (DELTA, WAY):
             by = ripple_of(weight, alias, state.x, n)
-            ripple += abs(_moved_margin(problem, state, scratch, s, place, by) - ends[0])
+            ripple += _change(problem, state, scratch, s, place, by)
         by = rate_ripple_of(weight, problem.k, alias, state.x, n)
-        ripple += abs(_moved_margin(problem, state, scratch, s, SPEED, by) - ends[0])
+        ripple += _change(problem, state, scratch, s, SPEED, by)
     ends[2], ends[3], ends[4], ends[5] = ends[0], ends[0], ends[0] + ripple, ends[0]
     scratch.largest[s, 0] = largest
     scratch.noise[s, 0] = max((_DIFFERENCED if differenced else _SAME) * largest, 2.0 * noise)
