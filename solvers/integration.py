@@ -270,6 +270,8 @@ class _Run:
         lost = partial(Losses.of_run, self.system.contacts, back, first, last, works, transitions, self._rubbed())
         if status is Status.DONE and not self._balances(works, complete, motion, rows, self._balanced(rubbed)):
             status = Status.UNBALANCED
+        if status is Status.DONE and _overdrawn(self.system, rows):
+            status = Status.OVERDRAWN
         count = self.state.count.tolist()
         cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
         known = self.tangent is not None and status is Status.DONE
@@ -344,6 +346,21 @@ class _Run:
             slider_row(self.engine.problem, self.state, s, self.time, row)
             row[[at.TIME, at.CLIPPED]] = math.nan, 0.0
         return np.concatenate((logged, rows, more))
+
+
+_NEARLY = 0.95  # of half a turn
+
+
+def _overdrawn(system: System, rows: Array) -> bool:
+    """Whether F_t has come to k_t π c in a circle of radius c: ξ is known up to whole turns there, and so is ξ - s."""
+    of_friction = rows[rows[:, at.GUARD] == at.FRICTION]
+    for s, contact in enumerate(system.contacts):
+        if contact.friction is not None and contact.circle:
+            largest = of_friction[of_friction[:, at.ELEMENT] == s, at.LARGEST].max(initial=0.0)
+            law: Any = contact.law
+            if largest > _NEARLY * law.friction.stiffness * math.pi * abs(contact.circle):
+                return True
+    return False
 
 
 def _always(system: System) -> Any:

@@ -13,6 +13,7 @@ from solvers import (
     Exponential,
     Friction,
     OrbitError,
+    SolverError,
     System,
     integrate,
     integrate_many,
@@ -292,6 +293,24 @@ def test_energy_balances_with_dashpots_and_knots(method, law):
         gone = 0.04 * (0.8**2 + v_t**2 - np.sum(run.q_dot[-1] ** 2))
         assert run.losses.loss[0] == pytest.approx(gone, rel=1e-6)
         assert run.losses.friction[0] > 0.0
+
+
+def test_a_spring_that_is_drawn_by_half_a_turn_is_refused():
+    """ξ - s is known up to whole turns: beyond half of one the force would jump."""
+    soft = Contact(EYE[:2], KelvinVoigt(1e4, 0.0), 0.01, map="annulus", friction=Friction(50.0, 1e3))
+    system = System(np.diag([1.0, 1.0, 0.08]), 0.0 * EYE, 0.0 * EYE, [soft])
+    with pytest.raises(SolverError, match="drawn by half a turn"):
+        integrate(system, [0.005, 0.0, 0.0], [1.0, 3.0, 0.0], 0.5)
+
+
+@every_method
+def test_a_contact_that_opens_while_sliding_back_has_stuck_before(method):
+    """A nonlinear wall: the spring has recoiled as N falls to zero, and turns the slip round before the exit."""
+    run = bounce(wall(Polynomial([0.0, 4e9]), mu=0.31, k_t=3e5), 0.25, method, v_n=0.8)
+    events = run.transitions.event.tolist()
+    slips = np.sign(run.transitions.force[run.transitions.event == "slip"])
+    assert events[-1] == "slip"
+    assert np.sign(run.friction.speed_out[0]) == slips[-1]
 
 
 def test_a_rub_slips_all_the_way():

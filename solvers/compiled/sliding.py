@@ -36,7 +36,7 @@ from solvers.problem.friction import ARM, CODE, FREE, MU, PEAK, SCRATCH, SLIDER,
 DELTA, RATE, ACCELERATION, WAY, SPEED, WAY_ACCELERATION = range(6)  # places in a point: δ, δ̇, δ̈, ξ, ξ̇, ξ̈
 POINT = 6
 STUCK, SLIPPED = range(2)  # codes of events, see `problem.friction.Rubbing`
-_NONE = 1e-8  # limit μN, in units of the largest |F_t| of the contact, that counts as none
+NONE = 1e-8  # limit μN, in units of the largest |F_t| of the contact, that counts as none
 _INSIDE = 1e-200  # m, where forces like δ^{1/4} grow without bound, and those like δ^{3/2} do not grow
 
 
@@ -120,7 +120,7 @@ def slider_margin(problem, s, segment, entry_rate, point):
     if segment == 0 or code == FREE:
         return 1.0
     margin = pressed_margin(problem, s, segment, entry_rate, point)
-    if code == 0.0 or own[MU] == 0.0 or own[MU] * own[SCRATCH + 2] > _NONE * own[PEAK]:
+    if code == 0.0 or own[MU] == 0.0 or own[MU] * own[SCRATCH + 2] > NONE * own[PEAK]:
         return margin
     return abs(speed) + abs(code * speed - margin)
 

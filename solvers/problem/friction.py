@@ -29,7 +29,8 @@ class Friction:
 
     The loss is ∫F_t ξ̇ dt - F_t²/2k_t. A contact begins in stick where N jumps at entry or grows quicker than the spring
     is drawn, k_t |ξ̇| <= μṄ; else in slip, as laws of exponent above 1 always do. One under way as a run begins is
-    undrawn. A law that adheres, N < 0, has the limit 0 there: the slider follows without force.
+    undrawn. In a circle of radius c the spring must stay within half a turn, |F_t| < k_t π c; other runs are refused. A
+    law that adheres, N < 0, has the limit 0 there: the slider follows without force.
 
     Parameters
     ----------

@@ -42,6 +42,10 @@ class Status(Enum):
     LAW_NOT_FINITE = "a contact law gave a force that is not finite"
     UNBALANCED = "the energy does not balance: the result is wrong; use a smaller rtol, or DormandPrince"
     GAINED = "the motion holds more energy than it was ever given: the method is unstable here"
+    OVERDRAWN = (
+        "the spring of friction in a circle was drawn by half a turn, beyond which its force is not known; "
+        "use a larger stiffness of Friction, or a smaller mu"
+    )
 
     @property
     def good(self) -> bool:

@@ -25,6 +25,7 @@ from solvers.exponential.contact.peaks import local_maximum, motion_around
 from solvers.exponential.contact.slider_margins import (
     ENDS,
     slider_margin_in,
+    slider_margin_landed,
     slider_margins_around,
     slider_margins_at_nodes,
     slider_margins_on_step,
@@ -297,7 +298,10 @@ def passed(problem, state, scratch, element, border, w, x):
         if _is_without(problem, state, s):
             continue
         margins_of(problem, state, scratch, s, w[size], w, scratch.ends)
-        margins_of(problem, state, scratch, s, x[size], x, scratch.margin)
+        if rubs(problem, s):
+            scratch.margin[0] = slider_margin_landed(problem, state, scratch, s, x[size], x)
+        else:
+            margins_of(problem, state, scratch, s, x[size], x, scratch.margin)
         near = False
         for j in range(count):
             if s == element and j == border:

@@ -21,11 +21,12 @@ from solvers.compiled.kernels import (
     slide_of,
     slider_of,
 )
-from solvers.compiled.parts import RUB_AROUND, RUB_IN, RUB_MARGINS, RUB_PEAK, part
+from solvers.compiled.parts import RUB_AROUND, RUB_IN, RUB_LANDED, RUB_MARGINS, RUB_PEAK, part
 from solvers.compiled.simd import largest8, load8, size8
 from solvers.compiled.sliding import (
     ACCELERATION,
     DELTA,
+    NONE,
     POINT,
     RATE,
     SPEED,
@@ -44,7 +45,7 @@ from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RAT
 from solvers.exponential.contact.nodes import LOCAL_SLOPES, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR
-from solvers.problem.friction import CODE, MU, PEAK, STIFFNESS
+from solvers.problem.friction import CODE, MU, PEAK, SCRATCH, STIFFNESS
 
 ENDS = 6  # numbers in `Scratch.ends` for a border
 _SAME = 1e-11  # margin, in units of the largest of the step, that is rounding
@@ -68,6 +69,20 @@ def slider_margin_in(problem, state, scratch, s, t, x, later):
         return margin_of(problem, state, s, point)
     move_point(point, later, moved)
     return margin_of(problem, state, s, moved)
+
+
+@part(RUB_LANDED, types.float64, types.int64, types.float64, VECTOR)
+def slider_margin_landed(problem, state, scratch, s, t, x):
+    """The same where a step ends that began in slip under N > 0; at N = 0 the slip goes on only if ξ̇ agrees with it.
+
+    A contact that opens with the other sign has stuck before. Where a law pulls as it opens the slider follows.
+    """
+    own = slider_of(problem, s)
+    pressed = own[CODE] != 0.0 and own[MU] * own[SCRATCH + 2] > NONE * own[PEAK]
+    margin = slider_margin_in(problem, state, scratch, s, t, x, 0.0)
+    if not pressed or own[MU] * own[SCRATCH + 2] < -NONE * own[PEAK]:
+        return margin
+    return pressed_margin(problem, s, state.segment[s], state.entry_rate[s], scratch.point[0])
 
 
 @merged
