@@ -31,10 +31,19 @@ from fembeam.study.segments import Segments
 BEAM = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
 PLAIN = {  # annotations of what is no signal
     *("float", "str", "str | None", "float | tuple[float, float, float]", "tuple[str, ...]"),
-    *("Of", "Place", "Second | None", "Direction | None", "float | Sequence[float]", "bool"),
+    *("Of", "Place", "Second | None", "Direction | None", "float | Sequence[float]", "bool", "float | None"),
     *("tuple[float, float]", "tuple[Direction, Direction] | None"),
 }
-STRUCTURE = {"z", "beam", "damping", "bodies", "joints", "law", *FEATURES}  # fields of other annotations that are none
+STRUCTURE = {
+    "z",
+    "beam",
+    "damping",
+    "bodies",
+    "joints",
+    "law",
+    "friction",
+    *FEATURES,
+}  # fields of other annotations that are none
 TABLES = {"motion"}  # signals by name, see below
 VALUES = {"z": 0.3, "stiffness": 1e3, "mass": 0.1, "velocity": 0.0, "damping": 0.1, "law": Hertz(1e8)}
 TONE, NOISE = fb.Harmonic(1e-5, 300.0), fb.BandNoise(1e-5, (0.0, 600.0), seed=3)

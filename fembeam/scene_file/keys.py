@@ -26,7 +26,7 @@ UNSEEN = {"Model": Any}  # a name in annotations that exists only for type check
 def parameters(constructor: Callable[..., Any]) -> dict[str, inspect.Parameter]:
     """Keys of a table: what can be given by position, a name, and the class's own options where **options are taken."""
     signature = inspect.signature(constructor, eval_str=True, locals=UNSEEN).parameters
-    plain = [p for p in signature.values() if p.kind is p.POSITIONAL_OR_KEYWORD or p.name == "name"]
+    plain = [p for p in signature.values() if p.kind is p.POSITIONAL_OR_KEYWORD or p.name in ("name", "direction")]
     if any(p.kind is p.VAR_KEYWORD for p in signature.values()):
         options = inspect.signature(constructor.__self__, eval_str=True).parameters.values()  # type: ignore[attr-defined]
         plain += [p for p in options if p.default is not p.empty]
