@@ -28,6 +28,7 @@ def pytest_sessionstart(session):
     if hasattr(session.config, "workerinput") or not session.config.getoption("numprocesses", None):
         return
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processors are taken
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each of many processes would compile all modules
     for process in [subprocess.Popen([sys.executable, "-c", code]) for code in KERNELS]:
         process.wait()
 
@@ -39,6 +40,15 @@ def pytest_collection_modifyitems(config, items):
     examples = [item for item in items if item.get_closest_marker("example")]
     config.hook.pytest_deselected(items=examples)
     items[:] = [item for item in items if not item.get_closest_marker("example")]
+
+
+@pytest.fixture
+def dots(monkeypatch):
+    """Figures are saved as dots, for tests that do not look at them: to draw takes most of the time of what writes."""
+    from matplotlib.figure import Figure
+
+    plain = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda _, place, **options: plain(Figure((0.1, 0.1)), place, **options))
 
 
 @pytest.hookimpl(wrapper=True)

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import every_method
+import fresh_process
 import numba
 import numpy as np
 import pytest
@@ -48,12 +49,8 @@ def package(tmp_path):
 def ran(code, folder, **environment):
     """What a process of its own says, and its warnings."""
     ours = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_CACHE")}
-    variables = {**ours, "PYTHONPATH": str(folder), **environment}
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=folder, env=variables, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.split(), done.stderr
+    said, warned = fresh_process.run(code, folder, {**ours, "PYTHONPATH": str(folder), **environment})
+    return said.split(), warned
 
 
 def test_a_changed_inner_function_is_compiled_anew_and_the_old_one_found_again(package):

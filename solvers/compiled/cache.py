@@ -37,7 +37,7 @@ DIGITS = 16  # of a digest
 UNUSED = 24 * 3600.0  # s without a start after which one beyond these is removed; until then a process may need it
 _LOOK, _LOOKS = 0.02, 100  # s between two looks whether another process still compiles, and how many in silence
 _PATIENCE = 300.0  # s to wait for it; one kernel takes seconds, so that a process that long at it is stopped or hangs
-_LOCKS = 16  # of functions that are compiled by themselves
+_LOCKS = 4096  # of functions that are compiled by themselves: so many that hardly two share one
 _LOCK = threading.RLock()  # numba's setting belongs to the process
 
 
