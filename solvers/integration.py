@@ -27,6 +27,7 @@ from solvers.compiled.state import (
     SAMPLED,
     STATUSES,
     STEPS,
+    State,
     T,
     event_row,
     slider_row,
@@ -62,7 +63,6 @@ from solvers.problem.run_arguments import (
 )
 
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
-_NEVER, _NOWHERE = np.array([math.inf]), np.empty((0, 0))  # no output is due
 _NOTHING = np.empty(0)  # latched by a law without memory
 
 
@@ -180,21 +180,25 @@ class _Run:
 
     def __init__(self, system: System, engine: Any, times: Array | None, tangent: Any) -> None:
         self.system, self.engine, self.times = system, engine, times
-        self.due, self.out, self.state = _NEVER, _NOWHERE, engine.state
         if times is not None:
-            self.due = np.append(np.minimum(times, engine.duration), math.inf)
-            self.out = np.empty((len(times), self.state.x.size))
+            due = np.append(np.minimum(times, engine.duration), math.inf)
+            engine.record(out=np.empty((len(times), self.state.x.size)), due=due)
         self.tangent: Any = None
         if tangent:
             from solvers.exponential.tangent import Tangent
 
             self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None, True)
-            self.state = engine.state  # with the event record
-        self.log = np.empty((max(256, 2 * len(system.contacts)), at.CODE + 1))
-        self.initial, self.latched = self.state.x[: 2 * engine.problem.k.size].copy(), self.memory
-        if times is not None and self.due[0] == 0.0:
-            self.out[0] = self.state.x
-            self.state.count[SAMPLED] = 1
+        state = self.state
+        self.initial, self.latched = state.x[: 2 * engine.problem.k.size].copy(), self.memory
+        if state.due[0] == 0.0:
+            state.out[0] = state.x
+            state.count[SAMPLED] = 1
+
+    @property
+    def state(self) -> State:
+        """What has been reached, and the outputs."""
+        found: State = self.engine.state
+        return found
 
     def _derivatives(self) -> dict[str, Array]:
         """Derivatives of the end, with and without what is latched."""
@@ -231,11 +235,11 @@ class _Run:
         """Block after block until done, failed or interrupted."""
         code = RUNNING
         try:
-            self.engine.start(self.log)
+            self.engine.start()
             while code in (RUNNING, LOG_FULL):
                 if code == LOG_FULL:
-                    self.log = np.concatenate((self.log, np.empty_like(self.log)))
-                code = self.engine.march(BLOCK_STEPS, self.log, self.out, self.due)
+                    self.engine.record(log=np.concatenate((self.state.log, np.empty_like(self.state.log))))
+                code = self.engine.march(BLOCK_STEPS)
                 if self.tangent:
                     self.tangent.follow()
                 if progress:
@@ -255,7 +259,7 @@ class _Run:
         if self.times is None:
             x, t, motion = state[None, :], self.state.now[T : T + 1].copy(), end[None, :]
         else:
-            x = self.out[: self._sampled(status)]
+            x = self.state.out[: self._sampled(status)]
             t, motion = self.times[: len(x)], product(x[:, :size], back.T)
         works = x[:, size:] if self.times is None else x[:, size:].copy()  # so that all the samples can be let go
         own = 2 + 2 * len(self.system.contacts)
@@ -270,7 +274,7 @@ class _Run:
         lost = partial(Losses.of_run, self.system.contacts, back, first, last, works, transitions, self._rubbed())
         if status is Status.DONE and not self._balances(works, complete, motion, rows, self._balanced(rubbed)):
             status = Status.UNBALANCED
-        if status is Status.DONE and _overdrawn(self.system, rows):
+        if status is Status.DONE and len(self.engine.problem.friction) and _overdrawn(self.system, rows):
             status = Status.OVERDRAWN
         count = self.state.count.tolist()
         cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
@@ -326,14 +330,15 @@ class _Run:
     def _sampled(self, status: Status) -> int:
         """Samples written; the last one may lie a rounding beyond the end."""
         written = int(self.state.count[SAMPLED])
-        if status is Status.DONE and written == len(self.out) - 1:
-            self.out[-1] = self.state.x
-            return len(self.out)
+        out = self.state.out
+        if status is Status.DONE and written == len(out) - 1:
+            out[-1] = self.state.x
+            return len(out)
         return written
 
     def _rows(self) -> Array:
         """The event list; contacts under way end last, at no time."""
-        logged = self.log[: self.state.count[LOGGED]].copy()
+        logged = self.state.log[: self.state.count[LOGGED]].copy()
         under_way = [s for s, segment in enumerate(self.state.segment.tolist()) if segment > 0]
         if not under_way:
             return logged
