@@ -10,11 +10,22 @@ import pytest
 REALISATION = int(os.environ.get("FEMBEAM_REALISATION", "0"))  # 0 is the test's own
 
 _NAMES = "from solvers.compiled.kernels import *; from solvers.exponential.preparation import *; "
-_NAMES += "from solvers.exponential.method import advance_of; from solvers.stepping.loop import march_of; "
+_NAMES += "from solvers.exponential.method import advance_of; "
+_STEPPING = """
+import solvers, solvers.exponential.linearised
+from contacts import Hertz
+zero, plane, law = [[0.0, 0.0], [0.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]], Hertz(1e6)
+ball = solvers.System(plane, zero, zero, [solvers.Contact([1.0, 0.0], law)])
+disc = solvers.System(plane, zero, zero, [solvers.Contact(plane, law, 1e-4, map="annulus")])
+constant = solvers.Newmark(1e-4), solvers.RK4(1e-4), solvers.HenonRK2(1e-4, 1e-4)
+for system, methods in ((ball, constant), (disc, ())):
+    for method in (solvers.DormandPrince(), *methods):
+        solvers.integrate(system, [0.0, 0.0], [-0.5, 0.0], 1e-3, method=method)
+"""
 KERNELS = [
-    f"{_NAMES} load_parts(PROBLEM, range(26)); advance_of(False); march_of(True)",
-    f"{_NAMES} load_parts(PLANAR_PROBLEM, range(51)); advance_of(True); march_of(False)",
-    "import solvers.exponential.linearised",
+    f"{_NAMES} load_parts(PROBLEM, range(26)); advance_of(False)",
+    f"{_NAMES} load_parts(PLANAR_PROBLEM, range(51)); advance_of(True)",
+    _STEPPING,
 ]  # take equally long to compile
 
 

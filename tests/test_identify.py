@@ -65,7 +65,7 @@ def test_zeros_are_found():
 def test_intervals_hold_the_truth_as_often_as_they_say(kind):
     # tests/bench/collisions.py does more experiments and kinds; here what 95 % rejects once in a million
     made, options = KINDS[kind]
-    count = 120
+    count = 50
     shares, widths = coverage(count, made, options, seed=11)
     fewest = binom.ppf(1e-6, count, 0.95)
     assert np.all(count * shares[[0, 2, 3]] >= fewest), shares
