@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -301,15 +302,25 @@ class _Search:
                 "fun": lambda x: within - self._counted(x, most)[1:] / size[1:],
                 "jac": lambda x: -self.gradient(x)[1:] / size[1:, None],
             })  # fmt: skip
-        minimize(
-            lambda x: self._counted(x, most)[0] / size[0],
-            self.shares[self.best()],
-            jac=lambda x: self.gradient(x)[0] / size[0],
-            method="SLSQP",
-            bounds=Bounds(np.zeros(len(self.box)), np.ones(len(self.box))),
-            constraints=limited,
-            options={"ftol": sure, "maxiter": most},
-        )
+        last = self.shares[self.best()]
+
+        def moved(x: Vector) -> None:
+            nonlocal last
+            if np.abs(x - last).max() <= tolerance:
+                raise StopIteration
+            last = x.copy()
+
+        with suppress(StopIteration):
+            minimize(
+                lambda x: self._counted(x, most)[0] / size[0],
+                last,
+                jac=lambda x: self.gradient(x)[0] / size[0],
+                method="SLSQP",
+                bounds=Bounds(np.zeros(len(self.box)), np.ones(len(self.box))),
+                constraints=limited,
+                callback=moved,
+                options={"ftol": sure, "maxiter": most},
+            )
         return self._is_flat(tolerance, size)
 
     def _counted(self, x: Vector, most: int) -> Vector:
