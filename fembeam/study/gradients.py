@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 import solvers
 from fembeam.model import Model, Orbit, Run
-from fembeam.model.sensitivity import Sensitivity
+from fembeam.model.sensitivity import Sensitivity, by_each, of_orbit_by_each
 from fembeam.scene import Place, Scene
 from fembeam.study.measure import cut, runs, values_of
 from fembeam.study.quantities import place_of
@@ -134,7 +134,7 @@ def _of_run(trial: Trial, model: Model) -> Vector:
     part = cut(run, plan.discard, plan.duration)
     mine = (run.contacts.t_in >= plan.discard) & (run.contacts.t_in < plan.duration)
     kept = slice(len(run.t) - len(part.t), None)
-    return np.stack([_column(trial, part, run.sensitivity(path), kept, mine) for path in trial.names], axis=1)
+    return np.stack([_column(trial, part, one, kept, mine) for one in by_each(run, trial.names)], axis=1)
 
 
 def _of_settled(trial: Trial, model: Model) -> Vector:
@@ -147,7 +147,7 @@ def _of_settled(trial: Trial, model: Model) -> Vector:
     if not np.allclose(trial.asked(part), values, rtol=SAME, atol=0.0):
         raise NoGradientError("the response does not repeat with the load")
     kept = slice(0, len(part.t))
-    return np.stack([_column(trial, part, orbit.sensitivity(path), kept, mine) for path in trial.names], axis=1)
+    return np.stack([_column(trial, part, one, kept, mine) for one in of_orbit_by_each(orbit, trial.names)], axis=1)
 
 
 def _column(trial: Trial, part: Run, found: Sensitivity, kept: slice, mine: NDArray[np.bool_]) -> Vector:

@@ -57,7 +57,7 @@ class Flow:
 
     def motion_of(self, t: Any, s: int) -> tuple[Any, Any]:
         """δ and δ̇ of an element at times."""
-        q, q_dot = np.split(self.motion.at(t), 2)
+        q, q_dot = self.motion.at(t)
         return -self.w[s] @ q - self.gaps[s], -self.w[s] @ q_dot
 
     def force(self, t: Any, s: int, acting: Acting) -> Array:
@@ -81,8 +81,7 @@ class Flow:
 
     def rate(self, t: Array, acting: Acting) -> Array:
         """[q̇, q̈] (2n, k) of the motion at times (k,)."""
-        system, x = self.system, self.motion.at(t)
-        q, q_dot = np.split(x, 2)
+        system, (q, q_dot) = self.system, self.motion.at(t)
         push = -dense(system.by_rate) @ q_dot - dense(system.K) @ q
         for vector, signal in system.loads:
             push += np.outer(np.asarray(vector), np.broadcast_to(signal(t), t.shape))
@@ -92,7 +91,7 @@ class Flow:
 
     def rates(self, t: float, s: int, acting: Acting) -> tuple[float, float]:
         """δ̇ and δ̈ of an element."""
-        speed, acceleration = np.split(self.rate(np.array([t]), acting)[:, 0], 2)
+        speed, acceleration = self.rate(np.array([t]), acting).reshape(2, -1)
         return -float(self.w[s] @ speed), -float(self.w[s] @ acceleration)
 
     def change(self, t: float, s: int) -> tuple[Array, Array]:
@@ -105,7 +104,7 @@ class Flow:
 
     def _explicit(self, t: Any, s: int) -> tuple[Any, Any]:
         """Changes (..., d) of δ and δ̇ by the parameters with the motion held fixed."""
-        q, q_dot = np.split(self.motion.at(t), 2)
+        q, q_dot = self.motion.at(t)
         turned = self.by.directions[:, s].T
         return -q.T @ turned - self.by.gaps[:, s], -q_dot.T @ turned
 
@@ -221,7 +220,7 @@ class Flow:
         push = np.zeros((len(by), system.size, times.size))
         if by.structural:
             rate = self.rate(times, acting)
-            q, (q_dot, q_ddot) = np.split(self.motion.at(times), 2)[0], np.split(rate, 2)
+            q, (q_dot, q_ddot) = self.motion.at(times)[0], rate.reshape(2, -1, times.size)
             push -= by.M @ q_ddot + by.B @ q_dot + by.K @ q
         for i, (vector, signal) in enumerate(system.loads):
             if np.any(by.vectors[:, i]):

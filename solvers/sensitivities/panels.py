@@ -8,10 +8,12 @@ t = clock(σ) makes forces δ^p with a broken p smooth at both ends of a contact
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.polynomial import Legendre
 from scipy.special import beta as beta_function
 from scipy.special import betainc, betaincinv
 
@@ -33,6 +35,7 @@ def _lagrange(at: Array) -> Array:
 
 
 _WITHIN = _lagrange(X[:, None] * X)  # (i, q, j): ℓ_j at node q of the part before node i
+_FINE, _NEWTON = _lagrange(np.linspace(0.0, 1.0, 4 * S + 1)), 4  # where a maximum is looked for, and steps from there
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,8 @@ def propagator(k: Array, c: Array, t: Array) -> tuple[Array, Array]:
 def moved(k: Array, c: Array, over: tuple[Array, Array], y: Array) -> Array:
     """E y for α, β (n, ...) of a time and y (2n, ..., m), whose middle axes are those of α or have length 1."""
     a, b = (one[..., None] for one in over)
-    p, v = np.split(y, 2)
+    n = len(k)
+    p, v = y[:n], y[n:]
     k, c = (one.reshape(-1, *[1] * (a.ndim - 1)) for one in (k, c))
     return np.concatenate((a * p + b * v, a * v - b * (k * p + c * v)))
 
@@ -173,20 +177,21 @@ class Panels:
 
     def seen(self, row: Array) -> Array:
         """What a row (2n,) reads at the nodes of a state at the start, (P, S, 2n)."""
-        (a, b), (p, v) = self._to_nodes, np.split(row[:, None, None], 2)
+        (a, b), (p, v) = self._to_nodes, row.reshape(2, -1, 1, 1)
         k, c = self.k[:, None, None], self.c[:, None, None]
         return np.moveaxis(np.concatenate((p * a - k * b * v, p * b + v * (a - c * b))), 0, -1)
 
     def at_nodes(self, rates: Array) -> Array:
         """States (2n, P, S, m) at the nodes due to rates (2n, P, S, m) at them."""
-        (a, b), (p, v) = self.kernels, np.split(rates, 2)
+        n, (a, b) = len(self.k), self.kernels
+        p, v = rates[:n], rates[n:]
         k, c = self.k[:, None, None, None], self.c[:, None, None, None]
         bp, bv = b @ p, b @ v
         return np.concatenate((a @ p + bv, a @ v - k * bp - c * bv))
 
     def response(self, read: Array, push: Array) -> Array:
         """Of a row read (2n,) at the nodes to a force at the nodes that pushes (2n,), (P, S, S); (1, S, S) if alike."""
-        (rp, rv), (bp, bv) = np.split(read, 2), np.split(push, 2)
+        (rp, rv), (bp, bv) = read.reshape(2, -1), push.reshape(2, -1)
         by_alpha, by_beta = rp * bp + rv * bv, rp * bv - rv * (self.k * bp + self.c * bv)
         alpha, beta = self.kernels
         return np.asarray(np.tensordot(by_alpha, alpha, 1) + np.tensordot(by_beta, beta, 1))
@@ -212,25 +217,40 @@ def coefficients(values: Array) -> Array:
     return np.asarray(np.tensordot(_LEGENDRE, values, axes=1))
 
 
-def largest(values: Array, ends: list[float]) -> tuple[float, float]:
-    """Place in [0, 1] of the largest value of the polynomial through values (S,) at the nodes, and that value.
+def largest(values: Array, ends: tuple[bool, bool]) -> tuple[int, float, float]:
+    """Panel, place in [0, 1] and size of the largest value of the polynomials through values (P, S) at the nodes.
 
-    Maxima within, and those of the ends, 0 and 1, that are given.
+    The first and the last end of all panels count where ``ends`` says so; -inf where the largest value is one that does
+    not.
     """
-    polynomial = np.polynomial.legendre.Legendre(coefficients(values))
-    roots = polynomial.deriv().roots()
-    real = roots[np.abs(roots.imag) < 1e-9].real
-    places = np.concatenate((2.0 * np.array(ends) - 1.0, real[np.abs(real) < 1.0]))
-    if not places.size:
-        return 0.0, -np.inf
-    found = polynomial(places)
-    best = int(np.argmax(found))
-    return 0.5 * (float(places[best]) + 1.0), float(found[best])
+    panel, best = (int(i) for i in np.unravel_index(np.argmax(values @ _FINE.T), (len(values), len(_FINE))))
+    x = 2.0 * best / (len(_FINE) - 1) - 1.0
+    for _ in range(2):  # near an end the maximum may be in the next panel
+        whole = Legendre(coefficients(values[panel]))
+        top = _top(whole, x)
+        beyond = int(top > 1.0) - int(top < -1.0)
+        if not beyond:
+            return panel, 0.5 * (top + 1.0), float(whole(top))
+        if not 0 <= panel + beyond < len(values):
+            return panel, 0.5 * (beyond + 1.0), float(whole(beyond)) if ends[beyond > 0] else -np.inf
+        panel, x = panel + beyond, -float(beyond)
+    return panel, 0.5 * (x + 1.0), float(Legendre(coefficients(values[panel]))(x))  # a kink between them
+
+
+def _top(whole: Legendre, x: float) -> float:
+    """Where the slope of a polynomial is zero near x; beyond [-1, 1] where it rises to an end."""
+    slope, curvature = whole.deriv(), whole.deriv(2)
+    for _ in range(_NEWTON):
+        bend = float(curvature(x))
+        x = x - float(slope(x)) / bend if bend < 0.0 else math.copysign(math.inf, slope(x))
+        if not abs(x) <= 1.0:
+            break
+    return x
 
 
 def zeros(values: Array) -> Array:
     """Places of the zeros of the polynomial through values (S,) at the nodes, in [0, 1] and a little beyond."""
-    roots = np.polynomial.legendre.Legendre(coefficients(values)).roots()
+    roots = Legendre(coefficients(values)).roots()
     real = roots[np.abs(roots.imag) < 1e-9].real
     return 0.5 * (real[np.abs(real) < _BEYOND] + 1.0)
 

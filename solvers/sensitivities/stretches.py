@@ -175,12 +175,11 @@ def _power(contact: Any) -> int:
 
 
 class Motion:
-    """The run's own motion at given times, [q, q̇]."""
+    """The run's own q and q̇ at given times."""
 
-    def __init__(self, t: Array, x: Array) -> None:
-        self.t, self.x = t, x
+    def __init__(self, solution: Solution) -> None:
+        self.t, self.both = solution.t, np.array([solution.q.T, solution.q_dot.T])
 
     def at(self, times: Any) -> Array:
-        """(2n,) or (2n, k), at times that were asked for."""
-        places = np.minimum(np.searchsorted(self.t, times), len(self.t) - 1)
-        return self.x[places].T
+        """(2, n) or (2, n, k), at times that were asked for."""
+        return self.both[..., np.minimum(np.searchsorted(self.t, times), len(self.t) - 1)]

@@ -301,7 +301,7 @@ class _Walk:
         times = np.unique(np.clip(np.concatenate(wanted), 0.0, asked.duration))
         self.solution, again = replayed(system, asked.x, asked.duration, times, asked.method, asked.memory)
         _check_same(rows, again, asked.duration)
-        self.motion = Motion(self.solution.t, np.hstack((self.solution.q, self.solution.q_dot)))
+        self.motion = Motion(self.solution)
         n2, own = 2 * system.size, sum(len(getattr(one.law, "memory", ())) for one in system.contacts)
         columns = n2 + own + len(by)
         start = np.zeros((n2, columns))
@@ -433,10 +433,8 @@ class _Walk:
     def _look_for_peak(self, panels: Panels, s: int, acting: Acting, change: Array) -> None:
         """Largest force within panels; ends of a stretch are looked at with their events."""
         values = self.flow.force(panels.times.ravel(), s, acting).reshape(-1, S)
-        tops = values.max(axis=1)
-        for i in np.flatnonzero(tops > _NEAR_TOP * max(self.open[s].top, tops.max())):
-            low, high = panels.edges[i : i + 2]
-            place, top = largest(values[i], [end for end, inside in ((0.0, low > 0.0), (1.0, high < 1.0)) if inside])
+        if values.max() > _NEAR_TOP * self.open[s].top:
+            i, place, top = largest(values, (panels.edges[0] > 0.0, panels.edges[-1] < 1.0))
             self.open[s].offer(top, interpolated(place, change[i]))
 
     def _look_for_kinks(self, panels: Panels, s: int, acting: Acting) -> None:
