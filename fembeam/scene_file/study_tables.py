@@ -545,7 +545,7 @@ class MinimiseTable:
     seeds: int = 0
     tolerance: float = 1e-4
     most: int = 200
-    gradients: bool = False
+    gradients: bool | None = None
     workers: int = 1
     solver: Any = None
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,16 +96,20 @@ def _periodic_rate(values: Vector, h: float) -> Vector:
     return (8.0 * (c - b) - (d - a)) / (12.0 * h)
 
 
-def check_gradients(trial: Trial) -> None:
-    """ValueError unless all that is asked has exact derivatives: by paths of a scene, without noise."""
-    where, advice = "minimise", "leave out gradients=True"
-    for name, one in trial.asked.parts:
-        require(hasattr(one, "derivative"), f"{name} has no exact derivative", name, where, advice)
-    require(isinstance(trial.scene, Scene), "a function that makes scenes has no exact derivatives", trial.scene, where,
-            advice)  # fmt: skip
-    require(not trial.plan.seeds, "means over noise have no exact derivatives here", trial.plan.seeds, where, advice)
-    exact = isinstance(trial.method, solvers.Exponential)
-    require(exact, "exact derivatives need the method Exponential", trial.method, where, advice)
+def has_gradients(trial: Trial, insist: bool = False) -> bool:
+    """Whether all that is asked has exact derivatives: by paths of a scene, without noise; ValueError if it must."""
+    reasons: list[tuple[str, Any]] = [
+        (f"{name} has no exact derivative", name) for name, one in trial.asked.parts if not hasattr(one, "derivative")
+    ]
+    if not isinstance(trial.scene, Scene):
+        reasons.append(("a function that makes scenes has no exact derivatives", trial.scene))
+    if trial.plan.seeds:
+        reasons.append(("means over noise have no exact derivatives here", trial.plan.seeds))
+    if not isinstance(trial.method, solvers.Exponential):
+        reasons.append(("exact derivatives need the method Exponential", trial.method))
+    for reason, value in reasons if insist else ():
+        require(False, reason, value, "minimise", "leave out gradients=True")
+    return not reasons
 
 
 def gradient(trial: Trial, point: Vector) -> Vector:
