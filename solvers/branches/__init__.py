@@ -9,5 +9,6 @@ fold over a second parameter. Imports: `orbits` and what that may. Begin with `c
 
 from solvers.branches.folds import FoldCurve, fold_curve
 from solvers.branches.restart import restarted
+from solvers.branches.walk import BranchStatus
 
-__all__ = ["FoldCurve", "fold_curve", "restarted"]
+__all__ = ["BranchStatus", "FoldCurve", "fold_curve", "restarted"]
