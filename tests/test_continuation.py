@@ -12,7 +12,7 @@ import solvers.branches.count_changes
 import solvers.branches.walk
 from contacts import law
 from solvers import Contact, Exponential, OrbitError, System, branch, integrate, orbit
-from solvers.branches.continuation import BranchStatus
+from solvers.branches import BranchStatus
 
 DAMPED = Bilinear(1.1, zeta=0.05)  # doubles its period between 0.83 and 0.93 rad/s
 GAPPED = Bilinear(0.8, zeta=0.05, gap=2.0)

@@ -6,8 +6,8 @@ from frames import free_dofs, frequencies, portal, space_l, static, turned
 
 import fembeam as fb
 import reduction
-from fembeam.response.section_forces import section_forces
-from fembeam.structures.frame_forces import FORCES
+from fembeam.response import section_forces
+from fembeam.structures import FORCES
 
 STEEL = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
 

@@ -8,9 +8,8 @@ from oscillators import Tone, random_family, random_stops_family
 
 from contacts import Hysteretic, PiecewiseLinear
 from solvers import Contact, DormandPrince, OrbitError, System, branch, integrate, orbit
-from solvers.branches import merging, walk
+from solvers.branches import BranchStatus, merging, walk
 from solvers.branches.bifurcations import between
-from solvers.branches.continuation import BranchStatus
 from solvers.branches.grazing import signature
 from solvers.branches.nonsmooth import nonsmooth_near
 

@@ -12,7 +12,7 @@ import fembeam as fb
 from contacts import PiecewiseLinear
 from contacts.memory import BoucWen, Coulomb, ElastoPlastic, Iwan, Jenkins, WaltonBraun
 from solvers import Contact, Exponential, System, branch, integrate, orbit
-from solvers.branches.walk import BranchStatus
+from solvers.branches import BranchStatus
 from solvers.orbits import PeriodicProblem, at_zero, delayed, state_after
 
 

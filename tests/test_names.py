@@ -14,7 +14,7 @@ import solvers
 from contacts import Hertz, Jenkins, KelvinVoigt, Polynomial
 from fembeam.plot.axis_names import axis_name
 from fembeam.results import files, html_page
-from fembeam.scene.parameters import path_of, value_of, with_value
+from fembeam.scene import path_of, value_of, with_value
 from fembeam.scene_file import SceneFileError, json_schema, read
 
 STEEL = fb.Section.circle(E=2.1e11, rho=7800.0, diameter=0.01)

@@ -12,8 +12,8 @@ import solvers.branches.walk
 import solvers.orbits.shots
 from contacts import Hertz, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, OrbitError, System, branch
+from solvers.branches import BranchStatus
 from solvers.branches.bifurcations import Arc
-from solvers.branches.continuation import BranchStatus
 from solvers.orbits import delayed, state_after
 
 

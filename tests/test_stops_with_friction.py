@@ -9,8 +9,7 @@ import fembeam as fb
 import solvers
 from contacts import Hertz, KelvinVoigt, WaltonBraun
 from fembeam.response import backbone, states
-from fembeam.scene_file import SceneFileError, read
-from fembeam.scene_file.json_schema import json_schema
+from fembeam.scene_file import SceneFileError, json_schema, read
 from fembeam.study.measure import cut
 
 METHOD = solvers.DormandPrince(1e-11)

@@ -10,6 +10,7 @@ formulas of the parameter; the motion is not: its derivative solves the variatio
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -24,7 +25,7 @@ from fembeam.scene.signals import is_of_signal
 from fembeam.support import Part, Printed, require
 from solvers.orbits import codes, counts, delayed
 from solvers.problem import counted, dataframe
-from solvers.sensitivities import Nearby, sensitivity
+from solvers.sensitivities import Nearby, sensitivities, sensitivity
 
 if TYPE_CHECKING:
     import solvers
@@ -312,22 +313,37 @@ def _check_smooth(models: Nearby, path: str) -> None:
 
 def of_run(run: Run, parameter: str | None, start: ArrayLike | None) -> Sensitivity:
     """See `Run.sensitivity`."""
+    require((parameter is None) != (start is None), "give a parameter or a direction of the start", (parameter, start),
+            "Run.sensitivity", "e.g. 'stops[0].gap'")  # fmt: skip
+    if parameter is not None:
+        return _warned(by_each(run, [parameter])[0])
+    model, known, options = _made(run)
+    return _warned(Sensitivity("start", float("nan"), run, sensitivity(
+        model.system, *known, options.pop("times"), None, _direction(model, start), **options
+    )))  # fmt: skip
+
+
+def by_each(run: Run, parameters: Sequence[str]) -> list[Sensitivity]:
+    """Derivatives of a run by each of several numbers of its scene, for little more than those by one."""
+    model, known, options = _made(run)
+    varied = [_Varied(model, path_of(model.scene, parameter)) for parameter in parameters]
+    x = np.concatenate(known[:2])
+    found = sensitivities(model.system, *known, [(one.systems, one.start(x)) for one in varied], **options)
+    return [
+        Sensitivity(one.path, one.value, run, its, 0.0, one.models, one.systems)
+        for one, its in zip(varied, found, strict=True)
+    ]
+
+
+def _made(run: Run) -> tuple[Model, tuple[Vector, Vector, float], dict[str, Any]]:
+    """The model of a run, its q, q̇ and duration, and how it was made."""
     made, model = run.made, run.model
     if model is None or made is None:
         raise ValueError("a run read from a file has no model to be derived from; simulate it again")
-    require((parameter is None) != (start is None), "give a parameter or a direction of the start", (parameter, start),
-            "Run.sensitivity", "e.g. 'stops[0].gap'")  # fmt: skip
     _check_stops(model, "Run.sensitivity")
+    q, q_dot = np.split(made.start[: 2 * len(model.omega)], 2)
     times = run.t if run.sampled else np.array([made.duration])
-    x, n = made.start, len(model.omega)
-    options = {"method": made.solver, "memory": run.began or None}
-    if parameter is None:
-        direction = _direction(model, start)
-        found = sensitivity(model.system, x[:n], x[n:], made.duration, times, None, direction, **options)
-        return _warned(Sensitivity("start", float("nan"), run, found))
-    varied = _Varied(model, path_of(model.scene, parameter))
-    found = sensitivity(model.system, x[:n], x[n:], made.duration, times, varied.systems, varied.start(x), **options)
-    return _warned(Sensitivity(varied.path, varied.value, run, found, 0.0, varied.models, varied.systems))
+    return model, (q, q_dot, made.duration), {"times": times, "method": made.solver, "memory": run.began or None}
 
 
 def _check_stops(model: Model, where: str) -> None:
@@ -373,19 +389,34 @@ def of_amplitude(orbit: Orbit, z: Any, parameter: str) -> float:
 
 def of_orbit(orbit: Orbit, parameter: str, times: Vector | None = None) -> Sensitivity:
     """See `Orbit.sensitivity`; at ``times`` (s since ``found.phase``, ascending) instead of those of the run."""
+    return of_orbit_by_each(orbit, [parameter], times)[0]
+
+
+def of_orbit_by_each(orbit: Orbit, parameters: Sequence[str], times: Vector | None = None) -> list[Sensitivity]:
+    """Derivatives of an orbit by each of several numbers of its scene.
+
+    First those of the end of one period at a fixed start, from which the derivative of the start follows; then those of
+    the whole period.
+    """
     model, found = orbit.model, orbit.found
     _check_stops(model, "Orbit.sensitivity")
-    varied, n = _Varied(model, path_of(model.scene, parameter)), len(model.omega)
-    later, system = varied.systems.map(lambda one: delayed(one, found.phase)), delayed(found.system, found.phase)
+    varied, n = [_Varied(model, path_of(model.scene, one)) for one in parameters], len(model.omega)
+    later = [one.systems.map(lambda system: delayed(system, found.phase)) for one in varied]
+    system = delayed(found.system, found.phase)
     known = found.state[:n], found.state[n:], found.period
     options: dict[str, Any] = {"method": found.method, "memory": found.memory or None}
-    once = sensitivity(system, *known, (), later, None, **options)
-    lengthening = orbit.period * varied.lengthening
-    change = once.end.copy()
-    change[: 2 * n] += once.rate * lengthening
-    start = _fixed_point(once.matrix, change, _free(found))
-    period = sensitivity(system, *known, orbit.run.t if times is None else times, later, start, **options)
-    return Sensitivity(varied.path, varied.value, orbit.run, period, lengthening, varied.models, varied.systems)
+    starts, lengthening, free = [], [orbit.period * one.lengthening for one in varied], _free(found)
+    once = sensitivities(system, *known, [(one, None) for one in later], **options)
+    for one, longer in zip(once, lengthening, strict=True):
+        change = one.end.copy()
+        change[: 2 * n] += one.rate * longer
+        starts.append(_fixed_point(one.matrix, change, free))
+    whole = orbit.run.t if times is None else times
+    period = sensitivities(system, *known, list(zip(later, starts, strict=True)), whole, **options)
+    return [
+        Sensitivity(one.path, one.value, orbit.run, its, longer, one.models, one.systems)
+        for one, its, longer in zip(varied, period, lengthening, strict=True)
+    ]
 
 
 def _free(found: Any) -> Any:

@@ -18,7 +18,7 @@ from fembeam.plot.linear import floor_spectrum, frequency_response, response_spe
 from fembeam.plot.methods import speed_accuracy, stability_map
 from fembeam.plot.mode_count import mode_count, smallest_model
 from fembeam.plot.orbits import bifurcation, branch, orbit, peak
-from fembeam.plot.peaks import backbone, peak_curve
+from fembeam.plot.peaks import backbone, fold_curve, peak_curve
 from fembeam.plot.random import random_densities, random_spectra
 from fembeam.plot.response import deflected, densities, mode_shapes, time_history
 from fembeam.plot.rig import rig
@@ -29,9 +29,10 @@ from fembeam.plot.variation import minimum, variation
 
 __all__ = [
     "animate", "backbone", "basins", "batches", "bifurcation", "branch", "campbell", "contacts", "deflected",
-    "densities", "equivalent", "floor_spectrum", "forces_in_clearance", "frame", "frequency_response", "hysteresis",
-    "identification", "loops", "minimum", "mode_count", "mode_shapes", "natural", "one_legend", "orbit",
-    "orbit_in_clearance", "peak", "peak_curve", "peaks", "places", "random_densities", "random_spectra",
+    "densities", "equivalent", "floor_spectrum", "fold_curve", "forces_in_clearance", "frame", "frequency_response",
+    "hysteresis", "identification", "loops", "minimum", "mode_count", "mode_shapes", "natural", "one_legend",
+    "orbit", "orbit_in_clearance", "peak", "peak_curve", "peaks", "places", "random_densities", "random_spectra",
     "response_spectrum", "responses", "restitutions", "rig", "sampling_of", "segment_for", "smallest_model",
-    "spectra_of", "spectrum", "speed_accuracy", "stability_map", "stationary", "styled", "time_history", "variation",
+    "spectra_of", "spectrum", "speed_accuracy", "stability_map", "stationary", "styled", "time_history",
+    "variation",
 ]  # fmt: skip

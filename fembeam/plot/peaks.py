@@ -1,4 +1,4 @@
-"""Figures of a resonance: its peak over a second parameter, its frequency and damping over amplitude."""
+"""Figures of a resonance: its peak and its folds over a second parameter, frequency and damping over amplitude."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fembeam.study import Backbone, Peak
+    from fembeam.study import Backbone, Fold, Peak
 
 FINE = 24  # points between two values
 WIDE = 20.0  # ratio of the last value to the first, from which on the axis is logarithmic
@@ -88,6 +88,39 @@ def backbone(found: Backbone, axes: Sequence[Axes] | None = None) -> Figure:
     if not stable.all():
         upper.legend()
     heading([upper, lower], "Backbone by phase resonance", axes is None)
+    return figure
+
+
+@styled
+def fold_curve(found: Fold, axes: Sequence[Axes] | None = None) -> Figure:
+    """Where a branch folds over a second parameter, and the amplitudes there; cusps marked, jumps in between shaded.
+
+    `axes` to draw into are two; None makes a figure.
+
+    Examples
+    --------
+    >>> import fembeam as fb
+    >>> from contacts import Polynomial
+    >>> scene = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)],
+    ...                  elements=[fb.Element(0.5, Polynomial([0.0, 0.0, 2e7]))], damping=fb.ModalDamping(0.01),
+    ...                  forces=[fb.PointForce(0.5, fb.Harmonic(0.2, 190.0))])
+    >>> branch = scene.reduce(modes=1).branch("omega", (170.0, 210.0)).run()
+    >>> found = fb.study.fold(branch, "forces[0].signal.amplitude", (0.1, 0.3))
+    >>> fold_curve(found).axes[0].get_ylabel()
+    'forcing frequency ω / (rad/s)'
+    """
+    figure, (upper, lower) = sheet(2, 1, (6.4, 4.8), axes, sharex=True, height_ratios=(1, 1))
+    height = 1e3 * found.amplitude
+    for axis, y in ((upper, found.at), (lower, height)):
+        axis.plot(found.values, y, ".-", color=BLUE)
+        axis.plot(found.values[found.cusps], y[found.cusps], "*", color=RED, markersize=11, label="cusp")
+    if len(found.cusps) == 1:
+        upper.fill(found.values, found.at, color=BLUE, alpha=0.15, label="three orbits")
+    upper.set_ylabel(found.titles[1])
+    lower.set(xlabel=found.titles[0], ylabel=f"amplitude of {displacement_name(found.z)} / mm")
+    if found.cusps:
+        upper.legend()
+    heading([upper, lower], "Folds of the response", axes is None)
     return figure
 
 

@@ -25,6 +25,7 @@ from fembeam.study import (
     Basins,
     Campbell,
     Ensemble,
+    Fold,
     Minimum,
     Peak,
     SpeedAccuracy,
@@ -34,6 +35,7 @@ from fembeam.study import (
     campbell,
     characteristics,
     ensemble,
+    fold,
     minimise,
     peak,
     speed_accuracy,
@@ -459,6 +461,39 @@ class PeakTable:
 
 
 @dataclass(frozen=True)
+class FoldTable:
+    """The table [fold]: a fold of a branch over a second number; `fb.study.fold` explains the keys.
+
+    Parameters
+    ----------
+    over : the second number, such as "amplitude". values : its (lowest, highest) value, the scene's among them.
+    span : (lowest, highest) value of the parameter, of the branch with the fold.
+    period : in periods of the load. number : which of the folds of the branch.
+    z : place of the displacement; None: the first stop or element, else the tip.
+    """
+
+    over: str
+    values: tuple[float, float]
+    span: tuple[float, float]
+    parameter: str = "omega"
+    period: int = 1
+    number: int = 0
+    z: Place | None = None
+
+    def __post_init__(self) -> None:
+        _check_period(self.period, "[fold]")
+
+    def check(self, scene: Scene) -> None:
+        """Raise ValueError for numbers that the scene does not have, or values that do not ascend."""
+        check_peak(scene, self.parameter, self.over, self.values, self.span, "[fold]")
+
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Fold:
+        """The study."""
+        branch = file.model().branch(self.parameter, self.span, self.period).run(progress)
+        return fold(branch, self.over, self.values, self.number, self.z)
+
+
+@dataclass(frozen=True)
 class BackboneTable:
     """The table [backbone]: frequency and damping over amplitude by phase resonance; `fb.study.backbone` explains more.
 
@@ -545,7 +580,7 @@ class MinimiseTable:
     seeds: int = 0
     tolerance: float = 1e-4
     most: int = 200
-    gradients: bool = False
+    gradients: bool | None = None
     workers: int = 1
     solver: Any = None
 
@@ -600,6 +635,7 @@ STUDIES: Constructors = {
     "basins": BasinsTable,
     "campbell": CampbellTable,
     "peak": PeakTable,
+    "fold": FoldTable,
     "backbone": BackboneTable,
     "ensemble": EnsembleTable,
     "mode_count": _table_of(mode_count),

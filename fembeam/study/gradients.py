@@ -10,13 +10,14 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import solvers
 from fembeam.model import Model, Orbit, Run
-from fembeam.model.sensitivity import Sensitivity
+from fembeam.model.sensitivity import Sensitivity, by_each, of_orbit_by_each
 from fembeam.scene import Place, Scene
 from fembeam.study.measure import cut, runs, values_of
 from fembeam.study.quantities import place_of
@@ -95,16 +96,20 @@ def _periodic_rate(values: Vector, h: float) -> Vector:
     return (8.0 * (c - b) - (d - a)) / (12.0 * h)
 
 
-def check_gradients(trial: Trial) -> None:
-    """ValueError unless all that is asked has exact derivatives: by paths of a scene, without noise."""
-    where, advice = "minimise", "leave out gradients=True"
-    for name, one in trial.asked.parts:
-        require(hasattr(one, "derivative"), f"{name} has no exact derivative", name, where, advice)
-    require(isinstance(trial.scene, Scene), "a function that makes scenes has no exact derivatives", trial.scene, where,
-            advice)  # fmt: skip
-    require(not trial.plan.seeds, "means over noise have no exact derivatives here", trial.plan.seeds, where, advice)
-    exact = isinstance(trial.method, solvers.Exponential)
-    require(exact, "exact derivatives need the method Exponential", trial.method, where, advice)
+def has_gradients(trial: Trial, insist: bool = False) -> bool:
+    """Whether all that is asked has exact derivatives: by paths of a scene, without noise; ValueError if it must."""
+    reasons: list[tuple[str, Any]] = [
+        (f"{name} has no exact derivative", name) for name, one in trial.asked.parts if not hasattr(one, "derivative")
+    ]
+    if not isinstance(trial.scene, Scene):
+        reasons.append(("a function that makes scenes has no exact derivatives", trial.scene))
+    if trial.plan.seeds:
+        reasons.append(("means over noise have no exact derivatives here", trial.plan.seeds))
+    if not isinstance(trial.method, solvers.Exponential):
+        reasons.append(("exact derivatives need the method Exponential", trial.method))
+    for reason, value in reasons if insist else ():
+        require(False, reason, value, "minimise", "leave out gradients=True")
+    return not reasons
 
 
 def gradient(trial: Trial, point: Vector) -> Vector:
@@ -134,7 +139,7 @@ def _of_run(trial: Trial, model: Model) -> Vector:
     part = cut(run, plan.discard, plan.duration)
     mine = (run.contacts.t_in >= plan.discard) & (run.contacts.t_in < plan.duration)
     kept = slice(len(run.t) - len(part.t), None)
-    return np.stack([_column(trial, part, run.sensitivity(path), kept, mine) for path in trial.names], axis=1)
+    return np.stack([_column(trial, part, one, kept, mine) for one in by_each(run, trial.names)], axis=1)
 
 
 def _of_settled(trial: Trial, model: Model) -> Vector:
@@ -147,7 +152,7 @@ def _of_settled(trial: Trial, model: Model) -> Vector:
     if not np.allclose(trial.asked(part), values, rtol=SAME, atol=0.0):
         raise NoGradientError("the response does not repeat with the load")
     kept = slice(0, len(part.t))
-    return np.stack([_column(trial, part, orbit.sensitivity(path), kept, mine) for path in trial.names], axis=1)
+    return np.stack([_column(trial, part, one, kept, mine) for one in of_orbit_by_each(orbit, trial.names)], axis=1)
 
 
 def _column(trial: Trial, part: Run, found: Sensitivity, kept: slice, mine: NDArray[np.bool_]) -> Vector:

@@ -3,9 +3,9 @@
     minimise f(x)    low <= x <= high,    g(x) <= bound
 
 The box is first looked over at points spread evenly (Halton's sequence), then searched from the best of them: by SLSQP,
-sequential quadratic programming, if exact gradients are asked for; else, and where that does not end at a smooth
-minimum, by COBYQA, a trust-region method with quadratic models that needs no derivatives. Noise has the same seeds at
-every point, so that f is a function of x alone.
+sequential quadratic programming, where all that is asked has exact gradients; else, and where that does not end at a
+smooth minimum, by COBYQA, a trust-region method with quadratic models that needs no derivatives. Noise has the same
+seeds at every point, so that f is a function of x alone.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,7 +26,7 @@ from fembeam import plot
 from fembeam.scene import Scene
 from fembeam.statistics import Estimate
 from fembeam.study.execution.checkpoint import Checkpoint
-from fembeam.study.gradients import NoGradientError, check_gradients, gradient
+from fembeam.study.gradients import NoGradientError, gradient, has_gradients
 from fembeam.study.measure import Plan, Start
 from fembeam.study.quantities import Quantity, label, named
 from fembeam.study.result import Result
@@ -120,7 +121,7 @@ def minimise(
     seeds: Sequence[int] = (),
     tolerance: float = 1e-4,
     most: int = 200,
-    gradients: bool = False,
+    gradients: bool | None = None,
     start: Start | None = None,
     solver: Any = None,
     executor: Executor | None = None,
@@ -139,10 +140,11 @@ def minimise(
     seeds : of the noise, three or more, the same at every point: the minimum is that of these realisations.
     tolerance : of the parameters, relative to high - low, in (0, 0.1).
     most : evaluations allowed.
-    gradients : use exact ones: fewer evaluations, but a gradient costs some hundred times a short run. They are those
-        of `Run.sensitivity`, of a settled response of `Orbit.sensitivity`; amplitude, rms, peak_force, mean_force,
-        contact_time and energy have them, and quantities of your own with a method ``derivative(change)``, see
-        `fembeam.study.gradients`. Noise, functions that make scenes, and other methods than `Exponential` have none.
+    gradients : whether to search by exact ones; None: where all that is asked has them, True: else refuse. They are
+        those of `Run.sensitivity`, of a settled response of `Orbit.sensitivity`; amplitude, rms, peak_force,
+        mean_force, contact_time and energy have them, and quantities of your own with a method
+        ``derivative(change)``, see `fembeam.study.gradients`. Noise, functions that make scenes, and other methods
+        than `Exponential` have none.
     executor : any `concurrent.futures.Executor`, for the first look over the box; the search is one after the other.
     checkpoint : file written whole after each point; what it holds is not computed again.
 
@@ -184,11 +186,12 @@ def minimise(
     require(is_whole(most) and most > looks, f"most must be above the {looks} first points", most, WHERE, "e.g. 200")
     plan = Plan(duration, dt, discard, tuple(seeds), start, solver)
     asked = [quantity, *(one for one, _ in limits)]
-    require(isinstance(gradients, (bool, np.bool_)), "gradients must be True or False", gradients, WHERE, "e.g. True")
+    known = gradients is None or isinstance(gradients, (bool, np.bool_))
+    require(known, "gradients must be True, False or None", gradients, WHERE, "leave it out")
     first = qmc.Halton(len(box), scramble=False).random(looks + 1)[1:]  # the sequence begins in a corner
     trial = Trial.of(scene, list(parameters), asked, plan, reduction).prepared(_within(box, first))
-    if gradients:
-        check_gradients(trial)
+    if gradients is not False:
+        gradients = has_gradients(trial, insist=gradients is True)
     kept = Checkpoint(checkpoint, {} if checkpoint is None else identity_of(trial))
     search = _Search(trial, box, np.array([bound for _, bound in limits]), kept)
     search.look(first, executor, WHERE if progress else None)
@@ -301,15 +304,25 @@ class _Search:
                 "fun": lambda x: within - self._counted(x, most)[1:] / size[1:],
                 "jac": lambda x: -self.gradient(x)[1:] / size[1:, None],
             })  # fmt: skip
-        minimize(
-            lambda x: self._counted(x, most)[0] / size[0],
-            self.shares[self.best()],
-            jac=lambda x: self.gradient(x)[0] / size[0],
-            method="SLSQP",
-            bounds=Bounds(np.zeros(len(self.box)), np.ones(len(self.box))),
-            constraints=limited,
-            options={"ftol": sure, "maxiter": most},
-        )
+        last = self.shares[self.best()]
+
+        def moved(x: Vector) -> None:
+            nonlocal last
+            if np.abs(x - last).max() <= tolerance:
+                raise StopIteration
+            last = x.copy()
+
+        with suppress(StopIteration):
+            minimize(
+                lambda x: self._counted(x, most)[0] / size[0],
+                last,
+                jac=lambda x: self.gradient(x)[0] / size[0],
+                method="SLSQP",
+                bounds=Bounds(np.zeros(len(self.box)), np.ones(len(self.box))),
+                constraints=limited,
+                callback=moved,
+                options={"ftol": sure, "maxiter": most},
+            )
         return self._is_flat(tolerance, size)
 
     def _counted(self, x: Vector, most: int) -> Vector:

@@ -8,4 +8,4 @@ linear modes do under forces given at nodes, `stretches` divides a run at its ev
 
 from solvers.sensitivities.events import NoDerivativeError
 from solvers.sensitivities.nearby import Nearby
-from solvers.sensitivities.variation import Sensitivity, sensitivity
+from solvers.sensitivities.variation import Sensitivity, sensitivities, sensitivity

@@ -67,9 +67,9 @@ def _at_knot(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[Any
     up = row[at.RATE] > 0.0
     border = acting.segment[s] if up else acting.segment[s] - 1
     late = moved.copy()
-    late[-1] -= flow.of_knot(s, border)
+    late[flow.own] -= flow.by.of_knot(s, border)
     still = rate * rate <= 2.0 * abs(acceleration) * GRAZING * span
-    if t == 0.0 and still and not np.any(late[-1:]):
+    if t == 0.0 and still and not np.any(late[flow.own]):
         return np.zeros(flow.columns)  # at rest on the surface: it begins at once
     if still:
         what = (
@@ -87,7 +87,7 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
     by = laws.margin_slopes(law, acting.rows[s], *place, acting.entry_rate[s])
     known = flow.latched[s]
     late = by[0] * moved + by[1] * sped + by[2:] @ known
-    late[-1] += flow.over_laws(s, acting, lambda one, own: laws.margin(one, own, *place, acting.entry_rate[s]))
+    late[flow.own] += flow.over_laws(s, acting, lambda one, own: laws.margin(one, own, *place, acting.entry_rate[s]))
     pace = by[0] * rate + by[1] * acceleration
     size = np.abs(by * np.concatenate((place[1:], acting.rows[s][list(law.memory)]))).sum()
     behind = laws.margin(law, acting.rows[s], *place, acting.entry_rate[s]) < -_BEHIND * size
@@ -99,7 +99,7 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
     latched = np.outer(maps[:, 0], moved + rate * shift) + np.outer(maps[:, 1], sped + acceleration * shift)
     latched += maps[:, 2:] @ known
     places = list(law.memory)
-    latched[:, -1] += flow.over_laws(s, acting, lambda one, own: laws.renewed(one, own, *place)[places])
+    latched[:, flow.own] += flow.over_laws(s, acting, lambda one, own: laws.renewed(one, own, *place)[places])
     flow.latched[s] = latched
     return shift
 

@@ -3,8 +3,9 @@
     Y' = A Y + Σ b_s dF_s + G,    dF = ∂F/∂δ dδ + ∂F/∂δ̇ dδ̇ + ∂F/∂(entry rate) d(entry rate) + ∂F/∂L dL + ∂F/∂p
     dδ = -w·dq - (dw·q + dgap),   M G = -dM q̈ - dC q̇ - dK q + Σ (dv s + v ds) + Σ dw F
 
-Columns of Y: by the start [q, q̇], by what laws have latched then, and last by the parameter, to which alone the
-explicit terms belong. Flights are exact; while forces act, the forces at a panel's nodes are the unknowns.
+Columns of Y: by the start [q, q̇], by what laws have latched then, and last by the parameters, to which alone the
+explicit terms belong. Flights are exact; while forces act, the forces at a panel's nodes are the unknowns. What a panel
+does is linear in the state at its start: all panels of a stretch are solved at once, then passed one after the other.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from solvers.problem import Array, System, dense
 from solvers.sensitivities import laws
 from solvers.sensitivities.nearby import Change
-from solvers.sensitivities.panels import Panel, S, moved, propagator
+from solvers.sensitivities.panels import Panels, S, moved, propagator, running
 from solvers.sensitivities.stretches import Acting, Motion
 
 _INSIDE = 1e-10  # relative distance kept from a knot, where the slope of a law could be that of the next segment
@@ -27,7 +28,7 @@ _INSIDE = 1e-10  # relative distance kept from a knot, where the slope of a law 
 class Flow:
     """The derivatives at one time, moved along."""
 
-    def __init__(self, system: System, motion: Motion, by: Change | None, start: Array, latched: list[Array]) -> None:
+    def __init__(self, system: System, motion: Motion, by: Change, start: Array, latched: list[Array]) -> None:
         self.system, self.motion, self.by = system, motion, by
         blocks, n = system.blocks, system.size
         self.k, self.c, self.T = blocks.k, blocks.c, blocks.T
@@ -35,10 +36,13 @@ class Flow:
         self.gaps = np.array([one.gap for one in system.contacts])
         self.push = self.w @ system.push.T
         self.read, self.read_rate = -self.w @ self.T[:n], -self.w @ self.T[n:]
+        self.accelerate = np.linalg.inv(dense(system.M))
         self.y = blocks.inverse @ start
         self.columns = start.shape[1]
+        self.own = slice(self.columns - len(by), self.columns)  # of the parameters
         self.latched = latched  # (l, m) of every element
         self.entry, self.impulse = (np.zeros((len(self.w), self.columns)) for _ in range(2))
+        self.largest = np.zeros((len(self.w), self.columns))  # change of each force so far
         self.roughness = 0.0
 
     @property
@@ -46,9 +50,14 @@ class Flow:
         """(2n, m) derivatives of [q, q̇]."""
         return np.asarray(self.T @ self.y)
 
+    @property
+    def by_parameters(self) -> Array:
+        """(d, 2n) of them those by the parameters."""
+        return np.asarray((self.T @ self.y[:, self.own]).T)
+
     def motion_of(self, t: Any, s: int) -> tuple[Any, Any]:
         """δ and δ̇ of an element at times."""
-        q, q_dot = np.split(self.motion.at(t), 2)
+        q, q_dot = self.motion.at(t)
         return -self.w[s] @ q - self.gaps[s], -self.w[s] @ q_dot
 
     def force(self, t: Any, s: int, acting: Acting) -> Array:
@@ -72,44 +81,35 @@ class Flow:
 
     def rate(self, t: Array, acting: Acting) -> Array:
         """[q̇, q̈] (2n, k) of the motion at times (k,)."""
-        system, x = self.system, self.motion.at(t)
-        q, q_dot = np.split(x, 2)
+        system, (q, q_dot) = self.system, self.motion.at(t)
         push = -dense(system.by_rate) @ q_dot - dense(system.K) @ q
         for vector, signal in system.loads:
             push += np.outer(np.asarray(vector), np.broadcast_to(signal(t), t.shape))
         for s in acting.elements:
             push += np.outer(self.w[s], self.force(t, s, acting))
-        return np.concatenate((q_dot, np.linalg.solve(dense(system.M), push)))
+        return np.concatenate((q_dot, self.accelerate @ push))
 
     def rates(self, t: float, s: int, acting: Acting) -> tuple[float, float]:
         """δ̇ and δ̈ of an element."""
-        speed, acceleration = np.split(self.rate(np.array([t]), acting)[:, 0], 2)
+        speed, acceleration = self.rate(np.array([t]), acting).reshape(2, -1)
         return -float(self.w[s] @ speed), -float(self.w[s] @ acceleration)
 
     def change(self, t: float, s: int) -> tuple[Array, Array]:
         """dδ and dδ̇ (m,) of an element at fixed time."""
         moved, sped = self.read[s] @ self.y, self.read_rate[s] @ self.y
         explicit = self._explicit(t, s)
-        moved[-1] += explicit[0]
-        sped[-1] += explicit[1]
+        moved[self.own] += explicit[0]
+        sped[self.own] += explicit[1]
         return moved, sped
 
     def _explicit(self, t: Any, s: int) -> tuple[Any, Any]:
-        """Change of δ and δ̇ by the parameter with the motion held fixed."""
-        if self.by is None:
-            return 0.0, 0.0
-        q, q_dot = np.split(self.motion.at(t), 2)
-        turned = self.by.directions[s]
-        return -turned @ q - self.by.gaps[s], -turned @ q_dot
-
-    def of_knot(self, s: int, border: int) -> float:
-        """Change of a knot by the parameter."""
-        return 0.0 if self.by is None else self.by.knot(s, border)
+        """Changes (..., d) of δ and δ̇ by the parameters with the motion held fixed."""
+        q, q_dot = self.motion.at(t)
+        turned = self.by.directions[:, s].T
+        return -q.T @ turned - self.by.gaps[:, s], -q_dot.T @ turned
 
     def over_laws(self, s: int, acting: Acting, read: Callable[[Any, Array], Any]) -> Any:
-        """Derivative by the parameter of what is read off a law, with what it has latched held fixed."""
-        if self.by is None:
-            return 0.0
+        """Derivatives (..., d) by the parameters of what is read off a law, with what it has latched held fixed."""
         places = list(getattr(self.system.contacts[s].law, "memory", ()))
         width = len(acting.rows[s])
 
@@ -129,9 +129,9 @@ class Flow:
         other = np.outer(slopes[2], self.entry[s])
         if len(self.latched[s]):
             other += laws.by_latched(law, acting.rows[s], inside, rate).T @ self.latched[s]
-        other[:, -1] += self.over_laws(s, acting, lambda one, own: laws.force(one, own, inside, rate))
-        moved, sped = self._explicit(t, s)
-        other[:, -1] += slopes[0] * moved + slopes[1] * sped
+        other[:, self.own] += self.over_laws(s, acting, lambda one, own: laws.force(one, own, inside, rate))
+        for slope, explicit in zip(slopes[:2], self._explicit(t, s), strict=True):
+            other[:, self.own] += slope[:, None] * explicit
         return slopes[:2], other
 
     def at_instant(self, t: float, s: int, acting: Acting) -> tuple[float, float, Array]:
@@ -142,56 +142,96 @@ class Flow:
         changed = other[0] + slopes[0, 0] * (self.read[s] @ self.y) + slopes[1, 0] * (self.read_rate[s] @ self.y)
         return float(self.force(times, s, acting)[0]), float(slopes[:, 0] @ (rate, acceleration)), changed
 
-    def fly(self, duration: float) -> None:
-        """Over a time in which nothing acts."""
-        self.y = moved(self.k, self.c, *propagator(self.k, self.c, np.array(duration)), self.y)
+    def fly(self, start: float, end: float, samples: Array) -> Array:
+        """Over a time in which nothing acts; derivatives by the parameters at samples, (q, 2n, d)."""
+        over = propagator(self.k, self.c, np.append(samples, end) - start)
+        found = moved(self.k, self.c, over, self.y[:, None])
+        self.y = found[:, -1]
+        return np.moveaxis(found[:, :-1, self.own], 0, 1)
 
-    def pass_panel(self, panel: Panel, acting: Acting) -> dict[int, Array]:
-        """Over a panel; the changes (S, m) of the forces at its nodes."""
-        drive = self._drive(panel.times, acting)
-        free, elements = panel.free(self.y), acting.elements
+    def pass_flight(self, panels: Panels, acting: Acting, samples: Array) -> Array:
+        """The same where the parameters drive the motion."""
+        rates, begun = self._drive(panels.times, acting), self.y[:, None, self.own]
+        found = self.fly(panels.ends[0], panels.ends[-1], samples)
+        if rates is None:
+            return found
+        ends = running(self.k, self.c, panels.ends[1:], panels.at_ends(rates))
+        self.y[:, self.own] += ends[:, -1]
+        if samples.size:
+            starts = np.concatenate((np.zeros_like(begun), ends[:, :-1]), axis=1)
+            found = found + panels.within(panels.free(starts) + panels.at_nodes(rates), samples)
+        return found
+
+    def pass_panels(self, panels: Panels, acting: Acting, samples: Array) -> tuple[Array, dict[int, Array]]:
+        """Where elements act; derivatives at samples, and the changes (P, S, m) of forces at nodes.
+
+        F = A y + B with y at the start of a panel; y ← (E + K A) y + K B + drive at its end.
+        """
+        count, size, own = len(panels), 2 * len(self.k), self.own
+        drive = self._drive(panels.times, acting)
+        by_state, other = self._forces(panels, acting, drive)
+        reach = np.concatenate([panels.reach(self.push[s]) for s in acting.elements], axis=2)
+        across, given = panels.across() + reach @ by_state, reach @ other
         if drive is not None:
-            free[..., -1] += panel.at_nodes(drive)
-        right, size = np.zeros((len(elements), S, self.columns)), len(elements) * S
-        matrix = np.zeros((len(elements), S, len(elements), S))
+            given[..., own] += np.moveaxis(panels.at_ends(drive), 0, 1)
+        starts = np.empty((count + 1, size, self.columns))
+        starts[0] = self.y
+        for i in range(count):
+            starts[i + 1] = across[i] @ starts[i] + given[i]
+        self.y = starts[-1]
+        both = by_state @ starts[:-1] + other
+        forces = {s: both[:, i * S : (i + 1) * S] for i, s in enumerate(acting.elements)}
+        for s, change in forces.items():
+            self.impulse[s] += np.tensordot(panels.weights, change, 2)
+        if not samples.size:
+            return np.zeros((0, size, len(self.by))), forces
+        rates = np.zeros((size, count, S, len(self.by))) if drive is None else drive
+        for s, change in forces.items():
+            rates = rates + self.push[s][:, None, None, None] * change[..., own]
+        states = panels.free(np.moveaxis(starts[:-1, :, own], 1, 0)) + panels.at_nodes(rates)
+        return panels.within(states, samples), forces
+
+    def _forces(self, panels: Panels, acting: Acting, drive: Array | None) -> tuple[Array, Array]:
+        """Changes of all forces at the nodes: by the state at the start of a panel (P, m S, 2n), and else."""
+        elements, count, size = acting.elements, len(panels), 2 * len(self.k)
+        m, driven = len(elements), None if drive is None else panels.at_nodes(drive)
+        by_state, other = np.zeros((count, m, S, size)), np.zeros((count, m, S, self.columns))
+        left: Array = np.zeros((count, m, S, m, S))
         for i, s in enumerate(elements):
-            slopes, other = self.force_change(panel.times, s, acting)
-            rows = self.read[s], self.read_rate[s]
-            right[i] = other + sum(
-                a[:, None] * np.tensordot(row, free, axes=1) for a, row in zip(slopes, rows, strict=True)
-            )
-            for j, r in enumerate(elements):
-                matrix[i, :, j] = -sum(
-                    a[:, None] * panel.response(row, self.push[r]) for a, row in zip(slopes, rows, strict=True)
-                )
-        matrix = matrix.reshape(size, size) + np.eye(size)
-        forces = np.linalg.solve(matrix, right.reshape(size, -1)).reshape(right.shape) if size else right
-        rates = np.zeros((2 * len(self.k), S, self.columns))
-        for i, s in enumerate(elements):
-            rates += self.push[s][:, None, None] * forces[i]
-            self.impulse[s] += panel.weights @ forces[i]
-        if drive is not None:
-            rates[..., -1] += drive
-        self.y = panel.end(self.y, rates)
-        return dict(zip(elements, forces, strict=True))
+            slopes, change = self.force_change(panels.times.ravel(), s, acting)
+            other[:, i] = change.reshape(count, S, -1)
+            for slope, row in zip(slopes.reshape(2, count, S, 1), (self.read[s], self.read_rate[s]), strict=True):
+                by_state[:, i] += slope * panels.seen(row)
+                if driven is not None:
+                    other[:, i, :, self.own] += slope * np.tensordot(row, driven, 1)
+                for j, r in enumerate(elements):
+                    left[:, i, :, j] -= slope * panels.response(row, self.push[r])
+        left = left.reshape(count, m * S, m * S) + np.eye(m * S)
+        right = np.concatenate((by_state, other), axis=3).reshape(count, m * S, -1)
+        solved = np.asarray(np.linalg.solve(left, right), dtype=float)
+        return solved[..., :size], solved[..., size:]
 
     def _drive(self, t: Array, acting: Acting) -> Array | None:
-        """Rate (2n, k) of the blocks by the parameter with state and forces held fixed; None where it is zero."""
+        """Rates (2n, P, S, d) of the blocks by the parameters at times (P, S), state and forces held fixed."""
         by, system = self.by, self.system
-        if by is None or not (by.forced or np.any(by.directions)):
+        if not (by.forced or np.any(by.directions)):
             return None
-        push = np.zeros((system.size, len(t)))
+        times = t.ravel()
+        push = np.zeros((len(by), system.size, times.size))
         if by.structural:
-            q, q_dot = np.split(self.motion.at(t), 2)
-            push -= by.M @ self.rate(t, acting)[system.size :] + by.B @ q_dot + by.K @ q
-        for (vector, signal), turned, slope in zip(system.loads, by.vectors, by.signals, strict=True):
-            if np.any(turned):
-                push += np.outer(turned, np.broadcast_to(signal(t), t.shape))
-            if slope is not None:
-                push += np.outer(np.asarray(vector), slope(t))
+            rate = self.rate(times, acting)
+            q, (q_dot, q_ddot) = self.motion.at(times)[0], rate.reshape(2, -1, times.size)
+            push -= by.M @ q_ddot + by.B @ q_dot + by.K @ q
+        for i, (vector, signal) in enumerate(system.loads):
+            if np.any(by.vectors[:, i]):
+                push += by.vectors[:, i, :, None] * np.broadcast_to(signal(times), times.shape)
+            for j, signals in enumerate(by.signals):
+                if (slope := signals[i]) is not None:
+                    push[j] += np.outer(np.asarray(vector), slope(times))
         for s in acting.elements:
-            push += np.outer(by.directions[s], self.force(t, s, acting))
-        return np.asarray(system.push @ push)
+            if np.any(by.directions[:, s]):
+                push += by.directions[:, s, :, None] * self.force(times, s, acting)
+        return np.asarray(np.moveaxis(system.push @ push, 0, -1)).reshape(-1, *t.shape, len(by))
 
 
 def _begun(places: list[int], law: Any) -> Array:
@@ -199,15 +239,15 @@ def _begun(places: list[int], law: Any) -> Array:
     return np.asarray(law.parameters)[places]
 
 
-def latched_columns(system: System, first: int, columns: int, by: Change | None, given: Sequence[Any] | None) -> Any:
-    """(l, m) of every element at the start: by what it has latched itself, and by the parameter where laws begin so."""
-    found, place = [], first
+def latched_columns(system: System, by: Change, columns: int, given: Sequence[Any] | None) -> list[Array]:
+    """(l, m) of every element at the start: by what it has latched itself, and by parameters where laws begin so."""
+    found, place = [], 2 * system.size
     for s, contact in enumerate(system.contacts):
         places = list(getattr(contact.law, "memory", ()))
         own = np.zeros((len(places), columns))
         own[:, place : place + len(places)] = np.eye(len(places))
         place += len(places)
-        if places and by is not None and (given is None or given[s] is None):
-            own[:, -1] = by.over_laws(s, partial(_begun, places))
+        if places and (given is None or given[s] is None):
+            own[:, columns - len(by) :] = by.over_laws(s, partial(_begun, places))
         found.append(own)
     return found

@@ -9,7 +9,7 @@ import numpy as np
 
 from solvers.problem import Array
 
-_REALS = ctypes.POINTER(ctypes.c_double)
+_REALS = ctypes.c_void_p
 _KNOWN = ctypes.c_int64, _REALS, _REALS, ctypes.c_double, _REALS
 _AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS
 _ONE, _THREE = ctypes.CFUNCTYPE(None, *_KNOWN, _REALS), ctypes.CFUNCTYPE(None, *_KNOWN, *[_REALS] * 3)
@@ -17,9 +17,9 @@ _MAPS = ctypes.CFUNCTYPE(None, *_AT, _REALS)
 _SHARE, _LEAST = 1e-7, 1e-10  # of differences of margins, which are nearly linear
 
 
-def _pointers(*arrays: Array) -> list[Any]:
+def _pointers(*arrays: Array) -> list[int]:
     """Addresses of numbers."""
-    return [array.ctypes.data_as(_REALS) for array in arrays]
+    return [array.ctypes.data for array in arrays]
 
 
 def _call(function: Any, row: Array, motion: tuple[Array, Array], entry_rate: float, *out: Array) -> None:

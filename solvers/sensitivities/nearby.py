@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,11 @@ class Nearby:
         return float(np.abs(fine - coarse).max(initial=0.0)) / size if size > 0.0 else 0.0
 
 
+def unchanged(system: System) -> Nearby:
+    """What a start changes: nothing of the data."""
+    return Nearby((system,), (0.0,), (0.0,))
+
+
 def combined(weights: tuple[float, ...], values: list[Any]) -> Any:
     """Σ weight value, exactly zero where all values are the same."""
     first = values[0]
@@ -74,86 +80,103 @@ def combined(weights: tuple[float, ...], values: list[Any]) -> Any:
 
 
 class Change:
-    """Derivative of the data: matrices, directions (E, n), gaps (E,), knots, loads' vectors (L, n) and signals."""
+    """Derivatives of the data by d parameters: matrices (d, n, n), directions (d, E, n), gaps (d, E), loads' vectors
+    (d, L, n); of each parameter the signals and laws that change.
+    """
 
-    def __init__(self, system: System, nearby: Nearby, duration: float) -> None:
-        self.nearby = nearby
-        self.M, self.B, self.K = (self._matrix(name) for name in ("M", "by_rate", "K"))
-        self.directions = nearby.derivative(_directions)
-        self.gaps = nearby.derivative(lambda one: [contact.gap for contact in one.contacts])
-        self.vectors = nearby.derivative(_vectors)
-        self.signals = [self._signal(system, i, duration) for i in range(len(nearby.systems[0].loads))]
-        self.laws = [self._law(s) for s in range(len(nearby.systems[0].contacts))]
+    def __init__(self, system: System, nearby: Sequence[Nearby], duration: float) -> None:
+        self.nearby, n = tuple(nearby), system.size
+        self.M, self.B, self.K = (self._each(partial(_matrix, name), (n, n)) for name in ("M", "by_rate", "K"))
+        self.directions = self._each(_directions, (len(system.contacts), n))
+        self.gaps = self._each(lambda one: [contact.gap for contact in one.contacts], (len(system.contacts),))
+        self.vectors = self._each(_vectors, (len(system.loads), n))
+        self.signals = [[_signal(one, system, i, duration) for i in range(len(system.loads))] for one in self.nearby]
+        self.laws = [[_laws(one, s) for s in range(len(system.contacts))] for one in self.nearby]
 
-    def _matrix(self, name: str) -> Array:
-        return self.nearby.derivative(lambda one: dense(getattr(one, name)))
+    def __len__(self) -> int:
+        return len(self.nearby)
+
+    def _each(self, read: Callable[[Any], Any], shape: tuple[int, ...]) -> Array:
+        return np.array([one.derivative(read) for one in self.nearby]).reshape(len(self), *shape)
 
     @property
     def structural(self) -> bool:
-        """Whether matrices or loads' vectors change."""
-        return any(np.any(one) for one in (self.M, self.B, self.K, self.vectors))
+        """Whether matrices change."""
+        return any(np.any(one) for one in (self.M, self.B, self.K))
 
     @property
     def forced(self) -> bool:
         """Whether the motion changes while nothing touches, besides by its state."""
-        return self.structural or any(signal is not None for signal in self.signals)
+        moving = any(signal is not None for signals in self.signals for signal in signals)
+        return self.structural or moving or bool(np.any(self.vectors))
 
-    def _law(self, s: int) -> list[Any] | None:
-        """The laws of an element at the values; None where all are one."""
-        laws: list[Any] = [one.contacts[s].law for one in self.nearby.systems]
-        same = all(
-            law is laws[0] or (law == laws[0] and np.array_equal(law.parameters, laws[0].parameters)) for law in laws
-        )
-        return None if same else laws
-
-    def knot(self, s: int, border: int) -> float:
-        """Derivative of a knot of an element; border 0 is its surface."""
-        laws = self.laws[s]
-        return 0.0 if border == 0 or laws is None else float(self._combined([law.knots[border - 1] for law in laws]))
-
-    def _combined(self, values: list[Any]) -> Any:
-        return combined(self.nearby.weights, values)
+    def of_knot(self, s: int, border: int) -> Array:
+        """(d,) of a knot of an element; border 0 is its surface."""
+        return self.over_laws(s, lambda law: 0.0 if border == 0 else law.knots[border - 1])
 
     def over_laws(self, s: int, read: Callable[[Any], Any]) -> Any:
-        """Derivative of what is read off the law of an element; 0 where it does not change."""
-        laws = self.laws[s]
-        return 0.0 if laws is None else self._combined([np.asarray(read(law)) for law in laws])
+        """(..., d) of what is read off the law of an element; zeros (d,) where it does not change."""
+        found = [
+            0.0
+            if (known := laws[s]) is None
+            else combined(one.weights, [np.asarray(read(law), float) for law in known])
+            for one, laws in zip(self.nearby, self.laws, strict=True)
+        ]
+        shape = max((np.shape(one) for one in found), key=len, default=())
+        return np.stack([np.broadcast_to(one, shape) for one in found], axis=-1) if found else np.zeros(0)
 
-    def _signal(self, system: System, i: int, duration: float) -> Callable[[Array], Array] | None:
-        """Derivative of a load's signal at fixed time; None where it is zero."""
-        signals: list[Any] = [one.loads[i][1] for one in self.nearby.systems]
-        own: Any = system.loads[i][1]
-        if all(signal is signals[0] for signal in signals):
-            return None
-        if all(hasattr(signal, "tones") for signal in signals):
-            slope = self._of_tones(own.tones(), [signal.tones() for signal in signals])
-        else:
-            slope = self._of_values(signals)
-        return slope if np.any(slope(duration * _PROBES)) else None
 
-    def _of_values(self, signals: list[Any]) -> Callable[[Array], Array]:
-        """By the values of the signals themselves."""
-        return lambda t: np.asarray(self._combined([np.asarray(signal(t), dtype=float) for signal in signals]))
+def _laws(nearby: Nearby, s: int) -> list[Any] | None:
+    """The laws of an element at the values; None where all are one."""
+    laws: list[Any] = [one.contacts[s].law for one in nearby.systems]
+    same = all(
+        law is laws[0] or (law == laws[0] and np.array_equal(law.parameters, laws[0].parameters)) for law in laws
+    )
+    return None if same else laws
 
-    def _of_tones(self, here: Any, tones: list[Any]) -> Callable[[Array], Array]:
-        """d/dp Re Σ a e^{iωt} = Re Σ (a' + i t ω' a) e^{iωt}, exact in t however long the run is."""
-        omega, amplitude = (np.asarray(part) for part in here)
-        turn = combined(self.nearby.weights, [np.asarray(tone[0], dtype=float) for tone in tones])
-        change = combined(self.nearby.weights, [np.asarray(tone[1], dtype=complex) for tone in tones])
 
-        def slope(t: Array) -> Array:
-            t = np.asarray(t, dtype=float)[..., None]
-            waves = (change + 1j * t * turn * amplitude) * np.exp(1j * omega * t)
-            return np.asarray(waves.real.sum(axis=-1))
+def _signal(nearby: Nearby, system: System, i: int, duration: float) -> Callable[[Array], Array] | None:
+    """Derivative of a load's signal at fixed time; None where it is zero."""
+    signals: list[Any] = [one.loads[i][1] for one in nearby.systems]
+    own: Any = system.loads[i][1]
+    if all(signal is signals[0] for signal in signals):
+        return None
+    if all(hasattr(signal, "tones") for signal in signals):
+        slope = _of_tones(nearby, own.tones(), [signal.tones() for signal in signals])
+    else:
+        slope = partial(_of_values, nearby, signals)
+    return slope if np.any(slope(duration * _PROBES)) else None
 
-        return slope
+
+def _of_values(nearby: Nearby, signals: list[Any], t: Array) -> Array:
+    """By the values of the signals themselves."""
+    return np.asarray(combined(nearby.weights, [np.asarray(signal(t), dtype=float) for signal in signals]))
+
+
+def _of_tones(nearby: Nearby, here: Any, tones: list[Any]) -> Callable[[Array], Array]:
+    """d/dp Re Σ a e^{iωt} = Re Σ (a' + i t ω' a) e^{iωt}, exact in t however long the run is."""
+    omega, amplitude = (np.asarray(part) for part in here)
+    turn = combined(nearby.weights, [np.asarray(tone[0], dtype=float) for tone in tones])
+    change = combined(nearby.weights, [np.asarray(tone[1], dtype=complex) for tone in tones])
+
+    def slope(t: Array) -> Array:
+        t = np.asarray(t, dtype=float)[..., None]
+        waves = (change + 1j * t * turn * amplitude) * np.exp(1j * omega * t)
+        return np.asarray(waves.real.sum(axis=-1))
+
+    return slope
+
+
+def _matrix(name: str, system: System) -> Array:
+    """M, K or what multiplies q̇."""
+    return dense(getattr(system, name))
 
 
 def _directions(system: System) -> Array:
     """(E, n)."""
-    return np.array([contact.direction for contact in system.contacts]).reshape(len(system.contacts), system.size)
+    return np.array([contact.direction for contact in system.contacts])
 
 
 def _vectors(system: System) -> Array:
     """(L, n)."""
-    return np.array([vector for vector, _ in system.loads]).reshape(len(system.loads), system.size)
+    return np.array([vector for vector, _ in system.loads])

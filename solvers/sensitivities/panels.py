@@ -8,10 +8,12 @@ t = clock(σ) makes forces δ^p with a broken p smooth at both ends of a contact
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.polynomial import Legendre
 from scipy.special import beta as beta_function
 from scipy.special import betainc, betaincinv
 
@@ -21,22 +23,19 @@ S = 14  # nodes
 _BEYOND = (
     1.02  # half widths of a panel from its middle: the outermost nodes are within, a zero may lie between two panels
 )
+_SAME = 1e-12  # relative difference of widths that are one
 _X, _W = np.polynomial.legendre.leggauss(S)
 X, W = 0.5 * (_X + 1.0), 0.5 * _W  # on [0, 1]
+_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_X, S - 1))  # values at nodes -> coefficients
 
 
 def _lagrange(at: Array) -> Array:
     """Values (..., S) of the polynomials that are 1 at one node and 0 at the others."""
-    out = np.ones((*at.shape, S))
-    for j in range(S):
-        for i in range(S):
-            if i != j:
-                out[..., j] *= (at - X[i]) / (X[j] - X[i])
-    return out
+    return np.asarray(np.polynomial.legendre.legvander(2.0 * at - 1.0, S - 1) @ _LEGENDRE)
 
 
 _WITHIN = _lagrange(X[:, None] * X)  # (i, q, j): ℓ_j at node q of the part before node i
-_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_X, S - 1))  # values at nodes -> coefficients
+_FINE, _NEWTON = _lagrange(np.linspace(0.0, 1.0, 4 * S + 1)), 4  # where a maximum is looked for, and steps from there
 
 
 @dataclass(frozen=True)
@@ -69,95 +68,148 @@ def propagator(k: Array, c: Array, t: Array) -> tuple[Array, Array]:
     """α and β of all blocks over times t (...,), shapes (n, ...): E = [[α, β], [-k β, α - c β]]."""
     t = np.asarray(t, dtype=float)
     shape = (-1, *[1] * t.ndim)
-    half, mu = 0.5 * c.reshape(shape), np.sqrt(0.25 * c * c - k + 0j).reshape(shape)
-    turn = mu * t
-    with np.errstate(divide="ignore", invalid="ignore"):
-        far = (np.exp(turn - half * t) - np.exp(-turn - half * t)) / (2.0 * mu)
-    square = turn * turn
-    near = np.exp(-half * t) * t * (1.0 + square / 6.0 * (1.0 + square / 20.0))
-    beta = np.where(np.abs(turn) < 1e-3, near, far).real
-    alpha = (0.5 * (np.exp(turn - half * t) + np.exp(-turn - half * t))).real + half * beta
-    return alpha, beta
+    half, square = 0.5 * c.reshape(shape), (k - 0.25 * c * c).reshape(shape)
+    turn = np.sqrt(np.abs(square)) * t
+    with np.errstate(over="ignore", invalid="ignore"):
+        decay = np.exp(-half * t)
+        alpha, beta = decay * np.cos(turn), decay * t * np.sinc(turn / np.pi)
+        if np.any(square < 0.0):
+            grow, fall = np.exp(turn - half * t), np.exp(-turn - half * t)
+            near = decay * t * (1.0 + turn * turn / 6.0 * (1.0 + turn * turn / 20.0))
+            far = 0.5 * (grow - fall) * t / np.where(turn > 0.0, turn, 1.0)
+            alpha = np.where(square < 0.0, 0.5 * (grow + fall), alpha)
+            beta = np.where(square < 0.0, np.where(turn < 1e-3, near, far), beta)
+    return alpha + half * beta, beta
 
 
-def moved(k: Array, c: Array, alpha: Array, beta: Array, y: Array) -> Array:
-    """E y for α, β (n, ...) and y (2n, m): (2n, ..., m)."""
+def moved(k: Array, c: Array, over: tuple[Array, Array], y: Array) -> Array:
+    """E y for α, β (n, ...) of a time and y (2n, ..., m), whose middle axes are those of α or have length 1."""
+    a, b = (one[..., None] for one in over)
     n = len(k)
-    lift = (n, *[1] * (alpha.ndim - 1), 1)
-    p, v = y[:n].reshape(*lift[:-1], -1), y[n:].reshape(*lift[:-1], -1)
-    a, b = alpha[..., None], beta[..., None]
-    first = a * p + b * v
-    return np.concatenate((first, a * v - b * (k.reshape(lift) * p + c.reshape(lift) * v)))
+    p, v = y[:n], y[n:]
+    k, c = (one.reshape(-1, *[1] * (a.ndim - 1)) for one in (k, c))
+    return np.concatenate((a * p + b * v, a * v - b * (k * p + c * v)))
+
+
+def running(k: Array, c: Array, t: Array, kicks: Array) -> Array:
+    """Σ_{i<=j} E(t_j - t_i) g_i (2n, P, m) for all j, of kicks g (2n, P, m) at times t (P,): by doubling."""
+    total, apart = kicks, 1
+    while apart < len(t):
+        over = propagator(k, c, t[apart:] - t[:-apart])
+        total = np.concatenate((total[:, :apart], total[:, apart:] + moved(k, c, over, total[:, :-apart])), axis=1)
+        apart *= 2
+    return total
 
 
 @dataclass(frozen=True, eq=False)
-class Panel:
-    """One panel of a clock, between two σ; of blocks with stiffness k and damping c."""
+class Panels:
+    """Panels of a clock between σ (P + 1,), ascending; of blocks with stiffness k and damping c."""
 
     k: Array
     c: Array
     clock: Clock
-    low: float
-    high: float
+    edges: Array
+
+    def __len__(self) -> int:
+        return len(self.edges) - 1
+
+    def parts(self, most: int) -> list[Panels]:
+        """Themselves in parts of at most so many."""
+        return [replace(self, edges=self.edges[i : i + most + 1]) for i in range(0, len(self), most)]
+
+    @cached_property
+    def widths(self) -> Array:
+        """(P,) in σ."""
+        return np.diff(self.edges)
+
+    @cached_property
+    def _sigma(self) -> Array:
+        """(P, S) of the nodes."""
+        return np.asarray(self.edges[:-1, None] + self.widths[:, None] * X)
 
     @cached_property
     def times(self) -> Array:
-        """(S,) of the nodes."""
-        return self.clock.time(self.low + (self.high - self.low) * X)
+        """(P, S) of the nodes."""
+        return self.clock.time(self._sigma)
 
     @cached_property
     def weights(self) -> Array:
-        """(S,) Σ w f = ∫ f dt."""
-        return np.asarray((self.high - self.low) * W * self.clock.pace(self.low + (self.high - self.low) * X))
+        """(P, S) Σ w f = ∫ f dt."""
+        return np.asarray(self.widths[:, None] * W * self.clock.pace(self._sigma))
 
     @cached_property
-    def ends(self) -> tuple[float, float]:
-        """Its first and last time."""
-        first, last = self.clock.time(np.array([self.low, self.high]))
-        return float(first), float(last)
+    def ends(self) -> Array:
+        """(P + 1,) times of the edges."""
+        return self.clock.time(self.edges)
+
+    @cached_property
+    def _to_nodes(self) -> tuple[Array, Array]:
+        """α and β (n, P, S) from the start of a panel to its nodes."""
+        return propagator(self.k, self.c, self.times - self.ends[:-1, None])
+
+    @cached_property
+    def _to_end(self) -> tuple[Array, Array]:
+        """α and β (n, P, S) from nodes to the end, times weights."""
+        alpha, beta = propagator(self.k, self.c, self.ends[1:, None] - self.times)
+        return alpha * self.weights, beta * self.weights
 
     @cached_property
     def kernels(self) -> tuple[Array, Array]:
-        """∫ α ℓ_j and ∫ β ℓ_j up to node i, (n, S, S) each."""
-        sigma = self.low + (self.high - self.low) * X[:, None] * X
-        lag = np.maximum(self.times[:, None] - self.clock.time(sigma), 0.0)
-        alpha, beta = propagator(self.k, self.c, lag)
-        weights = (self.high - self.low) * X[:, None] * W * self.clock.pace(sigma)
-        table = (weights[:, :, None] * _WITHIN).transpose(0, 1, 2)
-        a, b = (np.matmul(one[:, :, None, :], table[None])[:, :, 0, :] for one in (alpha, beta))
+        """∫ α ℓ_j and ∫ β ℓ_j up to node i, (n, P, S, S) each; (n, 1, S, S) of panels alike."""
+        alike = self.clock.power == 1 and np.ptp(self.widths) <= _SAME * self.widths[0]
+        own = slice(0, 1) if alike else slice(None)
+        sigma = self.edges[:-1, None, None][own] + self.widths[:, None, None][own] * (X[:, None] * X)
+        lag = np.maximum(self.times[own, :, None] - self.clock.time(sigma), 0.0)
+        weights = self.widths[:, None, None][own] * X[:, None] * W * self.clock.pace(sigma)
+        alpha, beta = (one * weights for one in propagator(self.k, self.c, lag))
+        a, b = (np.matmul(one[..., None, :], _WITHIN)[..., 0, :] for one in (alpha, beta))
         return a, b
 
     def free(self, y: Array) -> Array:
-        """States (2n, S, m) at the nodes without forces."""
-        return moved(self.k, self.c, *propagator(self.k, self.c, self.times - self.ends[0]), y)
+        """States (2n, P, S, m) at the nodes without forces, from those at the starts of panels (2n, P, m)."""
+        return moved(self.k, self.c, self._to_nodes, y[:, :, None])
+
+    def across(self) -> Array:
+        """E (P, 2n, 2n) from start to end."""
+        unit = np.eye(2 * len(self.k))[:, None]
+        over = propagator(self.k, self.c, np.diff(self.ends))
+        return np.moveaxis(moved(self.k, self.c, over, unit), 1, 0)
+
+    def seen(self, row: Array) -> Array:
+        """What a row (2n,) reads at the nodes of a state at the start, (P, S, 2n)."""
+        (a, b), (p, v) = self._to_nodes, row.reshape(2, -1, 1, 1)
+        k, c = self.k[:, None, None], self.c[:, None, None]
+        return np.moveaxis(np.concatenate((p * a - k * b * v, p * b + v * (a - c * b))), 0, -1)
 
     def at_nodes(self, rates: Array) -> Array:
-        """States (2n, S, ...) at the nodes due to rates (2n, S, ...) at them."""
+        """States (2n, P, S, m) at the nodes due to rates (2n, P, S, m) at them."""
         n, (a, b) = len(self.k), self.kernels
         p, v = rates[:n], rates[n:]
-        k, c = (x.reshape(-1, *[1] * (rates.ndim - 1)) for x in (self.k, self.c))
-        ap, bp, av, bv = (np.einsum("bij,bj...->bi...", m, r) for m, r in ((a, p), (b, p), (a, v), (b, v)))
-        return np.concatenate((ap + bv, av - k * bp - c * bv))
+        k, c = self.k[:, None, None, None], self.c[:, None, None, None]
+        bp, bv = b @ p, b @ v
+        return np.concatenate((a @ p + bv, a @ v - k * bp - c * bv))
 
     def response(self, read: Array, push: Array) -> Array:
-        """Of a row read (2n,) at the nodes to a force at the nodes that pushes (2n,), (S, S)."""
-        n, (a, b) = len(self.k), self.kernels
-        (rp, rv), (bp, bv) = np.split(read, 2), np.split(push, 2)
-        assert len(rp) == n
-        return np.asarray(
-            np.einsum("b,bij->ij", rp * bp + rv * bv, a)
-            + np.einsum("b,bij->ij", rp * bv - rv * (self.k * bp + self.c * bv), b)
-        )
+        """Of a row read (2n,) at the nodes to a force at the nodes that pushes (2n,), (P, S, S); (1, S, S) if alike."""
+        (rp, rv), (bp, bv) = read.reshape(2, -1), push.reshape(2, -1)
+        by_alpha, by_beta = rp * bp + rv * bv, rp * bv - rv * (self.k * bp + self.c * bv)
+        alpha, beta = self.kernels
+        return np.asarray(np.tensordot(by_alpha, alpha, 1) + np.tensordot(by_beta, beta, 1))
 
-    def end(self, y: Array, rates: Array) -> Array:
-        """State (2n, m) at the end, from that at the start and rates (2n, S, m) at the nodes."""
-        n, last = len(self.k), self.ends[1]
-        at_end = moved(self.k, self.c, *propagator(self.k, self.c, np.array(last - self.ends[0])), y)
-        alpha, beta = propagator(self.k, self.c, last - self.times)
-        a, b = (alpha * self.weights)[..., None], (beta * self.weights)[..., None]
-        p, v = rates[:n], rates[n:]
-        k, c = self.k[:, None, None], self.c[:, None, None]
-        return np.asarray(at_end + np.concatenate((a * p + b * v, a * v - b * (k * p + c * v))).sum(axis=1))
+    def reach(self, push: Array) -> Array:
+        """Of a force at the nodes that pushes (2n,): states at the ends, (P, 2n, S)."""
+        return np.moveaxis(moved(self.k, self.c, self._to_end, push[:, None, None, None])[..., 0], 0, 1)
+
+    def at_ends(self, rates: Array) -> Array:
+        """States (2n, P, m) at the ends due to rates (2n, P, S, m) at the nodes."""
+        return np.asarray(moved(self.k, self.c, self._to_end, rates).sum(axis=2))
+
+    def within(self, states: Array, t: Array) -> Array:
+        """States (q, 2n, m) at times t (q,) of the polynomials through states (2n, P, S, m) at the nodes."""
+        sigma = self.clock.place(t)
+        panel = np.clip(np.searchsorted(self.edges, sigma, side="right") - 1, 0, len(self) - 1)
+        values = _lagrange((sigma - self.edges[panel]) / self.widths[panel])
+        return np.einsum("qs,bqsm->qbm", values, states[:, panel])
 
 
 def coefficients(values: Array) -> Array:
@@ -165,25 +217,40 @@ def coefficients(values: Array) -> Array:
     return np.asarray(np.tensordot(_LEGENDRE, values, axes=1))
 
 
-def largest(values: Array, ends: list[float]) -> tuple[float, float]:
-    """Place in [0, 1] of the largest value of the polynomial through values (S,) at the nodes, and that value.
+def largest(values: Array, ends: tuple[bool, bool]) -> tuple[int, float, float]:
+    """Panel, place in [0, 1] and size of the largest value of the polynomials through values (P, S) at the nodes.
 
-    Maxima within, and those of the ends, 0 and 1, that are given.
+    The first and the last end of all panels count where ``ends`` says so; -inf where the largest value is one that does
+    not.
     """
-    polynomial = np.polynomial.legendre.Legendre(coefficients(values))
-    roots = polynomial.deriv().roots()
-    real = roots[np.abs(roots.imag) < 1e-9].real
-    places = np.concatenate((2.0 * np.array(ends) - 1.0, real[np.abs(real) < 1.0]))
-    if not places.size:
-        return 0.0, -np.inf
-    found = polynomial(places)
-    best = int(np.argmax(found))
-    return 0.5 * (float(places[best]) + 1.0), float(found[best])
+    panel, best = (int(i) for i in np.unravel_index(np.argmax(values @ _FINE.T), (len(values), len(_FINE))))
+    x = 2.0 * best / (len(_FINE) - 1) - 1.0
+    for _ in range(2):  # near an end the maximum may be in the next panel
+        whole = Legendre(coefficients(values[panel]))
+        top = _top(whole, x)
+        beyond = int(top > 1.0) - int(top < -1.0)
+        if not beyond:
+            return panel, 0.5 * (top + 1.0), float(whole(top))
+        if not 0 <= panel + beyond < len(values):
+            return panel, 0.5 * (beyond + 1.0), float(whole(beyond)) if ends[beyond > 0] else -np.inf
+        panel, x = panel + beyond, -float(beyond)
+    return panel, 0.5 * (x + 1.0), float(Legendre(coefficients(values[panel]))(x))  # a kink between them
+
+
+def _top(whole: Legendre, x: float) -> float:
+    """Where the slope of a polynomial is zero near x; beyond [-1, 1] where it rises to an end."""
+    slope, curvature = whole.deriv(), whole.deriv(2)
+    for _ in range(_NEWTON):
+        bend = float(curvature(x))
+        x = x - float(slope(x)) / bend if bend < 0.0 else math.copysign(math.inf, slope(x))
+        if not abs(x) <= 1.0:
+            break
+    return x
 
 
 def zeros(values: Array) -> Array:
     """Places of the zeros of the polynomial through values (S,) at the nodes, in [0, 1] and a little beyond."""
-    roots = np.polynomial.legendre.Legendre(coefficients(values)).roots()
+    roots = Legendre(coefficients(values)).roots()
     real = roots[np.abs(roots.imag) < 1e-9].real
     return 0.5 * (real[np.abs(real) < _BEYOND] + 1.0)
 

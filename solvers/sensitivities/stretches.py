@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from typing import Any
 
@@ -17,7 +17,7 @@ from solvers.integration import prepared_run
 from solvers.problem import Array, Solution, SolverError, Status, System
 from solvers.problem import event_list as at
 from solvers.sensitivities import laws
-from solvers.sensitivities.panels import Clock, Panel
+from solvers.sensitivities.panels import Clock, Panels
 
 _RADIANS = 1.5  # of the fastest motion in one panel
 _FEWEST = 2  # panels between two events, where elements act
@@ -47,18 +47,18 @@ class Acting:
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """From one event to the next: what acts, and edges between panels, or between flights where there are none."""
+    """From one event to the next: what acts, and its panels; None in a flight that only the state changes."""
 
     start: float
     end: float
     acting: Acting
-    edges: Array  # times, start and end among them
-    panels: list[Panel] = field(default_factory=list)
+    panels: Panels | None = None
 
     @property
     def times(self) -> list[Array]:
         """Where the motion has to be known."""
-        return [self.edges, *(panel.times for panel in self.panels)]
+        ends = np.array([self.start, self.end])
+        return [ends] if self.panels is None else [ends, self.panels.times.ravel()]
 
 
 def replayed(
@@ -116,8 +116,8 @@ def grouped(rows: Array) -> list[tuple[float, list[Array]]]:
 class Division:
     """Stretches of a run, with panels fine enough for its modes and its laws."""
 
-    def __init__(self, system: System, forced: bool, samples: Array, depth: Array, bends: Array) -> None:
-        self.system, self.forced, self.samples, self.bends = system, forced, samples, bends
+    def __init__(self, system: System, forced: bool, depth: Array, bends: Array) -> None:
+        self.system, self.forced, self.bends = system, forced, bends
         self.k, self.c = system.blocks.k, system.blocks.c
         tones = [signal.tones()[0] for _, signal in system.loads if hasattr(signal, "tones")] if forced else []
         speeds = np.sqrt(np.abs(self.k)), np.abs(self.c), *(np.abs(np.asarray(tone, float)) for tone in tones)
@@ -148,10 +148,8 @@ class Division:
 
     def _stretch(self, start: float, end: float, acting: Acting, refinement: int) -> Stretch:
         """One, with its panels."""
-        inside = self.samples[(self.samples > start) & (self.samples < end)]
-        edges = np.concatenate(([start], inside, [end]))
         if not (acting.elements or self.forced):
-            return Stretch(start, end, acting, edges)
+            return Stretch(start, end, acting)
         clock = Clock(start, end, max([1, *(_power(self.system.contacts[s]) for s in acting.elements)]))
         speed = max([self.fastest, *(self.stiffest[s] for s in acting.elements)])
         count = refinement * (_FEWEST + math.ceil((end - start) * speed / _RADIANS))
@@ -160,12 +158,10 @@ class Division:
                 f"a sensitivity over {end - start:g} s with motion of {speed:.3g} rad/s takes {count} panels; "
                 "keep fewer modes, or shorten the run"
             )
-        between = np.linspace(0.0, 1.0, count + 1)[1:-1]
-        bends = self.bends[(self.bends > start) & (self.bends < end)]
-        inner = np.unique(np.concatenate((between, clock.place(inside), clock.place(bends))))
-        sigma = np.concatenate(([0.0], inner, [1.0]))
-        panels = [Panel(self.k, self.c, clock, float(a), float(b)) for a, b in pairwise(sigma) if b > a]
-        return Stretch(start, end, acting, edges, panels)
+        edges, bends = np.linspace(0.0, 1.0, count + 1), self.bends[(self.bends > start) & (self.bends < end)]
+        if bends.size:
+            edges = np.unique(np.concatenate((edges, clock.place(bends))))
+        return Stretch(start, end, acting, Panels(self.k, self.c, clock, edges))
 
 
 def _power(contact: Any) -> int:
@@ -179,12 +175,11 @@ def _power(contact: Any) -> int:
 
 
 class Motion:
-    """The run's own motion at given times, [q, q̇]."""
+    """The run's own q and q̇ at given times."""
 
-    def __init__(self, t: Array, x: Array) -> None:
-        self.t, self.x = t, x
+    def __init__(self, solution: Solution) -> None:
+        self.t, self.both = solution.t, np.array([solution.q.T, solution.q_dot.T])
 
     def at(self, times: Any) -> Array:
-        """(2n,) or (2n, k), at times that were asked for."""
-        places = np.minimum(np.searchsorted(self.t, times), len(self.t) - 1)
-        return self.x[places].T
+        """(2, n) or (2, n, k), at times that were asked for."""
+        return self.both[..., np.minimum(np.searchsorted(self.t, times), len(self.t) - 1)]

@@ -13,8 +13,8 @@ from solvers.problem import Array, ContactLog, Solution, System, dense
 from solvers.problem import event_list as at
 from solvers.sensitivities.events import GRAZING, NoDerivativeError, cross
 from solvers.sensitivities.flow import Flow, latched_columns
-from solvers.sensitivities.nearby import Change, Nearby
-from solvers.sensitivities.panels import coefficients, interpolated, largest, zeros
+from solvers.sensitivities.nearby import Change, Nearby, unchanged
+from solvers.sensitivities.panels import Panels, S, coefficients, interpolated, largest, zeros
 from solvers.sensitivities.stretches import (
     Acting,
     Division,
@@ -27,6 +27,7 @@ from solvers.sensitivities.stretches import (
 
 SMOOTH = 1e-3  # share of the last Legendre coefficients of forces' derivatives, above which panels are halved
 _FINEST, _TWICE = 4, 2  # times
+_MOST_ENTRIES = 4_000_000  # of tables of panels held at once
 _SAME_BEND = 1e-9  # of the duration: a kink found twice, on both of its sides
 _NEAR_TOP = 0.9  # of the largest force so far: a panel whose nodes stay below has no larger one
 _SAME = 1e-6  # of the duration: events of one run, made twice, may be so far apart
@@ -76,7 +77,7 @@ def sensitivity(
     method: Any = None,
     memory: Sequence[Any] | None = None,
 ) -> Sensitivity:
-    """Derivative of a run by a parameter, and by its start, through all its events.
+    """Derivative of a run by a parameter, and by its start, through all its events; `sensitivities` by several.
 
     The variational equation is solved along the run's own motion: exactly in flight, by collocation of the forces on
     panels of fourteen Gauss nodes where elements act, with jumps at events.
@@ -114,6 +115,23 @@ def sensitivity(
     >>> float(found.entries[0])
     0.500000
     """
+    return sensitivities(system, q0, q_dot0, duration, [(nearby, start)], times, method, memory)[0]
+
+
+def sensitivities(
+    system: System,
+    q0: ArrayLike,
+    q_dot0: ArrayLike,
+    duration: float,
+    parameters: Sequence[tuple[Nearby | None, ArrayLike | None]],
+    times: ArrayLike = (),
+    method: Any = None,
+    memory: Sequence[Any] | None = None,
+) -> list[Sensitivity]:
+    """Derivatives of a run by several parameters, for little more than those by one.
+
+    ``parameters`` are pairs of ``nearby`` and ``start``; all else is as for `sensitivity`.
+    """
     from solvers.exponential.method import Exponential
     from solvers.problem.run_arguments import check_slopes
 
@@ -124,12 +142,17 @@ def sensitivity(
                 f"sensitivities take contacts without friction, and contact {i} has some; the derivative of the end is "
                 "given by integrate(tangent=True), or tangent=Parameter(...)"
             )
-    asked = _Asked(system, _state(q0, q_dot0), duration, np.atleast_1d(np.asarray(times, dtype=float)))
     method = Exponential() if method is None else method
-    asked.method = replace(method, ledger=False) if isinstance(method, Exponential) else method
-    asked.memory = memory
-    asked.by = None if nearby is None else Change(system, nearby, duration)
-    asked.start = np.zeros(2 * system.size) if start is None else np.asarray(start, dtype=float)
+    asked = _Asked(
+        system,
+        _state(q0, q_dot0),
+        duration,
+        np.atleast_1d(np.asarray(times, dtype=float)),
+        replace(method, ledger=False) if isinstance(method, Exponential) else method,
+        memory,
+        Change(system, [unchanged(system) if one is None else one for one, _ in parameters], duration),
+        [np.zeros(2 * system.size) if one is None else np.asarray(one, dtype=float) for _, one in parameters],
+    )
     log, rows = replayed(system, asked.x, duration, asked.looks(), asked.method, memory)
     asked.measure(log, rows)
     refinement, best, bends = 1, None, np.zeros(0)
@@ -137,15 +160,15 @@ def sensitivity(
         if best is not None:
             refinement *= 2
         walk = _Walk(asked, rows, refinement, bends)
-        found = walk.result()
+        walk.pass_all()
         for _ in range(_TWICE if walk.bends else 0):  # the second time they are known to rounding
             bends = _apart(walk.bends, _SAME_BEND * duration)
             walk = _Walk(asked, rows, refinement, bends)
-            found = walk.result()
-        if best is not None and found.roughness >= best.roughness:
+            walk.pass_all()
+        if best is not None and walk.roughness >= best.roughness:
             break
-        best = found
-    return best
+        best = walk
+    return best.results()
 
 
 def _apart(times: list[float], distance: float) -> Array:
@@ -173,10 +196,10 @@ class _Asked:
     x: Array
     duration: float
     times: Array
-    method: Any = None
-    memory: Any = None
-    by: Change | None = None
-    start: Array = field(default_factory=lambda: np.zeros(0))
+    method: Any
+    memory: Any
+    by: Change
+    starts: list[Array]  # of [q, q̇], or of what is latched too
     span: Array = field(default_factory=lambda: np.zeros(0))  # (E,) size of each element's displacement
     depth: Array = field(default_factory=lambda: np.zeros(0))  # (E,) largest indentation, m
 
@@ -249,15 +272,15 @@ def _check_same(rows: Array, again: Array, duration: float) -> None:
 
 @dataclass(eq=False)
 class _Contact:
-    """Derivatives (m,) of one contact."""
+    """Derivatives (d,) of one contact by the parameters."""
 
     stop: int
     entry: Array
     before: Array  # impulse when it began
-    exit: Array | None = None
-    impulse: Array | None = None
+    exit: Array
+    impulse: Array
+    peak: Array
     top: float = -np.inf
-    peak: Array | None = None
 
     def offer(self, force: float, change: Array) -> None:
         """A candidate for the largest force."""
@@ -269,31 +292,37 @@ class _Walk:
     """One pass over a run."""
 
     def __init__(self, asked: _Asked, rows: Array, refinement: int, bends: Array) -> None:
-        system = asked.system
+        system, by = asked.system, asked.by
         self.asked, self.rows, self.events = asked, rows, dict(grouped(rows))
-        forced = asked.by is not None and asked.by.forced
         self.acting = acting_at_start(system, asked.x, rows, asked.memory)
-        division = Division(system, forced, asked.times, asked.depth, bends)
+        division = Division(system, by.forced, asked.depth, bends)
         self.stretches = list(division.stretches(self.acting, rows, asked.duration, refinement))
         wanted = [np.array([0.0, asked.duration]), asked.times, *(t for one in self.stretches for t in one.times)]
         times = np.unique(np.clip(np.concatenate(wanted), 0.0, asked.duration))
         self.solution, again = replayed(system, asked.x, asked.duration, times, asked.method, asked.memory)
         _check_same(rows, again, asked.duration)
-        self.motion = Motion(self.solution.t, np.hstack((self.solution.q, self.solution.q_dot)))
+        self.motion = Motion(self.solution)
         n2, own = 2 * system.size, sum(len(getattr(one.law, "memory", ())) for one in system.contacts)
-        columns = n2 + own + 1
+        columns = n2 + own + len(by)
         start = np.zeros((n2, columns))
-        start[:, :n2], start[:, -1] = np.eye(n2), asked.start[:n2]
-        latched = latched_columns(system, n2, columns, asked.by, asked.memory)
-        for own, given in zip(latched, _parts(asked.start[n2:], [len(one) for one in latched]), strict=True):
-            own[:, -1] += given
-        self.flow = Flow(system, self.motion, asked.by, start, latched)
-        self.states = np.zeros((len(asked.times), n2))
+        start[:, :n2] = np.eye(n2)
+        latched = latched_columns(system, by, columns, asked.memory)
+        for i, given in enumerate(asked.starts, n2 + own):
+            start[:, i] = given[:n2]
+            for known, added in zip(latched, _parts(given[n2:], [len(one) for one in latched]), strict=True):
+                known[:, i] += added
+        self.flow = Flow(system, self.motion, by, start, latched)
+        self.states = np.zeros((len(asked.times), len(by), n2))
         self.contacts: list[_Contact] = []
         self.bends: list[float] = []  # times at which laws have kinks that are no knots
         self.open: dict[int, _Contact] = {}
 
-    def result(self) -> Sensitivity:
+    @property
+    def roughness(self) -> float:
+        """Of the forces' derivatives."""
+        return self.flow.roughness
+
+    def pass_all(self) -> None:
         """Go along the run, and collect."""
         self._keep(0.0)
         for stretch in self.stretches:
@@ -302,36 +331,44 @@ class _Walk:
                 self._check_start()
             self._pass(stretch)
         self._pass_events(self.asked.duration)
-        flow, log = self.flow, self.solution.contacts
         for one in self.open.values():
-            force, _, change = flow.at_instant(self.asked.duration, one.stop, self.acting)
-            one.offer(force, change)
-            one.impulse = flow.impulse[one.stop] - one.before
+            force, _, change = self.flow.at_instant(self.asked.duration, one.stop, self.acting)
+            one.offer(force, change[self.flow.own])
+            one.impulse = (self.flow.impulse[one.stop] - one.before)[self.flow.own]
+
+    def results(self) -> list[Sensitivity]:
+        """What was collected, one of each parameter."""
+        flow, log, times = self.flow, self.solution.contacts, self.asked.times
         end = np.concatenate((flow.state, *flow.latched))
         rate = flow.rate(np.array([self.asked.duration]), self.acting)[:, 0]
-        columns = self._of_contacts(log)
-        about = self._growth(), flow.roughness, self.solution
-        return Sensitivity(self.asked.times, self.states, log, *columns, end[:, -1], rate, end[:, :-1], *about)
+        of_contacts, matrix = self._of_contacts(log), end[:, : len(end)]
+        about: Any = matrix, self._growth(), flow.roughness, self.solution
+        return [
+            Sensitivity(times, states, log, *by_one, end[:, i], rate, *about)  # type: ignore[call-arg]
+            for i, states, by_one in zip(
+                range(len(end), end.shape[1]), self.states.swapaxes(0, 1), of_contacts, strict=True
+            )
+        ]
 
     def _check_start(self) -> None:
-        """NoDerivativeError for a stop that begins on its surface without contact, if the parameter moves it."""
+        """NoDerivativeError for a stop that begins on its surface without contact, if a parameter moves it."""
         for s, span in enumerate(self.asked.span):
             near = abs(self.flow.motion_of(0.0, s)[0]) <= GRAZING * span
-            if near and not self.acting.segment[s] and self.flow.change(0.0, s)[0][-1] != 0.0:
+            if near and not self.acting.segment[s] and np.any(self.flow.change(0.0, s)[0][self.flow.own]):
                 raise NoDerivativeError(
                     f"no derivative: contact {s} is touched at the start, so that it differs on both sides; "
                     "begin off the surface"
                 )
 
     def _keep(self, t: float) -> None:
-        """Keep the derivative of the state where a sample is at the time reached."""
+        """Keep the derivatives of the state where a sample is at the time reached."""
         place = np.searchsorted(self.asked.times, t)
         if place < len(self.states) and self.asked.times[place] == t:
-            self.states[place] = self.flow.T @ self.flow.y[:, -1]
+            self.states[place] = self.flow.by_parameters
 
     def _pass_events(self, t: float) -> None:
         """All events at a time."""
-        last = None
+        last, own = None, self.flow.own
         for row in self.events.get(t, ()):
             s = int(row[at.ELEMENT])
             ends, begins = (
@@ -345,71 +382,81 @@ class _Walk:
             before = self.flow.impulse[s].copy()
             self.acting, last = cross(self.flow, t, row, self.acting, float(self.asked.span[s]), last)
             if s in self.open:
-                self.open[s].offer(force, change + pace * last)
+                self.open[s].offer(force, (change + pace * last)[own])
             if ends and s in self.open:
                 one = self.open.pop(s)
-                one.exit, one.impulse = last, self.flow.impulse[s] - one.before
+                one.exit, one.impulse = last[own], (self.flow.impulse[s] - one.before)[own]
             if begins:
-                self.open[s] = _Contact(s, last, before)
+                unknown = np.full(len(self.asked.by), np.nan)
+                self.open[s] = _Contact(s, last[own], before, unknown, unknown, unknown)
                 self.contacts.append(self.open[s])
             if s in self.open and self.acting.segment[s]:
                 force, pace, change = self.flow.at_instant(t, s, self.acting)
-                self.open[s].offer(force, change + pace * last)
+                self.open[s].offer(force, (change + pace * last)[own])
 
     def _pass(self, stretch: Stretch) -> None:
-        """One stretch, by panels or by flights."""
-        if not stretch.panels:
-            for a, b in zip(stretch.edges, stretch.edges[1:], strict=False):
-                self.flow.fly(b - a)
-                self._keep(b)
-            return
-        inside = list(stretch.edges[1:-1])
-        places = list(stretch.panels[0].clock.place(stretch.edges[1:-1]))
-        for panel in stretch.panels:
-            forces = self.flow.pass_panel(panel, stretch.acting)
-            self._look(panel, forces, stretch.acting)
-            while places and places[0] <= panel.high:
-                self._keep(inside.pop(0))
-                places.pop(0)
+        """One stretch, by panels or in one flight."""
+        flow, times = self.flow, self.asked.times
+        begin, (low, high) = stretch.start, np.searchsorted(times, [stretch.start, stretch.end], side="right")
+        high -= int(high > low and times[high - 1] == stretch.end)
+        if stretch.panels is None:
+            self._sampled(low, flow.fly(begin, stretch.end, times[low:high]))
+        for panels in stretch.panels.parts(_MOST_ENTRIES // (S * S * len(flow.k))) if stretch.panels else ():
+            middle = high if panels.ends[-1] >= stretch.end else low + np.searchsorted(times[low:high], panels.ends[-1])
+            if stretch.acting.elements:
+                found, forces = flow.pass_panels(panels, stretch.acting, times[low:middle])
+                self._look(panels, forces, stretch.acting)
+            else:
+                found = flow.pass_flight(panels, stretch.acting, times[low:middle])
+            self._sampled(low, found)
+            low = middle
         self._keep(stretch.end)
 
-    def _look(self, panel: Any, forces: dict[int, Array], acting: Acting) -> None:
-        """Peaks within a panel, and how rough the derivatives are there."""
+    def _sampled(self, first: int, found: Array) -> None:
+        """Keep derivatives (q, 2n, d) of the blocks at samples."""
+        self.states[first : first + len(found)] = np.moveaxis(self.flow.T @ found, 1, 2)
+
+    def _look(self, panels: Panels, forces: dict[int, Array], acting: Acting) -> None:
+        """Peaks and kinks within panels, and how rough the derivatives are there."""
         for s, change in forces.items():
-            bent = self.flow.bend(panel.times, s, acting)
-            if bent is not None:
-                places = panel.low + (panel.high - panel.low) * zeros(bent)
-                self.bends += panel.clock.time(np.clip(places, 0.0, 1.0)).tolist()
-            size = np.abs(change).max(axis=0)
-            tail = np.abs(coefficients(change)[-2:]).max(axis=0)
-            scale = self._sizes.setdefault(s, np.zeros(len(size)))
-            np.maximum(scale, size, out=scale)
-            self.flow.roughness = max(self.flow.roughness, float((tail / np.where(scale > 0.0, scale, 1.0)).max()))
+            self._look_for_kinks(panels, s, acting)
+            size = np.abs(change).max(axis=1)
+            tail = np.abs(np.moveaxis(coefficients(np.moveaxis(change, 1, 0))[-2:], 0, 1)).max(axis=1)
+            size[0] = np.maximum(size[0], self.flow.largest[s])
+            scale = np.maximum.accumulate(size, axis=0)
+            self.flow.largest[s] = scale[-1]
+            rough = (tail / np.where(scale > 0.0, scale, 1.0)).max(initial=0.0)
+            self.flow.roughness = max(self.flow.roughness, float(rough))
             if s in self.open:
-                values = self.flow.force(panel.times, s, acting)
-                if values.max() > _NEAR_TOP * self.open[s].top:
-                    within = [
-                        end for end, at_event in ((0.0, panel.low == 0.0), (1.0, panel.high == 1.0)) if not at_event
-                    ]
-                    place, top = largest(values, within)
-                    self.open[s].offer(top, interpolated(place, change))
+                self._look_for_peak(panels, s, acting, change[..., self.flow.own])
 
-    @property
-    def _sizes(self) -> dict[int, Array]:
-        """Largest changes of each force so far."""
-        return self.__dict__.setdefault("sizes", {})
+    def _look_for_peak(self, panels: Panels, s: int, acting: Acting, change: Array) -> None:
+        """Largest force within panels; ends of a stretch are looked at with their events."""
+        values = self.flow.force(panels.times.ravel(), s, acting).reshape(-1, S)
+        if values.max() > _NEAR_TOP * self.open[s].top:
+            i, place, top = largest(values, (panels.edges[0] > 0.0, panels.edges[-1] < 1.0))
+            self.open[s].offer(top, interpolated(place, change[i]))
 
-    def _of_contacts(self, log: ContactLog) -> tuple[Array, Array, Array, Array]:
-        """Entries, exits, peak forces and impulses in the order of the log."""
-        found = np.full((4, len(log)), np.nan)
+    def _look_for_kinks(self, panels: Panels, s: int, acting: Acting) -> None:
+        """Times within panels, and a little beyond, at which a law has a kink that is no knot."""
+        bent = self.flow.bend(panels.times.ravel(), s, acting)
+        if bent is None:
+            return
+        turns = np.flatnonzero(np.diff(np.sign(bent)))
+        ends = np.array([0, bent.size - 1])  # a zero may lie between the outermost node and the end
+        for i in np.unique(np.concatenate((turns, turns + 1, ends)) // S):
+            places = panels.edges[i] + panels.widths[i] * zeros(bent.reshape(-1, S)[i])
+            self.bends += panels.clock.time(np.clip(places, 0.0, 1.0)).tolist()
+
+    def _of_contacts(self, log: ContactLog) -> Array:
+        """(d, 4, c) of entries, exits, peak forces and impulses in the order of the log."""
+        found = np.full((len(self.asked.by), 4, len(log)), np.nan)
         for s in set(log.stop.tolist()):
             rows = np.flatnonzero(log.stop == s)
             mine = [one for one in self.contacts if one.stop == s]
             for place, one in zip(rows[np.argsort(log.t_in[rows], kind="stable")], mine, strict=True):
-                values = one.entry, one.exit, one.peak, one.impulse
-                found[:, place] = [np.nan if value is None else value[-1] for value in values]
-        entries, exits, peaks, impulses = found
-        return entries, exits, peaks, impulses
+                found[:, :, place] = np.transpose([one.entry, one.exit, one.peak, one.impulse])
+        return found
 
     def _growth(self) -> float:
         """Largest factor from start to end in the norm of energy, of a spring that makes rigid motion count."""

@@ -129,7 +129,7 @@ def page(name):
     """Text of the page of a sheet."""
     parts = [
         MADE + f"# {title(name)}",
-        sheet(name).__doc__.split("\n", 1)[1].strip(),
+        sheet(name).__doc__.split("\n", 1)[1].strip("\n"),  # it may begin with an indented formula
         f"**Source.** {sheet(name).SOURCE}",
         f"![The problem, and the result]({name}.png)",
         "Relative errors against the formula:",

@@ -1,0 +1,239 @@
+"""The curve of folds of a periodic motion over two parameters.
+
+    Φ(x; λ, p) - x = 0,    g(x; λ, p) = 0,    [J b; cᵀ 0] [v; g] = [0; 1],    J = ∂Φ/∂x - 1
+
+At a fold J is singular: one multiplier is 1, and the branch along λ turns back. g vanishes with the determinant of J
+and is as smooth as J; with w of the transposed system, ∂g = -wᵀ ∂J v = -wᵀ ∂_v [J, Φ_λ, Φ_p], which two tangents of
+runs either side of x along v give. The curve is followed by its arc length, so that p may turn: two folds meet there in
+a cusp. See Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, 2000, chapters 3 and 4.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from solvers.branches.point import metric_of
+from solvers.orbits import Chain, Orbit, OrbitError, PeriodicProblem, is_cut, orbit_of
+from solvers.problem import Array, SolverError, System
+
+Make = Callable[[float, float], tuple[System, float]]
+ALONG = 1e-4  # of the motion's size: distance of the runs that give the derivative of g
+CLOSED, SINGULAR = 1e-10, 1e-8  # largest residual, relative to the motion, and |g| that count as none
+MOST, STRAIGHT = 8, 0.8  # iterations of a point, and the least cosine between two tangents
+LONGEST, SHORTEST = 0.2, 1e-4  # steps along the curve, in units of both spans and of the motion
+SHARP = 1e-9  # arc length to which a cusp is located
+POINTS = 400  # in one direction
+
+
+@dataclass(frozen=True, eq=False)
+class FoldCurve:
+    """Folds over two parameters, from one end of the curve to the other.
+
+    Attributes
+    ----------
+    orbits : the motions at the folds; `Orbit.parameter` is the first parameter, ``mark`` "fold", or "cusp" where two
+        folds meet and the second parameter turns. values : (k,) of the second. endings : of both directions, in words.
+    """
+
+    orbits: list[Orbit]
+    values: Array
+    endings: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """A fold: unknowns [states, λ, p] in units of the motion and of both spans, unit tangent, null vectors of J."""
+
+    y: Array
+    chain: Chain
+    problem: PeriodicProblem
+    tangent: Array
+    borders: tuple[Array, Array]
+
+
+@dataclass(eq=False)
+class _Equations:
+    """Both equations of a fold and their derivatives."""
+
+    make: Make
+    method: Any
+    fractions: tuple[float, ...]
+    widths: tuple[float, float]
+    shape: tuple[int, ...] = ()
+    last: tuple[Any, tuple[PeriodicProblem, PeriodicProblem]] | None = None
+    lift: Array = field(default_factory=lambda: np.eye(0))  # states -> units of the motion
+    back: Array = field(default_factory=lambda: np.eye(0))
+
+    def measured_by(self, x: Array, at: tuple[float, float]) -> Array:
+        """Take the motion x (m, N) for the unit; its unknowns."""
+        problem = self._problems(*at)[0]
+        metric = metric_of(problem, problem.evaluate(x, at[0], False), self.widths[0])[:-1, :-1]
+        self.shape, self.lift = x.shape, np.asarray(np.linalg.cholesky(metric).T, dtype=float)
+        self.back = np.asarray(np.linalg.inv(self.lift), dtype=float)
+        return np.concatenate((self.lift @ x.ravel(), np.array(at) / self.widths))
+
+    def _problems(self, first: float, second: float) -> tuple[PeriodicProblem, PeriodicProblem]:
+        """Along each parameter; the last are kept, with their systems."""
+        if self.last is None or self.last[0] != (first, second):
+            options = {"method": self.method, "fractions": self.fractions}
+            along = PeriodicProblem(lambda value: self.make(value, second), step=1e-6 * self.widths[0], **options)
+            across = PeriodicProblem(lambda value: self.make(first, value), step=1e-6 * self.widths[1], **options)
+            self.last = (first, second), (along, across)
+        return self.last[1]
+
+    def at(self, y: Array) -> tuple[Chain, PeriodicProblem, Array, Array]:
+        """Runs of the period, the residual (k,) and its derivative (k, k + 2)."""
+        first, second = (float(value) for value in y[-2:] * self.widths)
+        x = (self.back @ y[:-2]).reshape(self.shape)
+        along, across = self._problems(first, second)
+        chain = along.evaluate(x, first)
+        if is_cut(chain, along.make(first)[0]):
+            raise OrbitError("a contact whose law knows its entry rate is under way where a period begins")
+        ways = [chain.by_parameter, across.evaluate(x, second).by_parameter]
+        columns = [self.lift @ (width * way.ravel()) for width, way in zip(self.widths, ways, strict=True)]
+        jacobian = np.column_stack((self.lift @ chain.jacobian() @ self.back, *columns))
+        return chain, along, self.lift @ chain.residual.ravel(), jacobian
+
+    def singular(self, y: Array, jacobian: Array, borders: tuple[Array, Array]) -> tuple[float, Array, Any]:
+        """g, its derivative (k + 2,), and v and w."""
+        size = len(jacobian)
+        bordered = np.block([[jacobian[:, :size], borders[0][:, None]], [borders[1][None], np.zeros((1, 1))]])
+        unit = np.append(np.zeros(size), 1.0)
+        v, w = np.linalg.solve(bordered, unit), np.linalg.solve(bordered.T, unit)
+        step = ALONG / np.linalg.norm(v[:size]) * np.append(v[:size], (0.0, 0.0))
+        ahead, behind = (self.at(y + sign * step)[3] for sign in (1.0, -1.0))
+        change = -w[:size] @ (ahead - behind) * np.linalg.norm(v[:size]) / (2.0 * ALONG)
+        return float(v[-1]), change, (_unit(w[:size]), _unit(v[:size]))
+
+    def solved(self, guess: Array, row: Array, borders: tuple[Array, Array], along: Array) -> _Point:
+        """The fold near a guess, from which it moves at right angles to ``row``; raises OrbitError."""
+        y = guess
+        for _ in range(MOST):
+            chain, problem, residual, jacobian = self.at(y)
+            g, change, borders = self.singular(y, jacobian, borders)
+            matrix = np.vstack((jacobian, change, row))
+            if np.abs(residual).max() <= CLOSED and abs(g) <= SINGULAR:
+                matrix[-1] = along
+                tangent = np.linalg.solve(matrix, np.append(np.zeros(len(y) - 1), 1.0))
+                return _Point(y, chain, problem, _unit(tangent), borders)
+            missed = np.concatenate((residual, [g, float(row @ (y - guess))]))
+            y = np.asarray(y - np.linalg.solve(matrix, missed), dtype=float)
+        raise OrbitError(f"a fold was not found: residual {np.abs(residual).max():.3g}, |g| = {abs(g):.3g}")
+
+
+def fold_curve(
+    make: Make, fold: Orbit, second: float, span: tuple[float, float], width: float, step: float = LONGEST
+) -> FoldCurve:
+    """Follow a fold of a branch along a second parameter, both ways.
+
+    Parameters
+    ----------
+    make : (first, second parameter) -> (system, period in s).
+    fold : marked "fold", of a branch along the first parameter.
+    second : value of the second parameter there, within span, its (lowest, highest) value.
+    width : of the first parameter, to measure the curve with, such as the span of the branch.
+    step : largest one, in units of both widths and of the motion.
+
+    Returns
+    -------
+    FoldCurve : orbits to 1e-10, a multiplier 1 to some 1e-8.
+
+    Raises
+    ------
+    ValueError : bad input. OrbitError : there is no fold.
+
+    Examples
+    --------
+    Duffing's oscillator q̈ + 2ζ q̇ + q + q³ = f cos ωt.
+
+    >>> from contacts import Polynomial
+    >>> from solvers import Contact, Tone, branch
+    >>> def make(omega, f):
+    ...     spring = Contact([1.0], Polynomial([0.0, 0.0, 1.0]), always=True)
+    ...     return System.modal([1.0], [0.05], [spring], [([1.0], Tone(f, omega))]), 2.0 * np.pi / omega
+    >>> folds = branch(lambda omega: make(omega, 0.2), (0.8, 1.6), [0.0, 0.0]).run().special
+    >>> curve = fold_curve(make, folds[0], 0.2, (0.02, 0.2), 0.8)
+    >>> "cusp" in [one.mark for one in curve.orbits]
+    True
+    """
+    low, high = span
+    if fold.mark != "fold":
+        raise ValueError(f"folds are followed from an orbit marked 'fold', got one marked {fold.mark!r}")
+    if not low <= second <= high or not low < high:
+        raise ValueError(f"span must be two values, ascending, about the present one, {second!r}, got {span!r}")
+    fraction = fold.phase / fold.period
+    equations = _Equations(make, fold.method, (fraction,), (width, high - low))
+    y = equations.measured_by(fold.whole[None], (fold.parameter, second))
+    u, _, v = np.linalg.svd(equations.at(y)[3][:, :-2])
+    up = np.append(np.zeros(len(y) - 1), 1.0)
+    first = equations.solved(y, up, (u[:, -1], v[-1]), up)
+    walks = [_walk(equations, replace(first, tangent=sign * first.tangent), span, step) for sign in (1.0, -1.0)]
+    (ahead, end), (behind, begin) = walks
+    found = [*reversed(behind), (first, "fold"), *ahead]
+    orbits = [
+        orbit_of(one.problem, one.chain, float(np.abs(one.chain.residual).max()), 0, parameter=one.chain.parameter,
+                 mark=mark)
+        for one, mark in found
+    ]  # fmt: skip
+    return FoldCurve(orbits, np.array([one.y[-1] * (high - low) for one, _ in found]), (begin, end))
+
+
+def _walk(
+    equations: _Equations, point: _Point, span: tuple[float, float], longest: float
+) -> tuple[list[tuple[_Point, str]], str]:
+    """Points in one direction with their marks, and how they end."""
+    points: list[tuple[_Point, str]] = []
+    ends, step = np.array(span) / equations.widths[1], 0.2 * longest
+    while len(points) < POINTS:
+        try:
+            new = _moved(equations, point, step, ends)
+            turned = float(new.tangent @ point.tangent)
+            if turned < STRAIGHT:
+                raise OrbitError("the curve turns too fast")
+            if new.tangent[-1] * point.tangent[-1] < 0.0:
+                points.append((_cusp(equations, point, new), "cusp"))
+        except (SolverError, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+            step *= 0.5
+            if step < SHORTEST * longest:
+                return points, f"stopped at {point.y[-1] * equations.widths[1]:.6g}: {error}"
+            continue
+        points.append((new, "fold"))
+        if new.y[-1] in ends:
+            return points, "reached the end of the span"
+        step = min(1.5 * step, longest) if turned > 0.5 * (1.0 + STRAIGHT) else step
+        point = new
+    return points, f"{POINTS} points were not enough"
+
+
+def _moved(equations: _Equations, point: _Point, step: float, ends: Array) -> _Point:
+    """The fold a step further, or at the end of the span of p if that is nearer."""
+    guess = point.y + step * point.tangent
+    for end, outside in zip(ends, (guess[-1] < ends[0], guess[-1] > ends[1]), strict=True):
+        if outside:
+            guess = point.y + (end - point.y[-1]) / point.tangent[-1] * point.tangent
+            guess[-1] = end
+            return equations.solved(guess, np.append(np.zeros(len(guess) - 1), 1.0), point.borders, point.tangent)
+    return equations.solved(guess, point.tangent, point.borders, point.tangent)
+
+
+def _cusp(equations: _Equations, a: _Point, b: _Point) -> _Point:
+    """Where p turns between two points."""
+    known: dict[float, _Point] = {}
+
+    def pace(s: float) -> float:
+        known[s] = equations.solved(a.y + s * a.tangent, a.tangent, a.borders, a.tangent)
+        return float(known[s].tangent[-1])
+
+    length = float(a.tangent @ (b.y - a.y))
+    return known[brentq(pace, 0.0, length, xtol=SHARP)] if math.isfinite(length) else b
+
+
+def _unit(vector: Array) -> Array:
+    """In the Euclidean norm."""
+    return np.asarray(vector / np.linalg.norm(vector))

@@ -1,0 +1,139 @@
+"""Folds of branches over a second number: harmonic balance, brute force, multipliers, scaling, bad input."""
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+from contacts import KelvinVoigt, Polynomial
+from fembeam import scene_file
+
+ROD, TIP = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), 0.5
+CUBIC, ZETA, FORCE = 2e7, 0.01, "forces[0].signal.amplitude"
+
+
+def duffing(force=0.3):
+    """One mode of a rod with a cubic spring at its tip."""
+    scene = fb.Scene(
+        ROD,
+        [fb.Clamped(0.0)],
+        elements=[fb.Element(TIP, Polynomial([0.0, 0.0, CUBIC]), name="spring")],
+        forces=[fb.PointForce(TIP, fb.Harmonic(force, 190.0))],
+        damping=fb.ModalDamping(ZETA),
+    )
+    return scene.reduce(modes=1)
+
+
+def of_branch(model, span):
+    return model.branch("omega", span, step=0.2).run()
+
+
+def places(branch):
+    return sorted(one.parameter for one in branch.special if one.mark == "fold")
+
+
+@cache
+def known():
+    return of_branch(duffing(), (175.0, 210.0))
+
+
+@cache
+def curve():
+    return fb.study.fold(known(), FORCE, (0.05, 0.4))
+
+
+def test_the_cusp_against_harmonic_balance():
+    """Of one term, Δ = ω² - ω₀² = 2√3 ζ ω₀ ω and f² = 8 Δ³/27β, to its own error: third harmonics, some Δ/8ω²."""
+    model, found = duffing(), curve()
+    omega, phi = float(model.omega[0]), float(model.phi(TIP)[0])
+    root = math.sqrt(3.0) * ZETA * omega
+    at = root + math.hypot(root, omega)
+    delta = at**2 - omega**2
+    force = math.sqrt(8.0 * delta**3 / (27.0 * 0.75 * CUBIC * phi**4)) / phi
+    (i,) = found.cusps
+    assert found.at[i] == pytest.approx(at, rel=2e-4)
+    assert found.values[i] == pytest.approx(force, rel=0.125 * delta / at**2)
+    assert found.values.min() == found.values[i]
+
+
+def test_the_ends_against_a_branch_there():
+    """At the end of the span, met exactly from both sides of the cusp, folds are those of a branch."""
+    found = curve()
+    np.testing.assert_array_equal(found.values[[0, -1]], 0.4)
+    np.testing.assert_allclose(sorted(found.at[[0, -1]]), places(of_branch(duffing(0.4), (180.0, 220.0))), rtol=1e-9)
+
+
+def test_every_orbit_has_a_multiplier_1():
+    for one in curve().orbits:
+        assert np.abs(one.multipliers - 1.0).min() < 1e-7
+        assert one.found.residual < 1e-9
+
+
+def test_a_stop_by_its_gap_and_by_the_force():
+    """Lengths scale with the force: a gap 1.02 times as wide has the folds of a force 1.02 times as small."""
+    scene = fb.Scene(ROD, [fb.Clamped(0.0)], stops=[fb.Stop(TIP, KelvinVoigt(5e3, 1.0), gap=1e-3, name="stop")],
+                     forces=[fb.PointForce(TIP, fb.Harmonic(1.0, 200.0))], damping=fb.ModalDamping(0.02))  # fmt: skip
+    branch = of_branch(scene.reduce(modes=1), (160.0, 280.0))
+    by_gap = fb.study.fold(branch, "stops[stop].gap", (1e-3, 1.02e-3))
+    by_force = fb.study.fold(branch, FORCE, (1.0 / 1.02, 1.0))
+    assert by_gap.at[-1] == pytest.approx(by_force.at[0], rel=1e-9)
+    assert abs(by_gap.at[-1] - by_gap.at[0]) > 1e-4 * by_gap.at[0]
+
+
+def test_it_prints_and_is_drawn(tmp_path):
+    found = curve()
+    assert "cusp" in str(found)
+    assert found.table()[0].keys() == {"value", "at", "amplitude", "mark"}
+    assert len(found.plain()["folds"]) == len(found.values)
+    found.save(tmp_path / "folds.csv")
+    figure = found.figure()
+    assert figure.axes[1].get_xlabel().startswith("drive amplitude")
+    fb.plot.fold_curve(found, figure.axes)
+
+
+def test_the_table_of_a_scene_file(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(f"""
+[beam]
+length = 0.5
+section = {{ shape = "circle", E = 2.1e11, rho = 7800.0, diameter = 0.01 }}
+[[supports]]
+kind = "clamped"
+z = 0.0
+[[elements]]
+z = 0.5
+law = {{ kind = "polynomial", coefficients = [0.0, 0.0, {CUBIC}] }}
+[[forces]]
+z = 0.5
+signal = {{ kind = "harmonic", amplitude = 0.3, omega = 190.0 }}
+[damping]
+zeta = {ZETA}
+[reduce]
+modes = 1
+[fold]
+over = "forces[0].signal.amplitude"
+values = [0.29, 0.3]
+span = [175.0, 210.0]
+""")
+    file = scene_file.read(path)
+    found = file.studies["fold"].run(file, tmp_path)
+    assert np.abs(np.array(places(known())) - found.at[found.values == 0.3]).min() < 1e-7
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"over": "omega"}, "another number"),
+        ({"over": "forces[0].signal.amplitud"}, "amplitude"),
+        ({"number": 7}, "one of the 2 folds"),
+        ({"span": (0.6, 0.8)}, "must hold the present value 0.3"),
+        ({"span": (0.8, 0.1)}, "must hold the present value"),
+        ({"z": 7.0}, "z"),
+    ],
+)
+def test_bad_input(change, said):
+    given = {"branch": known(), "over": FORCE, "span": (0.05, 0.4)}
+    with pytest.raises(ValueError, match=said):
+        fb.study.fold(**{**given, **change})
