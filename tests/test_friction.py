@@ -1,5 +1,7 @@
 """Friction under a contact's own force: SciPy's DOP853 with its own events, closed forms, identities, energy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -278,6 +280,27 @@ def test_a_force_that_grows_without_bound_begins_in_stick(method, v_t):
     """A dashpot of δ^{1/4} has Ṅ = ∞ at the entry."""
     run = bounce(wall(Viscoelastic(1e7, 500.0)), v_t, method)
     assert run.transitions.event.tolist() == ["slip"]
+
+
+@every_method
+@pytest.mark.parametrize(("k_t", "v_t"), [(2e5, 0.15), (2e5, 0.2), (3e5, 0.2)])
+def test_the_peak_of_friction_just_before_a_slip(method, k_t, v_t):
+    """In stick the mass swings on the spring, |F_t| <= v_t √(k_t m), and slips soon after the peak."""
+    run = bounce(wall(k_t=k_t), v_t, replace(method, rtol=1e-8))
+    assert run.friction.peak_friction[0] == pytest.approx(v_t * np.sqrt(k_t * 0.08), rel=1e-7)
+
+
+@every_method
+def test_a_slip_at_entry_far_shorter_than_any_step(method):
+    """Under δ^1.2 it ends where k_t ξ̇ = μ N_δ v, here after 6e-13 s of a contact of 4e-5 s."""
+    friction = Friction(0.86, 1.5e9)
+    stop = Contact([-1.0, 0.0], Hertz(9e10, exponent=1.2), map="oblique", tangent=[0.0, 1.0], friction=friction)
+    system = System(EYE[:2, :2], 0.0 * EYE[:2, :2], 0.0 * EYE[:2, :2], [stop])
+    run = integrate(system, [-1e-5, 0.0], [1.15, 0.26], 1e-4, method=method)
+    assert run.transitions.event.tolist() == ["stick", "slip"]
+    after = (1.5e9 * 0.26 / (1.2 * 0.86 * 9e10 * 1.15)) ** 5 / 1.15
+    assert run.transitions.t[0] - run.contacts.t_in[0] == pytest.approx(after, rel=1e-4)
+    assert run.q_dot[-1, 1] == pytest.approx(0.082746796, abs=1e-8)  # of `DormandPrince`
 
 
 @every_method

@@ -32,6 +32,8 @@ from solvers.compiled.kernels import (
     merged,
     raised,
     row_of,
+    rubs,
+    slider_of,
 )
 from solvers.compiled.parts import PASSED
 from solvers.compiled.state import (
@@ -52,8 +54,10 @@ from solvers.exponential.contact.crossings import CLEAR, TOO_LONG, before_landin
 from solvers.exponential.contact.landing_step import INDENTATION, ROOT, TIME, landing_step, start_landing
 from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, START
 from solvers.exponential.contact.peaks import state_peaks
+from solvers.problem.friction import PEAK
 
 _MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
+_MOST_HALVINGS = 40  # the same on a border, whose margin may hardly change but at the start
 _PART = 0.1  # of the embedded difference that counts as the error
 _PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
 _OF_SLOPES, _MOST_SLOPE = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
@@ -154,6 +158,9 @@ def _begin_peaks(problem, state, scratch):
         if state.segment[s] > 0:
             column = first + 2 * s
             state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], work[0, column] / work[0, size])
+            if rubs(problem, s):
+                own, column = slider_of(problem, s), problem.friction[s, 1] + 1
+                own[PEAK] = max(own[PEAK], abs(work[0, column] / work[0, size]))
 
 
 @inner
@@ -293,6 +300,12 @@ def _rises(problem, state, scratch, s, border, time):
     return scratch.ends[border] < scratch.margin[border]
 
 
+@inlined
+def _between(above, below):
+    """A time between two, of which the first may be zero, or smaller by powers of ten."""
+    return math.sqrt(above * below) if above > 0.0 else 1e-3 * below
+
+
 @merged
 def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_end, out, due, with_energy):
     """Try to land on the bend of ``stop``, or on a border of its law, about ``near`` s ahead; whether it succeeded.
@@ -313,7 +326,8 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
         before = 0.9 * near
         _step(problem, tables, state, scratch, np.int64(TIME), stop, before, with_energy)
         apart = _apart(problem, tables, state, scratch, stop, border, x)
-    for _ in range(_MOST_TRIES):
+    above, below = before if apart > 0.0 else 0.0, furthest
+    for _ in range(_MOST_TRIES if border < 0 else _MOST_HALVINGS):
         _step(problem, tables, state, scratch, np.int64(TIME), stop, span, with_energy)
         value = _apart(problem, tables, state, scratch, stop, border, x)
         if abs(value) <= enough:
@@ -321,7 +335,11 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
         following = span - value * (span - before) / (value - apart)
         if abs(following - span) <= 1e-15 * span and border >= 0:
             break
-        if not 0.1 * near < following <= furthest or following == span:
+        if border >= 0:
+            above, below = (span, below) if value > 0.0 else (above, span)
+            if below < furthest and not above < following < below:
+                following = _between(above, below)
+        if not (0.1 * near if border < 0 else 0.0) < following <= furthest or following == span:
             return False
         before, apart, span = span, value, following
     if not (abs(value) <= 1e-6 * largest and _error_in_time(problem, scratch, span, rtol) <= 1.0):
