@@ -61,3 +61,9 @@ def friction_force(radius, own, way, normal):
     if own[CODE] == FREE or normal <= 0.0:
         return 0.0
     return own[CODE] * own[MU] * normal
+
+
+@inlined
+def slip_of(own):
+    """Sign of the slip, 0 where there is none."""
+    return own[CODE] if abs(own[CODE]) == 1.0 else 0.0

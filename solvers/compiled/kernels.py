@@ -31,10 +31,10 @@ from solvers.compiled.decorators import entry as entry  # re-exported for files 
 from solvers.compiled.decorators import inlined, inner, kernel, reordered
 from solvers.compiled.decorators import merged as merged
 from solvers.compiled.fields import packed_type
-from solvers.compiled.friction import friction_force, slide, slide_acceleration
+from solvers.compiled.friction import friction_force, slide, slide_acceleration, slip_of
 from solvers.compiled.packed import PackedType
 from solvers.compiled.parts import RADIAL_ACCELERATION, RADIAL_MOTION, RADIAL_PUSH, part
-from solvers.problem.friction import ACCOUNTS, ARM, CODE
+from solvers.problem.friction import ACCOUNTS, ARM
 
 
 class Problem(NamedTuple):
@@ -419,7 +419,7 @@ def add_friction(problem, s, t, touches, normal, x, rate):
         own = slider_of(problem, s)
         force = friction_force(radius_of(problem, s), own, way, normal)
         add_sideways(problem, s, force, x, rate)
-        rate[account], rate[account + 1], rate[account + 2] = force * speed, force, own[CODE] * speed
+        rate[account], rate[account + 1], rate[account + 2] = force * speed, force, slip_of(own) * speed
 
 
 @inner

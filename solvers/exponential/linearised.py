@@ -154,7 +154,7 @@ def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, directi
             derivatives.entry[c, s] = 0.0 if floored else change
         add_push(problem, s, -jump * shift, past.x, derivatives.y[c])
         if rubs(problem, s) and border > 0:
-            drag = share_of(slider_of(problem, s), 1.0) * jump
+            drag = share_of(slider_of(problem, s)) * jump
             add_sideways(problem, s, -drag * shift, past.x, derivatives.y[c])
     past.segment[s] += direction
     if rubs(problem, s) and entering:

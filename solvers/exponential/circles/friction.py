@@ -14,7 +14,7 @@ import math
 
 from numba import types
 
-from solvers.compiled.friction import TURN, drawn, friction_force
+from solvers.compiled.friction import TURN, drawn, friction_force, slip_of
 from solvers.compiled.kernels import (
     REAL,
     copy,
@@ -167,9 +167,9 @@ def spring_of(own):
 
 
 @inlined
-def share_of(own, normal):
-    """∂F_t/∂N; at N = 0, where a landing ends, that of the contact."""
-    return own[CODE] * own[MU] if abs(own[CODE]) == 1.0 and normal >= 0.0 else 0.0
+def share_of(own):
+    """∂F_t/∂N; at N = 0, where slip ends, that of the slip."""
+    return slip_of(own) * own[MU]
 
 
 @inner
@@ -180,7 +180,7 @@ def row_slopes(problem, s, motion, i, rate, normal, tangential, by_delta, by_rat
     """
     own, radius, m, sigma = slider_of(problem, s), radius_of(problem, s), count_of(problem, s), sigma_of(problem, s)
     u, w = motion[0, 0, i], motion[1, 0, i]
-    r, drawn_by, pressed_by = math.sqrt(u * u + w * w), spring_of(own), share_of(own, normal)
+    r, drawn_by, pressed_by = math.sqrt(u * u + w * w), spring_of(own), share_of(own)
     for b in range(m):
         away, aside = _ways(sigma, radius, own, u, w, b)
         turning = (sigma * motion[b, 1, i] - rate * sigma * away) / r if sigma != 0.0 and b < 2 else 0.0
@@ -254,7 +254,7 @@ def work_with_friction(problem, tables, state, scratch, node_set, level, s):
     impulse = h * sum8(load8(weights, 0) * load8(slid[TANGENTIAL], 0))
     state.x[account] += work
     state.x[account + 1] += impulse
-    state.x[account + 2] += own[CODE] * (end - begin)
+    state.x[account + 2] += slip_of(own) * (end - begin)
     rows = work_in_circle(problem, tables, state, scratch, node_set, level, s)
     return rows - work + own[ARM] * own[SPIN] * impulse
 
@@ -292,5 +292,5 @@ def work_within_rubbing(problem, tables, scratch, s, first):
         push += weights[i] * normal
         rubbed += weights[i] * tangential * speed
         drag += weights[i] * tangential
-        way += weights[i] * scratch.between[first - 1, i] * own[CODE] * speed
+        way += weights[i] * scratch.between[first - 1, i] * slip_of(own) * speed
     return pressed, push, rubbed, drag, way
