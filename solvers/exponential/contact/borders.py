@@ -289,7 +289,7 @@ def passed(problem, state, scratch, element, border, w, x):
     """(element, border) of the margin that has gone furthest below zero between the states w and x, or (-1, -1).
 
     The border landed on is left out, and what has been carried over by rounding only. The element is `UNRESOLVED` if a
-    margin may have been below zero in between.
+    margin may have been below zero in between, or is so at the start: that border is passed before any step.
     """
     worst, found, which, dips = -_TOGETHER, -1, -1, False
     for s in range(problem.law.size):
@@ -303,6 +303,7 @@ def passed(problem, state, scratch, element, border, w, x):
             if s == element and j == border:
                 continue
             near |= min(scratch.ends[j], scratch.margin[j]) < _ENDS_NEAR * scratch.largest[s, j]
+            dips |= scratch.ends[j] < -max(scratch.noise[s, j], _MISSED * scratch.largest[s, j])
             if scratch.margin[j] >= -scratch.noise[s, j]:
                 continue
             share = scratch.margin[j] / max(scratch.ends[j], scratch.noise[s, j])
