@@ -16,11 +16,13 @@ from __future__ import annotations
 
 import math
 
-from solvers.compiled.friction import TURN, drawn, friction_force
+from solvers.compiled.friction import TURN, drawn, friction_force, slide, slide_acceleration
 from solvers.compiled.kernels import (
     abs_dot,
     acceleration_of,
+    accelerations_at,
     call_gradient,
+    delta_of,
     force_at,
     indentation,
     indentation_rate,
@@ -29,8 +31,9 @@ from solvers.compiled.kernels import (
     kernel,
     law_forces,
     off_knots,
+    radial_acceleration,
     radius_of,
-    slide_acceleration_of,
+    rows_at,
     slide_of,
     slider_of,
 )
@@ -58,10 +61,14 @@ _INSIDE = 1e-200  # m, where forces like δ^{1/4} grow without bound, and those 
 @inner
 def point_of(problem, s, t, x, rate, point):
     """Write the motion of an element with friction in a state with its rate."""
-    point[DELTA], point[RATE] = indentation(problem, s, x), indentation_rate(problem, s, x)
-    point[ACCELERATION] = acceleration_of(problem, s, x, rate)
-    point[WAY], point[SPEED] = slide_of(problem, s, t, x)
-    point[WAY_ACCELERATION] = slide_acceleration_of(problem, s, x, rate)
+    radius, own, rows = radius_of(problem, s), slider_of(problem, s), rows_at(problem, s, x)
+    u, u_dot, w, w_dot, turned, turning = rows
+    u_twice, w_twice, turning_rate = accelerations_at(problem, s, rate)
+    point[DELTA], point[RATE] = delta_of(radius, rows)
+    point[ACCELERATION] = radial_acceleration(radius, u, u_dot, u_twice, w, w_dot, w_twice)
+    point[WAY], point[SPEED] = slide(radius, own, t, u, u_dot, w, w_dot, turned, turning)
+    args = u, u_dot, u_twice, w, w_dot, w_twice, turning_rate
+    point[WAY_ACCELERATION] = slide_acceleration(radius, own, *args)
 
 
 @inlined

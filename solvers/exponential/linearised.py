@@ -250,7 +250,7 @@ def _land(problem, ahead, behind, tables, past, scratch, derivatives, variation,
     """A landing: the variational equation on the Runge–Kutta step's own stages."""
     variable, stop, size = int(row[FIRST]), int(row[SECOND]), 2 * problem.k.size
     w, width, span = scratch.stages[START], past.x.size, row[SPAN]
-    start_landing(problem, tables, past, scratch, stop)
+    start_landing(problem, tables, past, scratch, stop, variable)
     for s in range(problem.law.size):
         scratch.unresolved[s] = 0.0
     _note_sides(problem, tables, past, scratch, past.x)

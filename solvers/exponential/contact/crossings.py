@@ -317,8 +317,8 @@ def _force_turns(work, column, width, known, sign):
 
     It is the force times ``sign``.
     """
-    if _at_stage(work, column, width, sign, 0) < 0.5 * known:  # too far below the peak for a higher maximum
-        return False
+    if work[0, width] == 0.0 or _at_stage(work, column, width, sign, 0) < 0.5 * known:
+        return False  # too far below the peak for a higher maximum, or it begins at an entry
     last, highest = STAGES - 1 if work[STAGES - 1, width] != 0.0 else STAGES - 2, known
     for i in range(1, last):
         if _at_stage(work, column, width, sign, i) > highest:

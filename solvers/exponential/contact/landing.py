@@ -5,6 +5,7 @@ It is a step of DOP853 with t among the unknowns, in a variable in which the mot
     INDENTATION   dt = dδ/δ̇         lands exactly on a kink, or on another stop's surface
     ROOT          dt = κ u^{κ-1} du/δ̇, u = δ^{1/κ}, κ as at entry: lands exactly on δ = 0, where δ^{3/2} is singular
     TIME          dt                lands on a bend by the secant rule; the force is continuous there
+    SINCE         dt = κ u^{κ-1} du, u = (t - t_in)^{1/κ}: the same from an entry on, where δ^{3/2} is singular
 
 The unknowns are [p, v, energy balance, t, u]. The fastest block moves by less than `landing_reach` radians, within
 which the step of every block is exact to the tolerance. The error by the forces is estimated by a tenth of the embedded
@@ -51,7 +52,8 @@ from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import land_on_circle
 from solvers.exponential.contact.borders import margins_later, margins_of, passed
 from solvers.exponential.contact.crossings import CLEAR, TOO_LONG, before_landing, side_at
-from solvers.exponential.contact.landing_step import INDENTATION, ROOT, TIME, landing_step, start_landing
+from solvers.exponential.contact.first_step import NEW, NODE_SET
+from solvers.exponential.contact.landing_step import INDENTATION, ROOT, SINCE, TIME, landing_step, start_landing
 from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, START
 from solvers.exponential.contact.peaks import state_peaks
 from solvers.problem.friction import PEAK
@@ -139,11 +141,13 @@ def _length_to(problem, tables, state, scratch, variable, stop, span, landed, ti
     left = (landed - time) / (landed - t) if landed > t else 0.0
     kappa = tables.time_exponent[1 + stop]
     length = span * (1.0 - (left ** (1.0 / kappa) if variable == ROOT else left))
+    if variable == SINCE:
+        length = span * (1.0 - left) ** (1.0 / kappa)
     while True:
         _step(problem, tables, state, scratch, variable, stop, length, with_energy)
         late, tries = x[size] - time, tries + 1
-        pace = 1.0 if variable == TIME else indentation_rate(problem, stop, x)  # d(variable)/dt
-        if variable == ROOT:
+        pace = 1.0 if variable >= TIME else indentation_rate(problem, stop, x)  # d(variable)/dt
+        if variable in (ROOT, SINCE):
             pace /= kappa * raised(x[size + 1], kappa - 1.0)
         if not abs(late) > 1e-15 * landed or not abs(pace) < np.inf or tries == _MOST_TRIES:
             return length if abs(late) <= 1e-6 * (landed - t) + 1e-15 * landed else np.inf
@@ -154,7 +158,7 @@ def _length_to(problem, tables, state, scratch, variable, stop, span, landed, ti
 def _begin_peaks(problem, state, scratch):
     """Raise the peak forces by those at the start of a landing, which its first stage has computed."""
     work, size, first = scratch.stages, state.x.size, 2 * problem.k.size + 3
-    for s in range(state.segment.size):
+    for s in range(state.segment.size if work[0, size] != 0.0 else 0):
         if state.segment[s] > 0:
             column = first + 2 * s
             state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], work[0, column] / work[0, size])
@@ -188,7 +192,7 @@ def _accept(problem, tables, state, scratch, variable, stop, level, span, t_end,
     if state.event_record.shape[0]:
         write_event(state, LANDING, t, landed, span, variable, stop, w)
     state.now[T] = landed
-    if is_circle(problem, stop) and variable != TIME and landed < t_end:
+    if is_circle(problem, stop) and variable < TIME and landed < t_end:
         land_on_circle(problem, state, scratch, stop, level)
     if variable != ROOT or landed == t_end:  # at a knot the force may fall
         state_peaks(problem, state, scratch, state.x)
@@ -251,7 +255,7 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
         return -1
     furthest, kappa = _furthest(problem, tables, scratch), tables.time_exponent[1 + stop]
     leaving = direction < 0 and state.segment[stop] == 1
-    start_landing(problem, tables, state, scratch, stop)
+    start_landing(problem, tables, state, scratch, stop, np.int64(ROOT))
     w, x = scratch.stages[START], scratch.stages[LANDED]
     variable = ROOT if leaving and kappa > 1.0 else INDENTATION
     span = -w[size + 1] if variable == ROOT else _level(problem, state, stop, direction) - scratch.start_motion[stop, 0]
@@ -319,16 +323,20 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
     scratch.landed[0] = -1
     if not 0.0 < near <= furthest:
         return False
-    start_landing(problem, tables, state, scratch, stop)
-    w, x = scratch.stages[START], scratch.stages[LANDED]
-    before, apart, span = 0.0, _apart(problem, tables, state, scratch, stop, border, w), near
+    variable, root = np.int64(TIME), 1.0  # a literal would be compiled for itself
+    if border >= 0 and scratch.control[NEW] and scratch.control[NODE_SET] == stop + 1:
+        variable, root = np.int64(SINCE), 1.0 / tables.time_exponent[stop + 1]
+    start_landing(problem, tables, state, scratch, stop, variable)
+    w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
+    furthest, span = furthest**root, near**root
+    before, apart = 0.0, _apart(problem, tables, state, scratch, stop, border, w)
     if (apart if border >= 0 else abs(apart)) <= 1e-6 * largest:  # it begins there: the secant needs another point
-        before = 0.9 * near
-        _step(problem, tables, state, scratch, np.int64(TIME), stop, before, with_energy)
+        before = 0.9 * span
+        _step(problem, tables, state, scratch, variable, stop, before, with_energy)
         apart = _apart(problem, tables, state, scratch, stop, border, x)
     above, below = before if apart > 0.0 else 0.0, furthest
     for _ in range(_MOST_TRIES if border < 0 else _MOST_HALVINGS):
-        _step(problem, tables, state, scratch, np.int64(TIME), stop, span, with_energy)
+        _step(problem, tables, state, scratch, variable, stop, span, with_energy)
         value = _apart(problem, tables, state, scratch, stop, border, x)
         if abs(value) <= enough:
             break
@@ -342,9 +350,10 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
         if not (0.1 * near if border < 0 else 0.0) < following <= furthest or following == span:
             return False
         before, apart, span = span, value, following
-    if not (abs(value) <= 1e-6 * largest and _error_in_time(problem, scratch, span, rtol) <= 1.0):
+    time = x[size] - w[size] if variable == SINCE else span
+    if not (abs(value) <= 1e-6 * largest and _error_in_time(problem, scratch, time, rtol) <= 1.0):
         return False
-    if border >= 0 and _rises(problem, state, scratch, stop, border, 1e-3 * span):  # it has been below zero before
+    if border >= 0 and _rises(problem, state, scratch, stop, border, 1e-3 * time):  # it has been below zero before
         return False
     if before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
         return False
@@ -354,5 +363,4 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
     lower, upper = problem.knots[stop, state.segment[stop] - 1], problem.knots[stop, state.segment[stop]]
     if not lower < indentation(problem, stop, x) < upper:
         return False
-    variable = np.int64(TIME)  # a literal would be compiled for itself
     return _accept(problem, tables, state, scratch, variable, stop, 0.0, span, t_end, out, due, with_energy)

@@ -35,16 +35,18 @@ from solvers.compiled.sliding import (
 )
 from solvers.compiled.state import T, rate_tolerance, surface_tolerance
 from solvers.compiled.sums import above, combine
-from solvers.exponential.circles.friction import SPARE, SPEEDS, TANGENTIAL, WAYS, nearest_way
+from solvers.exponential.circles.friction import SPARE, SPEEDS, TANGENTIAL, WAYS, nearest_way, slide_at_nodes
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL_SLOPES, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
+from solvers.exponential.tables import EXPONENT
 from solvers.problem.friction import CODE, CUT, FREE, MU, PEAK, PRESSES, SLIDES, STIFFNESS
 
 ENDS = 6  # numbers in `Scratch.ends` for a border
 _SAME = 1e-11  # margin, in units of the largest of the step, that is rounding
 _DIFFERENCED = 1e-8  # the same where it contains the slope of a polynomial
 _REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
+_TINY = 1e-300  # m
 _SHARE = 1e-6  # of δ and δ̇ at a node, by which slopes of N are differenced
 
 
@@ -88,13 +90,23 @@ def _slopes_of_rates(tables, scratch, node_set, h, s, rates, out):
         out[i] = total / (h * kappa * nodes[i] ** (kappa - 1.0))
 
 
+@inlined
+def _slopes(problem, tables, state, s, delta, rate, normal, slope):
+    """N_δ and N_δ̇ at S points; of a power law that only pushes N_δ = p N/δ."""
+    if _pulls(problem, s):
+        normal_slopes(problem, s, S, delta, rate, state.entry_rate[s], slope[0], slope[1], slope[2])
+        return
+    for i in range(S):
+        slope[0, i], slope[1, i] = tables.power_law[s, EXPONENT] * normal[i] / max(delta[i], _TINY), 0.0
+
+
 @inner
-def _margins_at(problem, state, scratch, s, delta, rate, speeds, drags, twice):
+def _margins_at(problem, tables, state, scratch, s, delta, rate, speeds, drags, twice):
     """Margins at S points into ``scratch.margin``, from N there in ``scratch.numbers``; ``twice`` is δ̈."""
     own, margin, normal, slope = slider_of(problem, s), scratch.margin, scratch.numbers, scratch.slope[s]
     slips, mu = _slips(own), own[MU]
     if slips and mu > 0.0:
-        normal_slopes(problem, s, S, delta, rate, state.entry_rate[s], slope[0], slope[1], slope[2])
+        _slopes(problem, tables, state, s, delta, rate, normal, slope)
     for i in range(S):
         if _pulls(problem, s):
             margin[S + i] = normal[i] if slips else 1.0
@@ -121,18 +133,26 @@ def slider_margins_at_nodes(problem, tables, state, scratch, s, node_set, h):
         normal_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], scratch.numbers)
     if _slips(own) and _pulls(problem, s):
         _slopes_of_rates(tables, scratch, node_set, h, s, motion[1], slid[SPARE])
-    _margins_at(problem, state, scratch, s, scratch.clipped, motion[1], slid[SPEEDS], slid[TANGENTIAL], slid[SPARE])
+    _margins_at(
+        problem, tables, state, scratch, s, scratch.clipped, motion[1], slid[SPEEDS], slid[TANGENTIAL], slid[SPARE]
+    )
 
 
 @merged
-def _sensitivities(problem, state, scratch, s):
+def _sensitivities(problem, tables, state, scratch, s):
     """How much both margins at the last node change with δ, and with δ̇, per unit: (own, own, N, N), in size.
 
-    N is the law's where N is asked for; in slip the margin has its slopes, which are differenced.
+    In slip the margin has slopes of N, which are differenced; those of a power law that only pushes are known.
     """
     own, numbers, motion = slider_of(problem, s), scratch.local_motion, scratch.motion[place_of(problem, s)]
     deltas, rates, slopes = numbers[KNOWN, :3], numbers[KNOWN, 3:6], numbers[FORCES]
     delta, rate = max(motion[0, S - 1], problem.knots[s, 0]), motion[1, S - 1]
+    if not _pulls(problem, s):
+        p = tables.power_law[s, EXPONENT]
+        along, share = p * scratch.numbers[S - 1] / max(delta, _TINY), own[MU] / own[STIFFNESS]
+        if not _slips(own):
+            return own[MU] * along, 0.0, along, 0.0
+        return share * abs((p - 1.0) * along * rate) / max(delta, _TINY), share * along, along, 0.0
     by = _SHARE * max(delta, 1e-300), _SHARE * max(abs(rate), scratch.reference_speed[s])
     deltas[0], deltas[1], deltas[2] = delta, delta + by[0], delta
     rates[0], rates[1], rates[2] = rate, rate, rate + by[1]
@@ -142,7 +162,7 @@ def _sensitivities(problem, state, scratch, s):
         return along, aside, along, aside
     if not _slips(own):
         return own[MU] * along, own[MU] * aside, along, aside
-    twice, share = scratch.slid[s, SPARE, S - 1] if _pulls(problem, s) else 0.0, own[MU] / own[STIFFNESS]
+    twice, share = scratch.slid[s, SPARE, S - 1], own[MU] / own[STIFFNESS]
     growing = slopes[0] * rate + slopes[3] * twice
     first = abs(slopes[1] * rate + slopes[4] * twice - growing) / by[0]
     second = abs(slopes[2] * (rate + by[1]) + slopes[5] * twice - growing) / by[1]
@@ -156,8 +176,9 @@ def slider_margins_on_step(problem, tables, state, scratch, s, node_set, level):
     The point at the start stays in ``scratch.point[0]``.
     """
     h, ends, own, t = tables.contact_step[level], scratch.ends, slider_of(problem, s), state.now[T]
+    slide_at_nodes(problem, scratch, s)
     slider_margins_at_nodes(problem, tables, state, scratch, s, node_set, h)
-    of_delta, of_rate, of_normal, of_its_rate = _sensitivities(problem, state, scratch, s)
+    of_delta, of_rate, of_normal, of_its_rate = _sensitivities(problem, tables, state, scratch, s)
     slider_margins_in(problem, state, scratch, s, t + h, scratch.x_new, 0.0, scratch.fired)
     for j in range(problem.border_count[s]):
         ends[ENDS * j + 1] = scratch.fired[j]
@@ -225,7 +246,7 @@ def slider_margins_around(problem, tables, state, scratch, s, node_set, h, place
     normal_forces(problem, s, S, deltas, rates, state.entry_rate[s], scratch.numbers)
     for i in range(S):
         drags[i] = friction_force(radius_of(problem, s), slider_of(problem, s), ways[i], scratch.numbers[i])
-    _margins_at(problem, state, scratch, s, deltas, rates, ways[S:], drags, twice)
+    _margins_at(problem, tables, state, scratch, s, deltas, rates, ways[S:], drags, twice)
 
 
 @part(RUB_PEAK, types.void, types.int64, types.float64, types.int64, types.float64)
