@@ -1,5 +1,7 @@
 """Friction under a contact's own force: SciPy's DOP853 with its own events, closed forms, identities, energy."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -277,7 +279,61 @@ def test_a_slip_from_the_entry_sticks_within_the_first_step(method):
 def test_a_force_that_grows_without_bound_begins_in_stick(method, v_t):
     """A dashpot of δ^{1/4} has Ṅ = ∞ at the entry."""
     run = bounce(wall(Viscoelastic(1e7, 500.0)), v_t, method)
-    assert run.transitions.event.tolist() == ["slip"]
+    assert run.transitions.event.tolist() == ["slip", "free"]  # the dashpot pulls as it opens
+
+
+@every_method
+@pytest.mark.parametrize(("k_t", "v_t"), [(2e5, 0.15), (2e5, 0.2), (3e5, 0.2)])
+def test_the_peak_of_friction_just_before_a_slip(method, k_t, v_t):
+    """In stick the mass swings on the spring, |F_t| <= v_t √(k_t m), and slips soon after the peak."""
+    run = bounce(wall(k_t=k_t), v_t, replace(method, rtol=1e-8))
+    assert run.friction.peak_friction[0] == pytest.approx(v_t * np.sqrt(k_t * 0.08), rel=1e-7)
+
+
+@every_method
+def test_a_slip_at_entry_far_shorter_than_any_step(method):
+    """Under δ^1.2 it ends where k_t ξ̇ = μ N_δ v, here after 6e-13 s of a contact of 4e-5 s."""
+    friction = Friction(0.86, 1.5e9)
+    stop = Contact([-1.0, 0.0], Hertz(9e10, exponent=1.2), map="oblique", tangent=[0.0, 1.0], friction=friction)
+    system = System(EYE[:2, :2], 0.0 * EYE[:2, :2], 0.0 * EYE[:2, :2], [stop])
+    run = integrate(system, [-1e-5, 0.0], [1.15, 0.26], 1e-4, method=method)
+    assert run.transitions.event.tolist() == ["stick", "slip"]
+    after = (1.5e9 * 0.26 / (1.2 * 0.86 * 9e10 * 1.15)) ** 5 / 1.15
+    assert run.transitions.t[0] - run.contacts.t_in[0] == pytest.approx(after, rel=1e-4)
+    assert run.q_dot[-1, 1] == pytest.approx(0.082746796, abs=1e-8)  # of `DormandPrince`
+
+
+@every_method
+@pytest.mark.parametrize("clamp", [False, True])
+@pytest.mark.parametrize("v_t", [0.1, 1.5])
+def test_a_slider_is_free_where_its_law_pulls(method, clamp, v_t):
+    """Or is cut: F_t is 0 from there on, and the way of the slider ends, ξ - F_t/k_t from slip to there."""
+    run = bounce(wall(KelvinVoigt(4e5, 60.0, clamp=clamp)), v_t, method)
+    assert run.transitions.event.tolist() == ["slip", "free"]
+    (begun, free), way = run.transitions.force, np.diff(run.transitions.delta)[0]
+    assert free == 0.0
+    assert np.sign(begun) == np.copysign(1.0, free) == 1.0
+    assert run.transitions.t[1] < run.contacts.t_out[0] - 1e-5
+    assert run.friction.slip[0] == pytest.approx(way + begun / 3e5, rel=1e-8)
+
+
+def pulled(clamp, amplitude=400.0):
+    """A mass on a dashpot stronger than its spring, shaken so that N falls to zero and comes back within a contact."""
+    law, friction = KelvinVoigt(4e5, 300.0, clamp=clamp), Friction(0.25, 3e5)
+    stop = Contact([-1.0, 0.0], law, map="oblique", tangent=[0.0, 1.0], friction=friction)
+    loads = [(EYE[0, :2], Tone(amplitude, 9e3)), (150.0 * EYE[0, :2], np.ones_like)]
+    return System(0.08 * EYE[:2, :2], 0.0 * EYE[:2, :2], 0.0 * EYE[:2, :2], [stop], loads)
+
+
+@pytest.mark.parametrize("clamp", [False, True])
+def test_a_slider_begins_anew_where_its_law_pushes_again(clamp):
+    start = [-1e-4, 0.0], [0.3, 0.3], 0.004
+    one, other = (integrate(pulled(clamp), *start, method=method) for method in METHODS)
+    assert one.transitions.event.tolist().count("free") == 4
+    assert one.transitions.event.tolist() == other.transitions.event.tolist()
+    np.testing.assert_allclose(one.transitions.t, other.transitions.t, rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(one.end[:4], other.end[:4], rtol=0.0, atol=1e-10)
+    assert one.friction.slip[0] == pytest.approx(other.friction.slip[0], rel=1e-8)
 
 
 @every_method

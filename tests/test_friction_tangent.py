@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
-from test_friction import EYE, SHARP, Tone, disc, wall
+from test_friction import EYE, SHARP, Tone, disc, pulled, wall
 
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear
 from solvers import Contact, Exponential, Friction, Parameter, System, integrate, orbit
@@ -47,11 +47,23 @@ def test_the_tangent_is_that_of_differences(name):
     assert abs(run.tangent - expected).max() < 2e-5 * abs(expected).max()
 
 
-def test_the_tangent_where_a_law_pulls_as_it_opens():
-    """The limit max(μN, 0) has a kink where N = 0; it lies within a step, whose derivative is off by its size."""
-    run = integrate(wall(KelvinVoigt(4e5, 60.0)), [-1e-3, 0.0], [0.8, 0.1], 0.004, method=FINE, tangent=True)
-    expected = by_differences(wall(KelvinVoigt(4e5, 60.0)), [-1e-3, 0.0], [0.8, 0.1], 0.004)
-    assert abs(run.tangent - expected).max() < 2e-3 * 500.0  # what a slip adds to the derivative, and takes away again
+@pytest.mark.parametrize("clamp", [False, True])
+@pytest.mark.parametrize("v_t", [0.1, 1.5])
+def test_the_tangent_where_a_law_pulls_as_it_opens(clamp, v_t):
+    """The limit max(μN, 0) has a kink where N = 0, which is an event."""
+    start = wall(KelvinVoigt(4e5, 60.0, clamp=clamp)), [-1e-3, 0.0], [0.8, v_t], 0.004
+    run = integrate(*start, method=FINE, tangent=True)
+    assert abs(run.tangent - by_differences(*start)).max() < 1e-6
+
+
+@pytest.mark.parametrize("clamp", [False, True])
+def test_the_tangent_where_a_law_pulls_and_pushes_again(clamp):
+    """The slider begins anew where N grows from zero: s has the derivative of ξ then, the time of N = 0 included."""
+    start = pulled(clamp), [-1e-4, 0.0], [0.3, 0.3], 0.004
+    run = integrate(*start, method=FINE, tangent=True)
+    assert run.transitions.event.tolist().count("free") == 4
+    expected = by_differences(*start)
+    assert abs(run.tangent - expected).max() < 5e-5 * abs(expected).max()
 
 
 def test_the_tangent_beside_other_elements():

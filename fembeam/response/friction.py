@@ -1,6 +1,6 @@
 """Friction under the force of a contact along a run: what sticks and slips when, its force, what it takes.
 
-stick: F_t = k_t (ξ - s);    slip: F_t = ±μN;    s as the run has logged it, between two events of a slider
+stick: F_t = k_t (ξ - s);    slip: F_t = ±μN;    free: F_t = 0;    s as the run has logged it, between two events
 
 In a circular clearance ξ = c θ + R (φ + Ω t) is known up to whole turns, and ξ - s is far below half of one.
 """
@@ -39,14 +39,14 @@ def states(run: Histories, stop: int) -> tuple[Vector, Vector, Vector]:
     mine = np.flatnonzero(log.contact == stop)
     mine = mine[np.argsort(log.t_in[mine], kind="stable")]
     events = np.flatnonzero(passed.contact == stop)
-    stuck = passed.event[events] == "stick"
+    stuck, freed = (passed.event[events] == word for word in ("stick", "free"))
     time, force, way, speed = (column[events] for column in (passed.t, passed.force, passed.delta, passed.delta_dot))
     slider = way - force / k_t
-    slips = np.where(force != 0.0, np.sign(force), np.sign(speed))
-    codes, places = _begun(run, stop, mine, (time, stuck, slips, slider))
+    slips = np.where((force != 0.0) | freed, np.copysign(1.0, force), np.sign(speed))
+    codes, places = _begun(run, stop, mine, (time, stuck | freed, slips, slider))
     ended = mine[~np.isnan(log.t_out[mine])]
     over = np.full(len(ended), FREE), np.full(len(ended), np.nan)
-    after = np.where(stuck, STICK, slips), np.where(stuck, slider, np.nan)
+    after = np.where(freed, FREE, np.where(stuck, STICK, slips)), np.where(stuck, slider, np.nan)
     times = np.concatenate((log.t_in[mine], time, log.t_out[ended]))
     kinds = np.repeat([0, 1, 2], [len(mine), len(time), len(ended)])
     order = np.lexsort((kinds, times))

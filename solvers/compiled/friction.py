@@ -20,14 +20,26 @@ TURN = 2.0 * math.pi
 
 
 @inlined
-def slide(radius, own, t, u, u_dot, w, w_dot, turned, turning):
-    """ξ and ξ̇ from the motion of the rows: of the first, of the second, and of the third with its sign turned."""
+def way_of(radius, own, t, u, w, turned):
+    """ξ from the displacements of the rows: of the first, of the second, and of the third with its sign turned."""
     if radius == 0.0:
-        return -w, -w_dot
-    c = abs(radius)
-    rate = c * (u * w_dot - w * u_dot) / (u * u + w * w)
-    sign, surface = math.copysign(1.0, own[ARM]), own[ARM] * own[SPIN]
-    return c * math.atan2(w, u) + sign * turned + surface * t, rate + sign * turning + surface
+        return -w
+    return abs(radius) * math.atan2(w, u) + math.copysign(1.0, own[ARM]) * turned + own[ARM] * own[SPIN] * t
+
+
+@inlined
+def speed_of(radius, own, u, u_dot, w, w_dot, turning):
+    """ξ̇ from their motion."""
+    if radius == 0.0:
+        return -w_dot
+    rate = abs(radius) * (u * w_dot - w * u_dot) / (u * u + w * w)
+    return rate + math.copysign(1.0, own[ARM]) * turning + own[ARM] * own[SPIN]
+
+
+@inlined
+def slide(radius, own, t, u, u_dot, w, w_dot, turned, turning):
+    """Both."""
+    return way_of(radius, own, t, u, w, turned), speed_of(radius, own, u, u_dot, w, w_dot, turning)
 
 
 @inlined
@@ -61,3 +73,9 @@ def friction_force(radius, own, way, normal):
     if own[CODE] == FREE or normal <= 0.0:
         return 0.0
     return own[CODE] * own[MU] * normal
+
+
+@inlined
+def slip_of(own):
+    """Sign of the slip, 0 where there is none."""
+    return own[CODE] if abs(own[CODE]) == 1.0 else 0.0

@@ -31,7 +31,7 @@ from solvers.compiled.decorators import entry as entry  # re-exported for files 
 from solvers.compiled.decorators import inlined, inner, kernel, reordered
 from solvers.compiled.decorators import merged as merged
 from solvers.compiled.fields import packed_type
-from solvers.compiled.friction import friction_force, slide, slide_acceleration
+from solvers.compiled.friction import friction_force, slide, slip_of, speed_of, way_of
 from solvers.compiled.packed import PackedType
 from solvers.compiled.parts import RADIAL_ACCELERATION, RADIAL_MOTION, RADIAL_PUSH, part
 from solvers.problem.friction import ACCOUNTS, ARM, CODE
@@ -318,7 +318,9 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
     for s in range(problem.law.size):
         rate[size + 2 + 2 * s] = 0.0
         rate[size + 3 + 2 * s] = 0.0
-        if segment[s] > 0:
+        if rubs(problem, s):
+            calls += _add_rubbing(problem, s, t, segment[s], entry_rate[s], x, rate, batch)
+        elif segment[s] > 0:
             delta_dot = indentation_rate(problem, s, x)
             delta = off_knots(problem, s, segment[s], indentation(problem, s, x))
             force = force_at(problem, s, delta, delta_dot, entry_rate[s], batch)
@@ -326,9 +328,21 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
             rate[size + 2 + 2 * s] = force * delta_dot
             rate[size + 3 + 2 * s] = force
             calls += 1
-        if rubs(problem, s):
-            add_friction(problem, s, t, segment[s] > 0, batch[2], x, rate)
     return calls
+
+
+@inner
+def _add_rubbing(problem, s, t, segment, entry_rate, x, rate, batch):
+    """Add what an element with friction does to the state's rate, and its power; number of law calls."""
+    if segment == 0:
+        no_friction(problem, s, rate)
+        return 0
+    rows, size = rows_at(problem, s, x), 2 * problem.k.size
+    delta, delta_dot = delta_of(radius_of(problem, s), rows)
+    normal = force_at(problem, s, off_knots(problem, s, segment, delta), delta_dot, entry_rate, batch)
+    add_friction(problem, s, t, rows, normal, rate)
+    rate[size + 2 + 2 * s], rate[size + 3 + 2 * s] = normal * delta_dot, normal
+    return 1
 
 
 @inlined
@@ -373,14 +387,30 @@ def slider_of(problem, s):
 
 
 @inner
-def slide_of(problem, s, t, x):
-    """ξ and ξ̇ of a stop with friction in a state."""
+def rows_at(problem, s, x):
+    """Motion of the rows of an element with friction: u, u̇, w, ẇ, and of the third one with its sign turned."""
     first, size, turned, turning = row_of(problem, s), 2 * problem.k.size, 0.0, 0.0
     u, u_dot = dot(problem.read[first], x, size) - problem.gap[first], dot(problem.read_rate[first], x, size)
     w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
     w_dot = dot(problem.read_rate[first + 1], x, size)
     if first + 2 < row_of(problem, s + 1):
         turned, turning = -dot(problem.read[first + 2], x, size), -dot(problem.read_rate[first + 2], x, size)
+    return u, u_dot, w, w_dot, turned, turning
+
+
+@inlined
+def delta_of(radius, rows):
+    """δ and δ̇ from the motion of the rows."""
+    u, u_dot, w, w_dot, _, _ = rows
+    if radius == 0.0:
+        return u, u_dot
+    return radial(u * u + w * w, u * u_dot + w * w_dot, u_dot * u_dot + w_dot * w_dot, radius)
+
+
+@inner
+def slide_of(problem, s, t, x):
+    """ξ and ξ̇ of a stop with friction in a state."""
+    u, u_dot, w, w_dot, turned, turning = rows_at(problem, s, x)
     return slide(radius_of(problem, s), slider_of(problem, s), t, u, u_dot, w, w_dot, turned, turning)
 
 
@@ -395,50 +425,58 @@ def angle_of(problem, s, x):
     return math.atan2(-w, -u)
 
 
-@inner
-def slide_acceleration_of(problem, s, x, rate):
-    """ξ̈ from the state and its rate."""
-    first, size, turning_rate = row_of(problem, s), 2 * problem.k.size, 0.0
-    u, u_dot = dot(problem.read[first], x, size) - problem.gap[first], dot(problem.read_rate[first], x, size)
-    w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
-    w_dot = dot(problem.read_rate[first + 1], x, size)
+@inlined
+def accelerations_at(problem, s, rate):
+    """Second derivatives of the displacements that `rows_at` has, from the state's rate."""
+    first, size, turning = row_of(problem, s), 2 * problem.k.size, 0.0
     u_twice, w_twice = dot(problem.read_rate[first], rate, size), dot(problem.read_rate[first + 1], rate, size)
     if first + 2 < row_of(problem, s + 1):
-        turning_rate = -dot(problem.read_rate[first + 2], rate, size)
-    own = slider_of(problem, s)
-    return slide_acceleration(radius_of(problem, s), own, u, u_dot, u_twice, w, w_dot, w_twice, turning_rate)
+        turning = -dot(problem.read_rate[first + 2], rate, size)
+    return u_twice, w_twice, turning
+
+
+@inlined
+def no_friction(problem, s, rate):
+    """Nothing rubs: no power."""
+    account = problem.friction[s, 1]
+    rate[account], rate[account + 1], rate[account + 2] = 0.0, 0.0, 0.0
 
 
 @inner
-def add_friction(problem, s, t, touches, normal, x, rate):
-    """Add what the friction of a stop in contact does to the state's rate, and its power."""
-    account = problem.friction[s, 1]
-    rate[account], rate[account + 1], rate[account + 2] = 0.0, 0.0, 0.0
-    if touches:
-        way, speed = slide_of(problem, s, t, x)
-        own = slider_of(problem, s)
-        force = friction_force(radius_of(problem, s), own, way, normal)
-        add_sideways(problem, s, force, x, rate)
-        rate[account], rate[account + 1], rate[account + 2] = force * speed, force, own[CODE] * speed
+def add_friction(problem, s, t, rows, normal, rate):
+    """Add what a stop with friction in contact does to the state's rate under a force N, and the power of friction."""
+    u, u_dot, w, w_dot, turned, turning = rows
+    own, radius, account = slider_of(problem, s), radius_of(problem, s), problem.friction[s, 1]
+    way = way_of(radius, own, t, u, w, turned) if own[CODE] == 0.0 else 0.0
+    speed, force = speed_of(radius, own, u, u_dot, w, w_dot, turning), friction_force(radius, own, way, normal)
+    _add_to_rows(problem, s, u, w, normal, force, rate)
+    rate[account], rate[account + 1], rate[account + 2] = force * speed, force, slip_of(own) * speed
+
+
+@inner
+def _add_to_rows(problem, s, u, w, normal, tangential, rate):
+    """Add what N and F_t of a stop with friction do to the state's rate; u and w are the displacements of its rows."""
+    first, size, radius = row_of(problem, s), 2 * problem.k.size, radius_of(problem, s)
+    if radius == 0.0:
+        for i in range(size):
+            rate[i] += problem.push[first, i] * normal - problem.push[first + 1, i] * tangential
+        return
+    square = u * u + w * w
+    share, press = tangential * abs(radius) / square, math.copysign(normal, normal * radius) / math.sqrt(square)
+    along, aside = press * u - share * w, press * w + share * u
+    for i in range(size):
+        rate[i] += problem.push[first, i] * along + problem.push[first + 1, i] * aside
+    if first + 2 < row_of(problem, s + 1):
+        turns = math.copysign(1.0, slider_of(problem, s)[ARM]) * tangential
+        for i in range(size):
+            rate[i] -= problem.push[first + 2, i] * turns
 
 
 @inner
 def add_sideways(problem, s, force, x, rate):
     """Add what a tangential force F_t of stop s does to the state's rate."""
-    first, size = row_of(problem, s), 2 * problem.k.size
-    if not is_circle(problem, s):
-        for i in range(size):
-            rate[i] -= problem.push[first + 1, i] * force
-        return
-    u = dot(problem.read[first], x, size) - problem.gap[first]
-    w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
-    share = force * abs(problem.radius[s]) / (u * u + w * w)
-    for i in range(size):
-        rate[i] += share * (problem.push[first + 1, i] * u - problem.push[first, i] * w)
-    if first + 2 < row_of(problem, s + 1):
-        turns = math.copysign(1.0, slider_of(problem, s)[ARM]) * force
-        for i in range(size):
-            rate[i] -= problem.push[first + 2, i] * turns
+    u, _, w, _, _, _ = rows_at(problem, s, x)
+    _add_to_rows(problem, s, u, w, 0.0, force, rate)
 
 
 @inlined
@@ -487,6 +525,17 @@ def radial(square, product, speed, radius):
     distance = math.sqrt(square)
     rate = product / distance if distance > 0.0 else math.sqrt(speed)
     return (distance - radius, rate) if radius > 0.0 else (-radius - distance, -rate)
+
+
+@inlined
+def radial_acceleration(radius, u, u_dot, u_twice, w, w_dot, w_twice):
+    """δ̈ from the motion of both rows, of a stop on a line from the first."""
+    if radius == 0.0:
+        return u_twice
+    square, product = u * u + w * w, u * u_dot + w * w_dot
+    along = u_dot * u_dot + w_dot * w_dot + u * u_twice + w * w_twice
+    found = (along - product * product / square) / math.sqrt(square)
+    return found if radius > 0.0 else -found
 
 
 @part(RADIAL_ACCELERATION, REAL, types.int64, VECTOR, VECTOR)

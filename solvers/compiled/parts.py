@@ -31,13 +31,12 @@ from solvers.compiled.packed import PackedType
 (CIRCLE_AWAY, CIRCLE_NEWTON, CIRCLE_WORK, CIRCLE_WITHIN, CIRCLE_LANDED) = range(33, 38)
 (RADIAL_MOTION, RADIAL_ACCELERATION, RADIAL_PUSH) = range(38, 41)
 (RUB_FORCES, RUB_GUESS, RUB_NEWTON, RUB_WORK, RUB_WITHIN, RUB_MARGINS, RUB_IN, RUB_AROUND, RUB_PEAK) = range(41, 50)
-(RUB_LANDED,) = range(50, 51)
 EVERY_RUN, ENERGY = range(10), range(10, 14)
 BORDERS, TWO_STOPS, MANY_STOPS, CIRCLES = range(14, 19), range(19, 20), range(20, 26), range(26, 41)
-FRICTION = range(41, 51)
+FRICTION = range(41, 50)
 """What needs them: every run, those with an energy balance, with bends or memory in a law, with two or many stops, with
 circular clearances, with friction."""
-PLACES = 51
+PLACES = 50
 
 _DECLARED: dict[int, tuple[Any, Any, tuple[Any, ...]]] = {}
 _LOADED: dict[tuple[type, int], Any] = {}

@@ -1,8 +1,8 @@
 """Borders of laws with memory: their margins, and what is latched and logged where one is met.
 
 A law tells by margins b_j(δ, δ̇) how far the borders of its segment are; all are positive inside. Where one falls to
-zero the law renews the numbers it latches, which stand among its parameters, and another segment begins. Friction has
-one border, whose margin depends on more than δ and δ̇, see `sliding`.
+zero the law renews the numbers it latches, which stand among its parameters, and another segment begins. Those of
+friction depend on more than δ and δ̇, see `sliding`.
 """
 
 from __future__ import annotations
@@ -61,14 +61,15 @@ def margins_before(problem, state, s, delta, rate, time, batch, out):
 
 @inner
 def renew(problem, state, s, j, delta, rate):
-    """Renew what element s latches on its border j; a row of the log tells of it."""
+    """Renew what element s latches on its border j, in a state whose rate is known; a row of the log tells of it."""
     t, row = state.now[T], state.log[state.count[LOGGED]]
     if state.event_record.shape[0]:
         write_event(state, RENEWAL, t, t, 0.0, s, j, state.x)
     event_row(problem, state, s, t, j, delta, rate, row)
     if rubs(problem, s):
         account, found = problem.friction[s, 1], row[at.DELTA : at.FORCE + 1]
-        row[at.CODE] = renew_slider(problem, s, state.entry_rate[s], state.segment[s], t, state.x, found)
+        entry, segment = state.entry_rate[s], state.segment[s]
+        row[at.CODE] = renew_slider(problem, s, j, entry, segment, t, state.x, state.rate, found)
         row[at.WORK], row[at.IMPULSE] = state.x[account], state.x[account + 1]
         held = abs(row[at.FORCE]) / slider_of(problem, s)[STIFFNESS]
         state.x[account + 2] += held if row[at.CODE] == SLIPPED else -held

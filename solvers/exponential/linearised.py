@@ -154,7 +154,7 @@ def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, directi
             derivatives.entry[c, s] = 0.0 if floored else change
         add_push(problem, s, -jump * shift, past.x, derivatives.y[c])
         if rubs(problem, s) and border > 0:
-            drag = share_of(slider_of(problem, s), 1.0) * jump
+            drag = share_of(slider_of(problem, s)) * jump
             add_sideways(problem, s, -drag * shift, past.x, derivatives.y[c])
     past.segment[s] += direction
     if rubs(problem, s) and entering:
@@ -250,7 +250,7 @@ def _land(problem, ahead, behind, tables, past, scratch, derivatives, variation,
     """A landing: the variational equation on the Runge–Kutta step's own stages."""
     variable, stop, size = int(row[FIRST]), int(row[SECOND]), 2 * problem.k.size
     w, width, span = scratch.stages[START], past.x.size, row[SPAN]
-    start_landing(problem, tables, past, scratch, stop)
+    start_landing(problem, tables, past, scratch, stop, variable)
     for s in range(problem.law.size):
         scratch.unresolved[s] = 0.0
     _note_sides(problem, tables, past, scratch, past.x)

@@ -95,7 +95,7 @@ def _explicit(problem, ahead, behind, past, s, j, delta, rate, derivatives, vari
 def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
     """A law with memory passes its border j: derivatives of what it latches, and of the motion if its force jumps."""
     if rubs(problem, s):
-        pass_slider(problem, ahead, behind, past, derivatives, variation, s)
+        pass_slider(problem, ahead, behind, past, derivatives, variation, s, j)
         return
     t, most, width = past.now[T], problem.latched.shape[1], problem.parameters.shape[1]
     stops = problem.law.size

@@ -11,12 +11,14 @@ from numpy.typing import ArrayLike
 
 from solvers.problem.matrices import Array
 
-(MU, STIFFNESS, ARM, SPIN, CODE, SLIDER, PEAK, BEGUN, SCRATCH) = range(9)
+(MU, STIFFNESS, ARM, SPIN, CODE, SLIDER, PEAK, BEGUN, CUT, SCRATCH) = range(10)
 """Places of a contact's friction behind its law's parameters: μ; k_t, N/m; R, m, negative where the place runs around a
-post; Ω, rad/s; code of the segment; s, m; largest |F_t| of the contact under way and F_t as the run began, N."""
+post; Ω, rad/s; code of the segment; s, m; largest |F_t| of the contact under way and F_t as the run began, N; place of
+the law's switch that cuts N at zero, or -1."""
 SIZE = 16  # the rest is scratch
 ACCOUNTS = 3  # numbers in the state behind the energy balance: ∫F_t ξ̇ dt, ∫F_t dt, and the way of the slider
-STICK, FREE = 0.0, 2.0  # codes; those of slip are -1 and 1, FREE is that of an open contact
+STICK, FREE = 0.0, 2.0  # codes; those of slip are -1 and 1, FREE is that of a contact that is open, or pulls
+SLIDES, PRESSES = range(2)  # borders: the slider's own, and N = 0, where slip ends
 
 
 @dataclass(frozen=True)
@@ -29,8 +31,9 @@ class Friction:
 
     The loss is ∫F_t ξ̇ dt - F_t²/2k_t. A contact begins in stick where N jumps at entry or grows quicker than the spring
     is drawn, k_t |ξ̇| <= μṄ; else in slip, as laws of exponent above 1 always do. One under way as a run begins is
-    undrawn. In a circle of radius c the spring must stay within half a turn, |F_t| < k_t π c; other runs are refused. A
-    law that adheres, N < 0, has the limit 0 there: the slider follows without force.
+    undrawn. In a circle of radius c the spring must stay within half a turn, |F_t| < k_t π c; other runs are refused.
+    Where a law pulls, N < 0, or is cut, N = 0, the slider is free as in an open contact: it follows without force, and
+    its way is no slip; where N grows again it begins as at an entry.
 
     Parameters
     ----------
@@ -70,12 +73,11 @@ class Friction:
 class Rubbing:
     """The law of a contact with its friction: the law itself, whose parameters go on with those of the slider.
 
-    To integrators a law with one border and two latched numbers, code and place of the slider; its border is not a C
-    function of δ and δ̇, see `compiled.sliding`.
+    To integrators a law with two latched numbers, code and place of the slider, and one border, or a second one where
+    N may fall to zero before the contact opens; they are no C functions of δ and δ̇, see `compiled.sliding`.
     """
 
-    borders = 1
-    events = ("stick", "slip")
+    events = ("stick", "slip", "free")
     segment_codes = ((-1.0, 0.0, 1.0, 2.0), ())
 
     def __init__(self, law: Any, friction: Friction, arm: float, spin: float) -> None:
@@ -89,6 +91,12 @@ class Rubbing:
 
     def __repr__(self) -> str:
         return f"{self.law!r} with {self.friction!r}"
+
+    @property
+    def borders(self) -> int:
+        """One of a law that is known to push while δ > 0, else two."""
+        *_, factor, damping = getattr(self.law, "inlined", None) or (1.0, 1.0)
+        return 2 if factor or damping else 1
 
     @property
     def place(self) -> int:
@@ -108,7 +116,14 @@ class Rubbing:
         numbers[: own.size] = own
         known = self.friction.mu, self.friction.stiffness, self.arm, self.spin, FREE
         numbers[self.place : self.place + SLIDER] = known
+        numbers[self.place + CUT] = self._switch(own)
         return numbers
+
+    def _switch(self, own: Array) -> int:
+        """Place of the parameter by which a law that is cut at zero differs from the one that is not, or -1."""
+        if getattr(self.law, "bend", None) != "force":
+            return -1
+        return int(np.flatnonzero(own != np.asarray(self.law.uncut.parameters))[0])
 
     def stored(self, delta: float, parameters: Array) -> float:
         """Energy of the law alone, J; that of the slider's spring is F_t²/2k_t."""

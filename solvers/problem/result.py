@@ -12,6 +12,7 @@ import numpy as np
 
 from solvers.problem import event_list as at
 from solvers.problem.frames import Columns
+from solvers.problem.friction import SLIDES
 from solvers.problem.matrices import Array
 from solvers.problem.system import stored_energy
 
@@ -153,7 +154,7 @@ class FrictionLog(Columns):
     contact : index of the contact. name : what it is called. t_in, t_out : s.
     angle_in, angle_out : rad, of the place in its circular clearance; NaN of an oblique stop.
     speed_in, speed_out : m/s, ξ̇ of the surface. peak_friction : N, the largest |F_t|. impulse : N s, ∫F_t dt.
-    slip : m, the way of the slider. energy_loss : J, lost by friction.
+    slip : m, the way of the slider in slip, while N > 0. energy_loss : J, lost by friction.
     """
 
     contact: Any
@@ -204,7 +205,7 @@ class Transitions(Columns):
     Attributes
     ----------
     contact : index of the contact. name : what it is called. t : s. border : its index among those of the law.
-    event : what it was, by the law's names, such as "stick" and "slip".
+    event : what it was, by the law's names, such as "stick" and "slip"; "free" of friction where its contact pulls.
     delta, delta_dot, force : m, m/s and N as the border was met.
     impulse : N s, and work : J, done by the law's force since the run began, before the border.
     """
@@ -250,6 +251,8 @@ class Transitions(Columns):
                 slips[key] = self.delta[i]
             elif self.event[i] == "stick" and key in slips:
                 path[i] = abs(self.delta[i] - slips.pop(key))
+            elif self.event[i] == "free":
+                slips.pop((self.contact[i], SLIDES), None)
         return path
 
 

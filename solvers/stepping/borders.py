@@ -30,8 +30,7 @@ from solvers.compiled.sliding import (
     WAY,
     move_point,
     point_of,
-    pressed_margin,
-    slider_margin,
+    slider_margins,
     way_tolerance,
 )
 from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
@@ -60,14 +59,16 @@ def _present_of_slider(problem, state, space, s, t, x, rate):
     scale[1] = max(scale[1], rate_tolerance(problem, s, x))
     way, speed = way_tolerance(problem, s, t, x)
     scale[2], scale[3] = max(scale[2], 4.0 * way), max(scale[3], speed)
-    present = slider_margin(problem, s, state.segment[s], state.entry_rate[s], point)
-    space.present[s, 0], space.rounding[s, 0] = present, 1e-15 * abs(present)
-    present = pressed_margin(problem, s, state.segment[s], state.entry_rate[s], point)
+    segment, entry, present, count = state.segment[s], state.entry_rate[s], space.present[s], problem.border_count[s]
+    slider_margins(problem, s, segment, entry, point, present)
+    for j in range(count):
+        space.rounding[s, j] = 1e-15 * abs(present[j])
     for i in range(4):
         copy(point, moved, POINT)
         moved[i if i < 2 else WAY if i == 2 else SPEED] += scale[i]
-        value = pressed_margin(problem, s, state.segment[s], state.entry_rate[s], moved)
-        space.rounding[s, 0] += abs(value - present)
+        slider_margins(problem, s, segment, entry, moved, space.one)
+        for j in range(count):
+            space.rounding[s, j] += abs(space.one[j] - present[j])
 
 
 @inner
@@ -101,7 +102,9 @@ def _watch(problem, state, space, h, s):
     motion_of(problem, s, state.x, space.dense, space.coefficients)
     if rubs(problem, s):
         for i in range(_NODES.size):
-            space.margin[i] = _slider_margin_at(problem, state, space, h, s, _NODES[i])
+            _slider_margins_at(problem, state, space, h, s, _NODES[i])
+            for j in range(problem.border_count[s]):
+                space.margin[_NODES.size * j + i] = space.one[j]
         return
     for i in range(_NODES.size):
         space.points[0, i] = polynomial(space.coefficients[0], _NODES[i])
@@ -110,10 +113,10 @@ def _watch(problem, state, space, h, s):
 
 
 @inner
-def _slider_margin_at(problem, state, space, h, s, theta):
-    """Margin of friction at θ of the step."""
+def _slider_margins_at(problem, state, space, h, s, theta):
+    """Margins of friction at θ of the step, into ``space.one``."""
     point_at(problem, s, state.now[T], h, theta, space.coefficients, space.point[1])
-    return slider_margin(problem, s, state.segment[s], state.entry_rate[s], space.point[1])
+    slider_margins(problem, s, state.segment[s], state.entry_rate[s], space.point[1], space.one)
 
 
 @inner
@@ -127,9 +130,10 @@ def _beyond(known, theta):
 
 @inner
 def _slider_beyond(known, theta):
-    """Minus the margin of friction at θ of the step."""
-    problem, state, space, h, s, _ = known
-    return -_slider_margin_at(problem, state, space, h, s, theta)
+    """Minus a margin of friction at θ of the step."""
+    problem, state, space, h, s, j = known
+    _slider_margins_at(problem, state, space, h, s, theta)
+    return -space.one[j]
 
 
 @inner
@@ -211,8 +215,8 @@ def border_apart(problem, state, space, h, s, j):
     time, present = _AHEAD * h, space.present[s, j]
     if rubs(problem, s):
         move_point(space.point[0], time, space.point[1])
-        later = slider_margin(problem, s, state.segment[s], state.entry_rate[s], space.point[1])
-        return -present, (present - later) / time, space.rounding[s, j]
+        slider_margins(problem, s, state.segment[s], state.entry_rate[s], space.point[1], space.one)
+        return -present, (present - space.one[j]) / time, space.rounding[s, j]
     space.trial[0] = delta + time * dot(problem.read[problem.first[s]], space.rate_new, 2 * problem.k.size)
     space.trial[1] = rate + time * acceleration_of(problem, s, space.x_new, space.rate_new)
     margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.one)
@@ -243,7 +247,7 @@ def renew_together(problem, state, space, h, element, border):
         delta, rate = _present(problem, state, space, s, state.now[T], state.x, state.rate)
         if rubs(problem, s):
             move_point(space.point[0], -_BEFORE * h, space.point[1])
-            space.one[0] = slider_margin(problem, s, state.segment[s], state.entry_rate[s], space.point[1])
+            slider_margins(problem, s, state.segment[s], state.entry_rate[s], space.point[1], space.one)
         else:
             margins_before(problem, state, s, delta, rate, _BEFORE * h, space.trial, space.one)
         for j in range(problem.border_count[s]):

@@ -157,7 +157,7 @@ def _side(problem, state, space, s, theta, lowest, batch):
     side = 2 if space.kinks[s] & 2 and rate > 0.0 else 0
     if space.kinks[s] & 1 and delta > lowest:
         force = force_at(problem, s, delta, rate, state.entry_rate[s], batch)
-        side += 1 if (force <= 0.0 if rubs(problem, s) else force == 0.0) else 0
+        side += 1 if force == 0.0 else 0
     return side
 
 

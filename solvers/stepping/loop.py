@@ -149,13 +149,8 @@ def march(step, rate_of, gained, problem, state, space, budget, steps, tolerance
     ``rate_of`` writes the rate of a state as `rhs` does, ``gained`` says whether the run gains energy; ``steps`` are
     the longest in flight and in contact, s, ``tolerances`` (rtol, atol).
     """
-    now, count, t_end, (dt_flight, dt_contact), (rtol, atol) = (
-        state.now,
-        state.count,
-        state.now[T_END],
-        steps,
-        tolerances,
-    )
+    now, count, (dt_flight, dt_contact), (rtol, atol) = state.now, state.count, steps, tolerances
+    t_end = now[T_END]
     not_finite, by_hand = False, False
     nearest = 0.0  # a kink nearer than this has been reached: there rounding switches the law to and fro
     for _ in range(budget):

@@ -212,7 +212,7 @@ def is_dissipative(law: Any) -> bool:
 
 
 def kinks_of(system: System) -> list[int]:
-    """Per stop: 1 where the law, or its friction, is cut at zero while δ > 0, plus 2 where it bends at δ̇ = 0."""
+    """Per stop: 1 where the law is cut at zero while δ > 0, plus 2 where it bends at δ̇ = 0."""
     found: list[int] = system.about_laws.get("kinks", lambda: [_kinks(contact.law) for contact in system.contacts])
     return found
 
@@ -221,10 +221,8 @@ def _kinks(law: Any) -> int:
     """The same of a law, from samples of its force: a user's law need not declare them."""
     delta = 2.0 * _depth(law, 1.0, EXPECTED_SPEED) * np.geomspace(1e-6, 1.0, 13)
     with np.errstate(all="ignore"):
-        rubs = isinstance(law, Rubbing)  # friction ends where the force is negative
-        cut = (rubs or not getattr(law, "memory", ())) and any(
-            np.any(force <= 0.0 if rubs else force == 0.0)
-            for force in (law.force(delta, rate, EXPECTED_SPEED) for rate in (-1e3, -1.0, 1.0))
+        cut = (isinstance(law, Rubbing) or not getattr(law, "memory", ())) and any(
+            np.any(law.force(delta, rate, EXPECTED_SPEED) == 0.0) for rate in (-1e3, -1.0, 1.0)
         )
         leaving, rest, entering = (law.force(delta, rate, EXPECTED_SPEED) for rate in (-1e-4, 0.0, 1e-4))
         bent = np.abs(leaving - 2.0 * rest + entering) > 1e-2 * np.abs(entering - leaving) + 1e-13 * np.abs(rest)

@@ -14,7 +14,7 @@ import math
 
 from numba import types
 
-from solvers.compiled.friction import TURN, drawn, friction_force
+from solvers.compiled.friction import TURN, drawn, slip_of, speed_of, way_of
 from solvers.compiled.kernels import (
     REAL,
     copy,
@@ -25,12 +25,11 @@ from solvers.compiled.kernels import (
     place_of,
     radius_of,
     row_of,
-    slide,
     slide_of,
     slider_of,
 )
 from solvers.compiled.parts import RUB_FORCES, RUB_GUESS, RUB_NEWTON, RUB_WITHIN, RUB_WORK, part
-from solvers.compiled.simd import load8, sum8
+from solvers.compiled.simd import load8, positive8, splat8, store8, sum8
 from solvers.compiled.state import CALLS, T, acts
 from solvers.compiled.sums import above, combine
 from solvers.exponential.circles.contact import radial_forces, work_in_circle
@@ -62,30 +61,38 @@ def nearest_way(way, known, radius):
 def slide_at_nodes(problem, scratch, s):
     """ξ and ξ̇ at the nodes from the motion of the rows; ξ does not jump by a turn between two nodes."""
     first, own, radius = row_of(problem, s), slider_of(problem, s), radius_of(problem, s)
-    u, w, third, slid = scratch.motion[first], scratch.motion[first + 1], count_of(problem, s) > 2, scratch.slid[s]
-    turned, turning = 0.0, 0.0
+    u, w, slid, third = scratch.motion[first], scratch.motion[first + 1], scratch.slid[s], count_of(problem, s) > 2
+    _ways_at_nodes(problem, scratch, s)
     for i in range(S):
-        if third:
-            turned, turning = -scratch.motion[first + 2, 0, i], -scratch.motion[first + 2, 1, i]
-        way, slid[SPEEDS, i] = slide(
-            radius, own, scratch.node_time[i], u[0, i], u[1, i], w[0, i], w[1, i], turned, turning
-        )
-        slid[WAYS, i] = nearest_way(way, slid[WAYS, i - 1], radius) if i > 0 else way
+        turning = -scratch.motion[first + 2, 1, i] if third else 0.0
+        slid[SPEEDS, i] = speed_of(radius, own, u[0, i], u[1, i], w[0, i], w[1, i], turning)
 
 
 @inlined
-def _add_sideways(problem, scratch, s, i, force):
-    """Add F_t ∂ξ/∂y to the forces on the rows at node i."""
-    first, out = row_of(problem, s), scratch.law_force
+def _ways_at_nodes(problem, scratch, s):
+    """ξ alone."""
+    first, own, radius = row_of(problem, s), slider_of(problem, s), radius_of(problem, s)
+    u, w, ways = scratch.motion[first, 0], scratch.motion[first + 1, 0], scratch.slid[s, WAYS]
+    third = count_of(problem, s) > 2
+    for i in range(S):
+        turned = -scratch.motion[first + 2, 0, i] if third else 0.0
+        way = way_of(radius, own, scratch.node_time[i], u[i], w[i], turned)
+        ways[i] = nearest_way(way, ways[i - 1], radius) if i > 0 else way
+
+
+@inlined
+def _add_sideways(problem, scratch, s):
+    """Add F_t ∂ξ/∂y to the forces on the rows at the nodes."""
+    first, out, force = row_of(problem, s), scratch.law_force, load8(scratch.slid[s, TANGENTIAL], 0)
     if not is_circle(problem, s):
-        out[first + 1, i] = -force
+        store8(out[first + 1], 0, splat8(0.0) - force)
         return
-    u, w = scratch.motion[first, 0, i], scratch.motion[first + 1, 0, i]
-    share = force * abs(radius_of(problem, s)) / (u * u + w * w)
-    out[first, i] -= share * w
-    out[first + 1, i] += share * u
+    u, w = load8(scratch.motion[first, 0], 0), load8(scratch.motion[first + 1, 0], 0)
+    share = splat8(abs(radius_of(problem, s))) * force / (u * u + w * w)
+    store8(out[first], 0, load8(out[first], 0) - share * w)
+    store8(out[first + 1], 0, load8(out[first + 1], 0) + share * u)
     if count_of(problem, s) > 2:
-        out[first + 2, i] = -math.copysign(force, force * slider_of(problem, s)[ARM])
+        store8(out[first + 2], 0, splat8(-math.copysign(1.0, slider_of(problem, s)[ARM])) * force)
 
 
 @inner
@@ -99,10 +106,13 @@ def _forces(problem, tables, state, scratch, s):
         above(motion[0], problem.knots[s, 0], scratch.clipped)
         law_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], scratch.law_force[place])
         state.count[CALLS] += S
-    slide_at_nodes(problem, scratch, s)
-    for i in range(S):
-        slid[TANGENTIAL, i] = friction_force(radius, own, slid[WAYS, i], scratch.law_force[place, i])
-        _add_sideways(problem, scratch, s, i, slid[TANGENTIAL, i])
+    if own[CODE] == 0.0:
+        _ways_at_nodes(problem, scratch, s)
+        for i in range(S):
+            slid[TANGENTIAL, i] = own[STIFFNESS] * drawn(radius, own, slid[WAYS, i])
+    else:
+        store8(slid[TANGENTIAL], 0, splat8(share_of(own)) * positive8(load8(scratch.law_force[place], 0)))
+    _add_sideways(problem, scratch, s)
 
 
 @part(RUB_FORCES, types.void, types.int64)
@@ -167,9 +177,9 @@ def spring_of(own):
 
 
 @inlined
-def share_of(own, normal):
-    """∂F_t/∂N; at N = 0, where a landing ends, that of the contact."""
-    return own[CODE] * own[MU] if abs(own[CODE]) == 1.0 and normal >= 0.0 else 0.0
+def share_of(own):
+    """∂F_t/∂N; at N = 0, where slip ends, that of the slip."""
+    return slip_of(own) * own[MU]
 
 
 @inner
@@ -180,7 +190,7 @@ def row_slopes(problem, s, motion, i, rate, normal, tangential, by_delta, by_rat
     """
     own, radius, m, sigma = slider_of(problem, s), radius_of(problem, s), count_of(problem, s), sigma_of(problem, s)
     u, w = motion[0, 0, i], motion[1, 0, i]
-    r, drawn_by, pressed_by = math.sqrt(u * u + w * w), spring_of(own), share_of(own, normal)
+    r, drawn_by, pressed_by = math.sqrt(u * u + w * w), spring_of(own), share_of(own)
     for b in range(m):
         away, aside = _ways(sigma, radius, own, u, w, b)
         turning = (sigma * motion[b, 1, i] - rate * sigma * away) / r if sigma != 0.0 and b < 2 else 0.0
@@ -254,7 +264,7 @@ def work_with_friction(problem, tables, state, scratch, node_set, level, s):
     impulse = h * sum8(load8(weights, 0) * load8(slid[TANGENTIAL], 0))
     state.x[account] += work
     state.x[account + 1] += impulse
-    state.x[account + 2] += own[CODE] * (end - begin)
+    state.x[account + 2] += slip_of(own) * (end - begin)
     rows = work_in_circle(problem, tables, state, scratch, node_set, level, s)
     return rows - work + own[ARM] * own[SPIN] * impulse
 
@@ -292,5 +302,5 @@ def work_within_rubbing(problem, tables, scratch, s, first):
         push += weights[i] * normal
         rubbed += weights[i] * tangential * speed
         drag += weights[i] * tangential
-        way += weights[i] * scratch.between[first - 1, i] * own[CODE] * speed
+        way += weights[i] * scratch.between[first - 1, i] * slip_of(own) * speed
     return pressed, push, rubbed, drag, way

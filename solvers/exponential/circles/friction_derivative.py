@@ -5,7 +5,7 @@ At fixed time the forces on the rows change by their slopes, `friction.row_slope
     dF_t = -k_t ds in stick,  ±μ dN in slip,   dN by the latched entry rate.
 
 s is latched at entry, ds = dξ + ξ̇ dt*, and where slip ends, at s = ξ - F_t/k_t: its slope by time is zero there, so
-that ds = dξ - dF_t/k_t does not depend on when. F_t is continuous at both borders. A parameter adds what the forces
+that ds = dξ - dF_t/k_t does not depend on when. F_t is continuous at all borders. A parameter adds what the forces
 change by at fixed motion, a difference of the two laws ahead and behind.
 """
 
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from solvers.compiled.friction import friction_force
 from solvers.compiled.kernels import (
-    call_gradient,
+    acceleration_of,
     contact_forces,
     copy,
     dot,
@@ -24,11 +24,12 @@ from solvers.compiled.kernels import (
     inner,
     place_of,
     radius_of,
+    rhs,
     row_of,
     slide_of,
     slider_of,
 )
-from solvers.compiled.sliding import begin_slider, end_slider, normal_force, renew_slider
+from solvers.compiled.sliding import begin_slider, end_slider, normal_force, renew_slider, slopes_of
 from solvers.compiled.state import T
 from solvers.exponential.circles.derivative import change_of, explicit_change, is_parameter, row_change
 from solvers.exponential.circles.friction import (
@@ -42,7 +43,7 @@ from solvers.exponential.circles.friction import (
     ways_of,
 )
 from solvers.exponential.contact.nodes import S
-from solvers.problem.friction import CODE, SLIDER, STIFFNESS
+from solvers.problem.friction import CODE, FREE, SLIDER, STIFFNESS
 
 _OF_SLIDER = 1  # place of s among what is latched
 
@@ -113,27 +114,42 @@ def _place_of_slider(problem, s, entry_rate, segment, t, x):
 
 
 @inner
-def pass_slider(problem, ahead, behind, past, derivatives, variation, s):
-    """Stick or slip ends."""
-    t, own, batch, entry = past.now[T], slider_of(problem, s), derivatives.batch, past.entry_rate[s]
-    sticks, explicit = own[CODE] != 0.0, 0.0
-    if sticks and variation.law_step > 0.0:
-        explicit = _place_of_slider(ahead, s, entry, past.segment[s], t, past.x)
-        explicit -= _place_of_slider(behind, s, entry, past.segment[s], t, past.x)
-        explicit /= 2.0 * variation.law_step
-    batch[0], batch[1] = indentation(problem, s, past.x), indentation_rate(problem, s, past.x)
-    results = batch[2:3], batch[3:4], batch[4:5]
-    call_gradient(problem.gradient[s], 1, batch[0:1], batch[1:2], entry, problem.parameters[s], results)
-    normal = normal_force(problem, s, past.segment[s], entry, batch[0], batch[1])
-    share = share_of(own, normal) / own[STIFFNESS]
+def _by_law(problem, ahead, behind, past, variation, s):
+    """Changes of N and of ξ - F_t/k_t at fixed motion per unit of a parameter of the laws."""
+    if variation.law_step == 0.0:
+        return 0.0, 0.0
+    entry, segment, t, x, width = past.entry_rate[s], past.segment[s], past.now[T], past.x, 2.0 * variation.law_step
+    place = _place_of_slider(ahead, s, entry, segment, t, x) - _place_of_slider(behind, s, entry, segment, t, x)
+    delta, rate = indentation(problem, s, x), indentation_rate(problem, s, x)
+    pressed = normal_force(ahead, s, segment, entry, delta, rate)
+    return (pressed - normal_force(behind, s, segment, entry, delta, rate)) / width, place / width
+
+
+@inner
+def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
+    """Stick, slip or the freedom of a slider ends; where it sticks from then on, s is latched.
+
+    Behind a slip ds does not depend on when; where N begins to grow, ds = dξ + ξ̇ dt*, dt* = -dN/Ṅ.
+    """
+    t, own, entry = past.now[T], slider_of(problem, s), past.entry_rate[s]
+    rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
+    was, share, by_law = own[CODE], share_of(own) / own[STIFFNESS], _by_law(problem, ahead, behind, past, variation, s)
+    delta, rate = indentation(problem, s, past.x), indentation_rate(problem, s, past.x)
+    acceleration = acceleration_of(problem, s, past.x, derivatives.rate[0])
+    normal_force(problem, s, past.segment[s], entry, delta, rate)
+    by_delta, by_rate, by_entry = slopes_of(problem, s, entry)
+    growing, speed = by_delta * rate + by_rate * acceleration, slide_of(problem, s, t, past.x)[1]
+    out = derivatives.batch[5:8]
+    renew_slider(problem, s, j, entry, past.segment[s], t, past.x, derivatives.rate[0], out)
     for c in range(derivatives.y.shape[0]):
-        pressed = batch[2] * change_of(problem, variation, derivatives, past.x, c, s, 0, t)
-        pressed += batch[3] * change_of(problem, variation, derivatives, past.x, c, s, 1, t)
-        pressed += batch[4] * derivatives.entry[c, s]
+        pressed = by_delta * change_of(problem, variation, derivatives, past.x, c, s, 0, t)
+        pressed += by_rate * change_of(problem, variation, derivatives, past.x, c, s, 1, t)
+        pressed += by_entry * derivatives.entry[c, s]
         found = way_change(problem, variation, derivatives, past.x, c, s, t) - share * pressed
-        found += explicit if is_parameter(variation, derivatives, c) else 0.0
-        derivatives.latched[c, _place(problem, s)] = found if sticks else 0.0
-    renew_slider(problem, s, entry, past.segment[s], t, past.x, batch[5:8])
+        if is_parameter(variation, derivatives, c):
+            pressed, found = pressed + by_law[0], found + by_law[1]
+        found -= speed * pressed / growing if was == FREE and growing != 0.0 else 0.0
+        derivatives.latched[c, _place(problem, s)] = found if own[CODE] == 0.0 else 0.0
     _keep_together(problem, ahead, behind, variation, s)
 
 
@@ -190,7 +206,7 @@ def rubbing_residual(problem, tables, scratch, derivatives, variation, node_set,
     for i in range(S):
         t = begin + tables.contact_step[level] * tables.times[node_set, i]
         along = derivatives.entry[c, s] * scratch.slope[s, 2, i]
-        aside = share_of(own, scratch.law_force[at, i]) * along - spring_of(own) * latched
+        aside = share_of(own) * along - spring_of(own) * latched
         if parameter and variation.law_step > 0.0:
             along, aside = along + derivatives.by_rows[first, i], aside + derivatives.by_rows[first + 1, i]
         for a in range(m):
@@ -236,7 +252,7 @@ def add_rubbing_change(problem, ahead, behind, derivatives, variation, s, entry_
     for c in range(derivatives.y.shape[0]):
         y, latched = derivatives.trial[c], derivatives.latched[c, _place(problem, s)]
         along = by_entry * derivatives.entry[c, s]
-        aside = share_of(own, normal) * along - spring_of(own) * latched
+        aside = share_of(own) * along - spring_of(own) * latched
         if is_parameter(variation, derivatives, c):
             along, aside = along + pressed, aside + rubbed
         for a in range(m):

@@ -24,10 +24,9 @@ from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
 from solvers.exponential.contact.slider_margins import (
     ENDS,
-    slider_margin_in,
-    slider_margin_landed,
     slider_margins_around,
     slider_margins_at_nodes,
+    slider_margins_in,
     slider_margins_on_step,
 )
 
@@ -48,7 +47,7 @@ _CLEAR = 0.03  # the lowest margin between them, in the same units, that counts 
 def margins_of(problem, state, scratch, s, t, x, out):
     """Margins of element s in the state x at time t; returns δ and δ̇."""
     if rubs(problem, s):
-        out[0] = slider_margin_in(problem, state, scratch, s, t, x, 0.0)
+        slider_margins_in(problem, state, scratch, s, t, x, 0.0, out)
         return indentation(problem, s, x), indentation_rate(problem, s, x)
     return margins_in(problem, state, s, x, scratch.trial, out)
 
@@ -57,7 +56,7 @@ def margins_of(problem, state, scratch, s, t, x, out):
 def margins_later(problem, state, scratch, s, t, x, time, out):
     """The same a time later than x, by the rates there."""
     if rubs(problem, s):
-        out[0] = slider_margin_in(problem, state, scratch, s, t, x, time)
+        slider_margins_in(problem, state, scratch, s, t, x, time, out)
         return
     rhs(problem, t, x, state.segment, state.entry_rate, state.rate, scratch.trial)
     delta, rate = indentation(problem, s, x), indentation_rate(problem, s, x)
@@ -290,7 +289,7 @@ def passed(problem, state, scratch, element, border, w, x):
     """(element, border) of the margin that has gone furthest below zero between the states w and x, or (-1, -1).
 
     The border landed on is left out, and what has been carried over by rounding only. The element is `UNRESOLVED` if a
-    margin may have been below zero in between.
+    margin may have been below zero in between, or is so at the start: that border is passed before any step.
     """
     worst, found, which, dips = -_TOGETHER, -1, -1, False
     for s in range(problem.law.size):
@@ -298,15 +297,13 @@ def passed(problem, state, scratch, element, border, w, x):
         if _is_without(problem, state, s):
             continue
         margins_of(problem, state, scratch, s, w[size], w, scratch.ends)
-        if rubs(problem, s):
-            scratch.margin[0] = slider_margin_landed(problem, state, scratch, s, x[size], x)
-        else:
-            margins_of(problem, state, scratch, s, x[size], x, scratch.margin)
+        margins_of(problem, state, scratch, s, x[size], x, scratch.margin)
         near = False
         for j in range(count):
             if s == element and j == border:
                 continue
             near |= min(scratch.ends[j], scratch.margin[j]) < _ENDS_NEAR * scratch.largest[s, j]
+            dips |= scratch.ends[j] < -max(scratch.noise[s, j], _MISSED * scratch.largest[s, j])
             if scratch.margin[j] >= -scratch.noise[s, j]:
                 continue
             share = scratch.margin[j] / max(scratch.ends[j], scratch.noise[s, j])

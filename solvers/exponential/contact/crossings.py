@@ -32,6 +32,8 @@ from solvers.compiled.kernels import (
     merged,
     push_of,
     row_of,
+    rubs,
+    slider_of,
 )
 from solvers.compiled.parts import BOUNDS, LEAVES, SIDE, part
 from solvers.compiled.simd import largest8, least8, load8, splat8, store8
@@ -43,6 +45,7 @@ from solvers.exponential.contact.node_response import RTOL, motion_of, respond, 
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import largest_indentation
 from solvers.exponential.flight import energy_norms
+from solvers.problem.friction import PEAK
 
 RATE, FORCE = 1.0, 2.0  # kinds of bends in Tables.bend; 0 for a law that has none
 CLEAR, TOO_LONG = -1, -2  # of a landing: no other event before it, or one that requires shorter steps
@@ -295,27 +298,46 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
                 return TOO_LONG
         if not bends and tables.bend[s] == FORCE and _pulls_inside(scratch.stages, size + 3 + 2 * s, width):
             return TOO_LONG
-        if _force_turns(scratch.stages, size + 3 + 2 * s, width, state.active[s, PEAK_FORCE]):
+        if _force_turns(scratch.stages, size + 3 + 2 * s, width, state.active[s, PEAK_FORCE], 1.0):
+            return TOO_LONG
+        if rubs(problem, s) and _friction_turns(problem, scratch.stages, width, s):
             return TOO_LONG
     return CLEAR
 
 
+@inner
+def _friction_turns(problem, work, width, s):
+    """The same of |F_t|."""
+    column = problem.friction[s, 1] + 1
+    sign = math.copysign(1.0, work[0, column] + work[STAGES - 2, column])
+    return _force_turns(work, column, width, slider_of(problem, s)[PEAK], sign)
+
+
 @merged
-def _force_turns(work, column, width, known):
-    """Whether a force, the rate of the impulse over that of time, has a maximum above ``known`` inside a landing."""
-    if work[0, column] / work[0, width] < 0.5 * known:  # too far below the peak for a higher maximum
-        return False
+def _force_turns(work, column, width, known, sign):
+    """Whether a force, the rate of the impulse over that of time, has a maximum above ``known`` inside a landing.
+
+    It is the force times ``sign``.
+    """
+    if work[0, width] == 0.0 or _at_stage(work, column, width, sign, 0) < 0.5 * known:
+        return False  # too far below the peak for a higher maximum, or it begins at an entry
     last, highest = STAGES - 1 if work[STAGES - 1, width] != 0.0 else STAGES - 2, known
     for i in range(1, last):
-        if work[i, column] / work[i, width] > highest:
-            highest = work[i, column] / work[i, width]
-    ends = max(work[0, column] / work[0, width], work[last, column] / work[last, width])
+        if _at_stage(work, column, width, sign, i) > highest:
+            highest = _at_stage(work, column, width, sign, i)
+    ends = max(_at_stage(work, column, width, sign, 0), _at_stage(work, column, width, sign, last))
     if max(highest, ends) <= known:
         return False
     turns = highest > ends
     for i, j, k in ((0, 1, 2), (8, 10, last)):
-        turns |= _turns_at(work, column, width, i, j, k)
+        turns |= _turns_at(work, column, width, sign, i, j, k)
     return turns
+
+
+@inlined
+def _at_stage(work, column, width, sign, i):
+    """A force, times the sign, at a stage."""
+    return sign * work[i, column] / work[i, width]
 
 
 @merged
@@ -328,9 +350,10 @@ def _pulls_inside(work, column, width):
 
 
 @inlined
-def _turns_at(work, column, width, i, j, k):
+def _turns_at(work, column, width, sign, i, j, k):
     """Whether the parabola through a force at three stages has its maximum between them."""
-    a, b, c = work[i, column] / work[i, width], work[j, column] / work[j, width], work[k, column] / work[k, width]
+    a, b = _at_stage(work, column, width, sign, i), _at_stage(work, column, width, sign, j)
+    c = _at_stage(work, column, width, sign, k)
     rise, fall = (b - a) / (C[j] - C[i]), (c - b) / (C[k] - C[j])
     bend = (fall - rise) / (C[k] - C[i])
     return bend < 0.0 and rise - bend * (C[j] - C[i]) > 0.0 > fall + bend * (C[k] - C[j])

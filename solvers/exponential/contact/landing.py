@@ -5,6 +5,7 @@ It is a step of DOP853 with t among the unknowns, in a variable in which the mot
     INDENTATION   dt = dδ/δ̇         lands exactly on a kink, or on another stop's surface
     ROOT          dt = κ u^{κ-1} du/δ̇, u = δ^{1/κ}, κ as at entry: lands exactly on δ = 0, where δ^{3/2} is singular
     TIME          dt                lands on a bend by the secant rule; the force is continuous there
+    SINCE         dt = κ u^{κ-1} du, u = (t - t_in)^{1/κ}: the same from an entry on, where δ^{3/2} is singular
 
 The unknowns are [p, v, energy balance, t, u]. The fastest block moves by less than `landing_reach` radians, within
 which the step of every block is exact to the tolerance. The error by the forces is estimated by a tenth of the embedded
@@ -32,6 +33,8 @@ from solvers.compiled.kernels import (
     merged,
     raised,
     row_of,
+    rubs,
+    slider_of,
 )
 from solvers.compiled.parts import PASSED
 from solvers.compiled.state import (
@@ -50,12 +53,14 @@ from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import land_on_circle
 from solvers.exponential.contact.borders import margins_later, margins_of, passed
 from solvers.exponential.contact.crossings import CLEAR, TOO_LONG, before_landing, side_at
-from solvers.exponential.contact.first_step import BALANCED
-from solvers.exponential.contact.landing_step import INDENTATION, ROOT, TIME, landing_step, start_landing
+from solvers.exponential.contact.first_step import BALANCED, NEW, NODE_SET
+from solvers.exponential.contact.landing_step import INDENTATION, ROOT, SINCE, TIME, landing_step, start_landing
 from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, REACH, RTOL, START
 from solvers.exponential.contact.peaks import state_peaks
+from solvers.problem.friction import PEAK
 
 _MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
+_MOST_HALVINGS = 40  # the same on a border, whose margin may hardly change but at the start
 _PART = 0.1  # of the embedded difference that counts as the error
 _PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
 _OF_SLOPES, _MOST_SLOPE = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
@@ -137,11 +142,13 @@ def _length_to(problem, tables, state, scratch, variable, stop, span, landed, ti
     left = (landed - time) / (landed - t) if landed > t else 0.0
     kappa = tables.time_exponent[1 + stop]
     length = span * (1.0 - (left ** (1.0 / kappa) if variable == ROOT else left))
+    if variable == SINCE:
+        length = span * (1.0 - left) ** (1.0 / kappa)
     while True:
         _step(problem, tables, state, scratch, variable, stop, length)
         late, tries = x[size] - time, tries + 1
-        pace = 1.0 if variable == TIME else indentation_rate(problem, stop, x)  # d(variable)/dt
-        if variable == ROOT:
+        pace = 1.0 if variable >= TIME else indentation_rate(problem, stop, x)  # d(variable)/dt
+        if variable in (ROOT, SINCE):
             pace /= kappa * raised(x[size + 1], kappa - 1.0)
         if not abs(late) > 1e-15 * landed or not abs(pace) < np.inf or tries == _MOST_TRIES:
             return length if abs(late) <= 1e-6 * (landed - t) + 1e-15 * landed else np.inf
@@ -152,10 +159,13 @@ def _length_to(problem, tables, state, scratch, variable, stop, span, landed, ti
 def _begin_peaks(problem, state, scratch):
     """Raise the peak forces by those at the start of a landing, which its first stage has computed."""
     work, size, first = scratch.stages, state.x.size, 2 * problem.k.size + 3
-    for s in range(state.segment.size):
+    for s in range(state.segment.size if work[0, size] != 0.0 else 0):
         if state.segment[s] > 0:
             column = first + 2 * s
             state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], work[0, column] / work[0, size])
+            if rubs(problem, s):
+                own, column = slider_of(problem, s), problem.friction[s, 1] + 1
+                own[PEAK] = max(own[PEAK], abs(work[0, column] / work[0, size]))
 
 
 @inner
@@ -184,7 +194,7 @@ def _accept(problem, tables, state, scratch, variable, stop, level, span):
     if state.event_record.shape[0]:
         write_event(state, LANDING, t, landed, span, variable, stop, w)
     state.now[T] = landed
-    if is_circle(problem, stop) and variable != TIME and landed < t_end:
+    if is_circle(problem, stop) and variable < TIME and landed < t_end:
         land_on_circle(problem, state, scratch, stop, level)
     if variable != ROOT or landed == t_end:  # at a knot the force may fall
         state_peaks(problem, state, scratch, state.x)
@@ -247,7 +257,7 @@ def land(problem, tables, state, scratch, stop, direction, near):
         return -1
     furthest, kappa = _furthest(problem, tables, scratch), tables.time_exponent[1 + stop]
     leaving = direction < 0 and state.segment[stop] == 1
-    start_landing(problem, tables, state, scratch, stop)
+    start_landing(problem, tables, state, scratch, stop, np.int64(ROOT))
     w, x = scratch.stages[START], scratch.stages[LANDED]
     variable = ROOT if leaving and kappa > 1.0 else INDENTATION
     span = -w[size + 1] if variable == ROOT else _level(problem, state, stop, direction) - scratch.start_motion[stop, 0]
@@ -296,6 +306,12 @@ def _rises(problem, state, scratch, s, border, time):
     return scratch.ends[border] < scratch.margin[border]
 
 
+@inlined
+def _between(above, below):
+    """A time between two, of which the first may be zero, or smaller by powers of ten."""
+    return math.sqrt(above * below) if above > 0.0 else 1e-3 * below
+
+
 @merged
 def land_on_bend(problem, tables, state, scratch, stop, border, near):
     """Try to land on the bend of ``stop``, or on a border of its law, about ``near`` s ahead; whether it succeeded.
@@ -309,27 +325,37 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near):
     scratch.landed[0] = -1
     if not 0.0 < near <= furthest:
         return False
-    start_landing(problem, tables, state, scratch, stop)
-    w, x = scratch.stages[START], scratch.stages[LANDED]
-    before, apart, span = 0.0, _apart(problem, tables, state, scratch, stop, border, w), near
+    variable, root = np.int64(TIME), 1.0  # a literal would be compiled for itself
+    if border >= 0 and scratch.control[NEW] and scratch.control[NODE_SET] == stop + 1:
+        variable, root = np.int64(SINCE), 1.0 / tables.time_exponent[stop + 1]
+    start_landing(problem, tables, state, scratch, stop, variable)
+    w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
+    furthest, span = furthest**root, near**root
+    before, apart = 0.0, _apart(problem, tables, state, scratch, stop, border, w)
     if (apart if border >= 0 else abs(apart)) <= 1e-6 * largest:  # it begins there: the secant needs another point
-        before = 0.9 * near
-        _step(problem, tables, state, scratch, np.int64(TIME), stop, before)
+        before = 0.9 * span
+        _step(problem, tables, state, scratch, variable, stop, before)
         apart = _apart(problem, tables, state, scratch, stop, border, x)
-    for _ in range(_MOST_TRIES):
-        _step(problem, tables, state, scratch, np.int64(TIME), stop, span)
+    above, below = before if apart > 0.0 else 0.0, furthest
+    for _ in range(_MOST_TRIES if border < 0 else _MOST_HALVINGS):
+        _step(problem, tables, state, scratch, variable, stop, span)
         value = _apart(problem, tables, state, scratch, stop, border, x)
         if abs(value) <= enough:
             break
         following = span - value * (span - before) / (value - apart)
         if abs(following - span) <= 1e-15 * span and border >= 0:
             break
-        if not 0.1 * near < following <= furthest or following == span:
+        if border >= 0:
+            above, below = (span, below) if value > 0.0 else (above, span)
+            if below < furthest and not above < following < below:
+                following = _between(above, below)
+        if not (0.1 * near if border < 0 else 0.0) < following <= furthest or following == span:
             return False
         before, apart, span = span, value, following
-    if not (abs(value) <= 1e-6 * largest and _error_in_time(problem, scratch, span) <= 1.0):
+    time = x[size] - w[size] if variable == SINCE else span
+    if not (abs(value) <= 1e-6 * largest and _error_in_time(problem, scratch, time) <= 1.0):
         return False
-    if border >= 0 and _rises(problem, state, scratch, stop, border, 1e-3 * span):  # it has been below zero before
+    if border >= 0 and _rises(problem, state, scratch, stop, border, 1e-3 * time):  # it has been below zero before
         return False
     if before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
         return False
@@ -339,5 +365,4 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near):
     lower, upper = problem.knots[stop, state.segment[stop] - 1], problem.knots[stop, state.segment[stop]]
     if not lower < indentation(problem, stop, x) < upper:
         return False
-    variable = np.int64(TIME)  # a literal would be compiled for itself
     return _accept(problem, tables, state, scratch, variable, stop, 0.0, span)

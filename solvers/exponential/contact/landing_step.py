@@ -16,13 +16,17 @@ from solvers.compiled.kernels import (
     add_push,
     call_force,
     copy,
+    delta_of,
     indentation,
     indentation_rate,
     inner,
     law_forces,
     merged,
+    no_friction,
     off_knots,
+    radius_of,
     raised,
+    rows_at,
     rubs,
     table_value,
     width_of,
@@ -35,7 +39,7 @@ from solvers.exponential.contact.node_response import BATCH, LANDED, START
 from solvers.exponential.energy.quadrature import powers
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 
-INDENTATION, ROOT, TIME = range(3)
+INDENTATION, ROOT, TIME, SINCE = range(4)
 _CHOICE = types.boolean, types.int64, types.int64  # types of with_energy, variable, stop
 
 
@@ -75,17 +79,24 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
             out[e] += load[e] * value
     out[size], out[size + 1] = powers(problem, tables, w[t], w) if with_energy else (0.0, 0.0)
     for s in range(problem.law.size):
-        force, rate = 0.0, 0.0
+        force, rate, rows = 0.0, 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         if segment[s] > 0:
-            rate = indentation_rate(problem, s, w)
-            delta = indentation(problem, s, w)
+            if rubs(problem, s):
+                rows = rows_at(problem, s, w)
+                delta, rate = delta_of(radius_of(problem, s), rows)
+            else:
+                rate = indentation_rate(problem, s, w)
+                delta = indentation(problem, s, w)
             force = _force(problem, tables, s, segment[s], delta, rate, side[s], entry_rate[s], batch)
             calls += 1
-            add_push(problem, s, force, w, out)
+            if rubs(problem, s):
+                add_friction(problem, s, w[t], rows, force, out)
+            else:
+                add_push(problem, s, force, w, out)
+        elif rubs(problem, s):
+            no_friction(problem, s, out)
         out[size + 2 + 2 * s] = force * rate
         out[size + 3 + 2 * s] = force
-        if rubs(problem, s):
-            add_friction(problem, s, w[t], segment[s] > 0, force, w, out)
     delta_dot = indentation_rate(problem, stop, w)
     factor = span
     if variable == INDENTATION:
@@ -93,10 +104,13 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
     elif variable == ROOT:
         kappa = tables.time_exponent[1 + stop]
         factor = span * kappa * raised(w[t + 1], kappa - 1.0) / delta_dot
+    elif variable == SINCE:
+        kappa = tables.time_exponent[1 + stop]
+        factor = span * kappa * raised(w[t + 1], kappa - 1.0)
     for e in range(t):
         out[e] *= factor
     out[t] = factor
-    out[t + 1] = span if variable == ROOT else 0.0
+    out[t + 1] = span if variable in (ROOT, SINCE) else 0.0
     return calls
 
 
@@ -115,9 +129,11 @@ def landing_step(problem, tables, with_energy, variable, stop, span, w, segment,
 
 
 @inner
-def start_landing(problem, tables, state, scratch, stop):
-    """Put the state at the start of a landing of ``stop``, with t and δ^{1/κ}, into ``scratch.stages[START]``."""
+def start_landing(problem, tables, state, scratch, stop, variable):
+    """Put the state at the start of a landing of ``stop``, with t and u, into ``scratch.stages[START]``."""
     w, size, delta = scratch.stages[START], state.x.size, max(indentation(problem, stop, state.x), 0.0)
     copy(state.x, w, size)
     kappa, root = tables.time_exponent[1 + stop], math.sqrt(delta)
     w[size], w[size + 1] = state.now[T], root if kappa == 2.0 else delta ** (1.0 / kappa)
+    if variable == SINCE:
+        w[size + 1] = 0.0

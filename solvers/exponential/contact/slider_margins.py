@@ -1,4 +1,4 @@
-"""Margins of friction in a step: how far stick and slip are from their ends, see `compiled.sliding`; peaks of F_t.
+"""Margins of a slider in a step of the main method, see `compiled.sliding`: at the nodes, at its ends, between nodes.
 
 They depend on ξ, ξ̇ and, in slip, Ṅ besides δ and δ̇. Ṅ of a law with a dashpot needs δ̈: in a state it follows from the
 equations of motion, at the nodes from the polynomial through δ̇ there and at the start of the step.
@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from numba import types
 
+from solvers.compiled.friction import friction_force
 from solvers.compiled.kernels import (
     VECTOR,
     copy,
-    force_at,
+    inlined,
     inner,
     merged,
     place_of,
@@ -21,68 +22,55 @@ from solvers.compiled.kernels import (
     slide_of,
     slider_of,
 )
-from solvers.compiled.parts import RUB_AROUND, RUB_IN, RUB_LANDED, RUB_MARGINS, RUB_PEAK, part
+from solvers.compiled.parts import RUB_AROUND, RUB_IN, RUB_MARGINS, RUB_PEAK, part
 from solvers.compiled.simd import largest8, load8, size8
 from solvers.compiled.sliding import (
     ACCELERATION,
-    DELTA,
-    NONE,
-    POINT,
-    RATE,
-    SPEED,
-    WAY,
     move_point,
+    normal_forces,
+    normal_slopes,
     point_of,
-    pressed_margin,
-    slider_margin,
+    slider_margins,
     way_tolerance,
 )
 from solvers.compiled.state import T, rate_tolerance, surface_tolerance
-from solvers.compiled.sums import combine
-from solvers.exponential.circles.friction import SPARE, SPEEDS, TANGENTIAL, WAYS, nearest_way
-from solvers.exponential.contact.crossings import FORCE
+from solvers.compiled.sums import above, combine
+from solvers.exponential.circles.friction import SPARE, SPEEDS, TANGENTIAL, WAYS, nearest_way, slide_at_nodes
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL_SLOPES, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
-from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR
-from solvers.problem.friction import CODE, MU, PEAK, SCRATCH, STIFFNESS
+from solvers.exponential.tables import EXPONENT
+from solvers.problem.friction import CODE, CUT, FREE, MU, PEAK, PRESSES, SLIDES, STIFFNESS
 
 ENDS = 6  # numbers in `Scratch.ends` for a border
 _SAME = 1e-11  # margin, in units of the largest of the step, that is rounding
 _DIFFERENCED = 1e-8  # the same where it contains the slope of a polynomial
 _REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
+_TINY = 1e-300  # m
+_SHARE = 1e-6  # of δ and δ̇ at a node, by which slopes of N are differenced
 
 
-@merged
-def margin_of(problem, state, s, point):
-    """Margin of an element with friction at a point."""
-    return slider_margin(problem, s, state.segment[s], state.entry_rate[s], point)
+@inlined
+def _slips(own):
+    """Whether a slider slips."""
+    return abs(own[CODE]) == 1.0
 
 
-@part(RUB_IN, types.float64, types.int64, types.float64, VECTOR, types.float64)
-def slider_margin_in(problem, state, scratch, s, t, x, later):
-    """The same in the state x at time t, or a time later by its rates."""
-    rhs(problem, t, x, state.segment, state.entry_rate, state.rate, scratch.numbers)
+@inlined
+def _pulls(problem, s):
+    """Whether N depends on the rate, so that it may pull."""
+    return problem.border_count[s] > PRESSES
+
+
+@part(RUB_IN, types.void, types.int64, types.float64, VECTOR, types.float64, VECTOR)
+def slider_margins_in(problem, state, scratch, s, t, x, later, out):
+    """Margins of an element with friction in the state x at time t, or a time later by its rates, which are left."""
     point, moved = scratch.point[0], scratch.point[1]
+    if later != 0.0 or (slider_of(problem, s)[CODE] != 0.0 and _pulls(problem, s)):
+        rhs(problem, t, x, state.segment, state.entry_rate, state.rate, scratch.numbers)
     point_of(problem, s, t, x, state.rate, point)
-    if later == 0.0:
-        return margin_of(problem, state, s, point)
     move_point(point, later, moved)
-    return margin_of(problem, state, s, moved)
-
-
-@part(RUB_LANDED, types.float64, types.int64, types.float64, VECTOR)
-def slider_margin_landed(problem, state, scratch, s, t, x):
-    """The same where a step ends that began in slip under N > 0; at N = 0 the slip goes on only if ξ̇ agrees with it.
-
-    A contact that opens with the other sign has stuck before. Where a law pulls as it opens the slider follows.
-    """
-    own = slider_of(problem, s)
-    pressed = own[CODE] != 0.0 and own[MU] * own[SCRATCH + 2] > NONE * own[PEAK]
-    margin = slider_margin_in(problem, state, scratch, s, t, x, 0.0)
-    if not pressed or own[MU] * own[SCRATCH + 2] < -NONE * own[PEAK]:
-        return margin
-    return pressed_margin(problem, s, state.segment[s], state.entry_rate[s], scratch.point[0])
+    slider_margins(problem, s, state.segment[s], state.entry_rate[s], moved, out)
 
 
 @merged
@@ -102,74 +90,128 @@ def _slopes_of_rates(tables, scratch, node_set, h, s, rates, out):
         out[i] = total / (h * kappa * nodes[i] ** (kappa - 1.0))
 
 
+@inlined
+def _slopes(problem, tables, state, s, delta, rate, normal, slope):
+    """N_δ and N_δ̇ at S points; of a power law that only pushes N_δ = p N/δ."""
+    if _pulls(problem, s):
+        normal_slopes(problem, s, S, delta, rate, state.entry_rate[s], slope[0], slope[1], slope[2])
+        return
+    for i in range(S):
+        slope[0, i], slope[1, i] = tables.power_law[s, EXPONENT] * normal[i] / max(delta[i], _TINY), 0.0
+
+
+@inner
+def _margins_at(problem, tables, state, scratch, s, delta, rate, speeds, drags, twice):
+    """Margins at S points into ``scratch.margin``, from N there in ``scratch.numbers``; ``twice`` is δ̈."""
+    own, margin, normal, slope = slider_of(problem, s), scratch.margin, scratch.numbers, scratch.slope[s]
+    slips, mu = _slips(own), own[MU]
+    if slips and mu > 0.0:
+        _slopes(problem, tables, state, s, delta, rate, normal, slope)
+    for i in range(S):
+        if _pulls(problem, s):
+            margin[S + i] = normal[i] if slips else 1.0
+        if own[CODE] == FREE:
+            margin[i] = -normal[i]
+        elif not slips:
+            margin[i] = mu * normal[i] - abs(drags[i])
+        else:
+            margin[i] = own[CODE] * speeds[i]
+            if mu > 0.0:
+                growing = slope[0, i] * rate[i]
+                growing += slope[1, i] * twice[i] if slope[1, i] != 0.0 else 0.0
+                margin[i] -= mu / own[STIFFNESS] * growing
+
+
 @inner
 def slider_margins_at_nodes(problem, tables, state, scratch, s, node_set, h):
-    """Margins at the nodes, into ``scratch.margin``."""
-    motion, slid, point = scratch.motion[place_of(problem, s)], scratch.slid[s], scratch.point[1]
-    _slopes_of_rates(tables, scratch, node_set, h, s, motion[1], slid[SPARE])
-    for i in range(S):
-        point[DELTA], point[RATE], point[ACCELERATION] = motion[0, i], motion[1, i], slid[SPARE, i]
-        point[WAY], point[SPEED] = slid[WAYS, i], slid[SPEEDS, i]
-        scratch.margin[i] = margin_of(problem, state, s, point)
+    """Margins at the nodes, into ``scratch.margin``; N and F_t there are known, but N without a cut at zero."""
+    place, slid, own = place_of(problem, s), scratch.slid[s], slider_of(problem, s)
+    motion = scratch.motion[place]
+    above(motion[0], problem.knots[s, 0], scratch.clipped)
+    copy(scratch.law_force[place], scratch.numbers, S)
+    if own[CUT] >= 0.0:
+        normal_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], scratch.numbers)
+    if _slips(own) and _pulls(problem, s):
+        _slopes_of_rates(tables, scratch, node_set, h, s, motion[1], slid[SPARE])
+    _margins_at(
+        problem, tables, state, scratch, s, scratch.clipped, motion[1], slid[SPEEDS], slid[TANGENTIAL], slid[SPARE]
+    )
 
 
 @merged
-def _change(problem, state, scratch, s, place, by):
-    """How much the margin at the last node changes with one number of the point there, kept among the spare ones."""
-    point = scratch.slid[s, SPARE]
-    before = pressed_margin(problem, s, state.segment[s], state.entry_rate[s], point)
-    known = point[place]
-    point[place] += by
-    after = pressed_margin(problem, s, state.segment[s], state.entry_rate[s], point)
-    point[place] = known
-    return abs(after - before)
+def _sensitivities(problem, tables, state, scratch, s):
+    """How much both margins at the last node change with δ, and with δ̇, per unit: (own, own, N, N), in size.
 
-
-@merged
-def _margin_at_start(problem, tables, state, scratch, s):
-    """Margin at the start of the step; of slip on N = 0, as at an entry, that with which N begins to grow.
-
-    Where a law has been cut at N = 0 its slope there is not known, but at the first node.
+    In slip the margin has slopes of N, which are differenced; those of a power law that only pushes are known.
     """
-    margin = slider_margin_in(problem, state, scratch, s, state.now[T], state.x, 0.0)
-    if slider_of(problem, s)[CODE] == 0.0 or scratch.law_force[place_of(problem, s), 0] <= 0.0:
-        return margin
-    pressed = pressed_margin(problem, s, state.segment[s], state.entry_rate[s], scratch.point[0])
-    return min(pressed, scratch.margin[0]) if pressed != margin and tables.bend[s] == FORCE else pressed
+    own, numbers, motion = slider_of(problem, s), scratch.local_motion, scratch.motion[place_of(problem, s)]
+    deltas, rates, slopes = numbers[KNOWN, :3], numbers[KNOWN, 3:6], numbers[FORCES]
+    delta, rate = max(motion[0, S - 1], problem.knots[s, 0]), motion[1, S - 1]
+    if not _pulls(problem, s):
+        p = tables.power_law[s, EXPONENT]
+        along, share = p * scratch.numbers[S - 1] / max(delta, _TINY), own[MU] / own[STIFFNESS]
+        if not _slips(own):
+            return own[MU] * along, 0.0, along, 0.0
+        return share * abs((p - 1.0) * along * rate) / max(delta, _TINY), share * along, along, 0.0
+    by = _SHARE * max(delta, 1e-300), _SHARE * max(abs(rate), scratch.reference_speed[s])
+    deltas[0], deltas[1], deltas[2] = delta, delta + by[0], delta
+    rates[0], rates[1], rates[2] = rate, rate, rate + by[1]
+    normal_slopes(problem, s, 3, deltas, rates, state.entry_rate[s], slopes[0:3], slopes[3:6], slopes[6:9])
+    along, aside = abs(slopes[0]), abs(slopes[3])
+    if own[CODE] == FREE:
+        return along, aside, along, aside
+    if not _slips(own):
+        return own[MU] * along, own[MU] * aside, along, aside
+    twice, share = scratch.slid[s, SPARE, S - 1], own[MU] / own[STIFFNESS]
+    growing = slopes[0] * rate + slopes[3] * twice
+    first = abs(slopes[1] * rate + slopes[4] * twice - growing) / by[0]
+    second = abs(slopes[2] * (rate + by[1]) + slopes[5] * twice - growing) / by[1]
+    return share * first, share * second, along, aside
 
 
 @part(RUB_MARGINS, types.void, *[types.int64] * 3)
 def slider_margins_on_step(problem, tables, state, scratch, s, node_set, level):
-    """Margins at the nodes and both ends of the step tried, largest one and rounding, as `borders` has them of laws.
+    """Margins at the nodes and both ends of the step tried, largest ones and rounding, as `borders` has them of laws.
 
     The point at the start stays in ``scratch.point[0]``.
     """
-    h, ends, n, r = tables.contact_step[level], scratch.ends, problem.k.size, row_of(problem, s)
-    ends[1] = slider_margin_in(problem, state, scratch, s, state.now[T] + h, scratch.x_new, 0.0)
+    h, ends, own, t = tables.contact_step[level], scratch.ends, slider_of(problem, s), state.now[T]
+    slide_at_nodes(problem, scratch, s)
     slider_margins_at_nodes(problem, tables, state, scratch, s, node_set, h)
-    copy(scratch.point[1], scratch.slid[s, SPARE], POINT)
-    ends[0] = _margin_at_start(problem, tables, state, scratch, s)
-    largest = max(abs(ends[0]), abs(ends[1]), largest8(size8(load8(scratch.margin, 0))))
-    way, speed = way_tolerance(problem, s, state.now[T], state.x)
+    of_delta, of_rate, of_normal, of_its_rate = _sensitivities(problem, tables, state, scratch, s)
+    slider_margins_in(problem, state, scratch, s, t + h, scratch.x_new, 0.0, scratch.fired)
+    for j in range(problem.border_count[s]):
+        ends[ENDS * j + 1] = scratch.fired[j]
+    slider_margins_in(problem, state, scratch, s, t, state.x, 0.0, scratch.fired)
+    way, speed = way_tolerance(problem, s, t, state.x)
     rest = _REST * scratch.reference_speed[s]
     delta, rate = surface_tolerance(problem, s, state.x), max(rate_tolerance(problem, s, state.x), rest)
-    noise = _change(problem, state, scratch, s, DELTA, delta) + _change(problem, state, scratch, s, RATE, rate)
-    noise += _change(problem, state, scratch, s, WAY, way)
-    noise += _change(problem, state, scratch, s, SPEED, max(speed, rest))
-    law = tables.power_law[s]
-    elastic = law[EXPONENT] > 0.0 and law[FACTOR] == 0.0 and law[DAMPING] == 0.0
-    differenced = slider_of(problem, s)[CODE] != 0.0 and not elastic
-    alias, ripple = tables.alias[tables.kind[node_set], level], 0.0
-    for a in range(2):
-        weight = tables.ripple_weight[r + a]
-        for place in (DELTA, WAY):
-            by = ripple_of(weight, alias, state.x, n)
-            ripple += _change(problem, state, scratch, s, place, by)
-        by = rate_ripple_of(weight, problem.k, alias, state.x, n)
-        ripple += _change(problem, state, scratch, s, SPEED, by)
-    ends[2], ends[3], ends[4], ends[5] = ends[0], ends[0], ends[0] + ripple, ends[0]
-    scratch.largest[s, 0] = largest
-    scratch.noise[s, 0] = max((_DIFFERENCED if differenced else _SAME) * largest, 2.0 * noise)
+    ripple, faster = _ripples(problem, tables, state, s, tables.alias[tables.kind[node_set], level])
+    slips, of_way = _slips(own), own[STIFFNESS] if own[CODE] == 0.0 else 0.0
+    for j in range(problem.border_count[s]):
+        by, of_speed = (of_delta, of_rate, of_way), 1.0 if slips else 0.0
+        if j == PRESSES:
+            by, of_speed = (of_normal, of_its_rate, 0.0), 0.0
+        end = ends[ENDS * j : ENDS * (j + 1)]
+        end[0] = scratch.fired[j]
+        end[2], end[3], end[4], end[5] = end[0], end[0], end[0], end[0]
+        if j == SLIDES or slips:
+            end[4] += (by[0] + by[2]) * ripple + of_speed * faster
+        largest = max(abs(end[0]), abs(end[1]), largest8(size8(load8(scratch.margin[S * j :], 0))))
+        noise = by[0] * delta + by[1] * rate + by[2] * way + of_speed * max(speed, rest)
+        differenced = j == SLIDES and slips and _pulls(problem, s)
+        scratch.largest[s, j] = largest
+        scratch.noise[s, j] = max((_DIFFERENCED if differenced else _SAME) * largest, 2.0 * noise)
+
+
+@inlined
+def _ripples(problem, tables, state, s, alias):
+    """Errors of δ or ξ, m, and of their rates, m/s, by blocks that the nodes do not resolve."""
+    ripple, faster, first = 0.0, 0.0, row_of(problem, s)
+    for r in range(first, first + 2):
+        ripple += ripple_of(tables.ripple_weight[r], alias, state.x, problem.k.size)
+        faster += rate_ripple_of(tables.ripple_weight[r], problem.k, alias, state.x, problem.k.size)
+    return ripple, faster
 
 
 @merged
@@ -194,14 +236,17 @@ def slider_margins_around(problem, tables, state, scratch, s, node_set, h, place
     _slide_around(problem, tables, state, scratch, node_set, h, s, place)
     begin, end = tables.local_interval[node_set, place, 0], tables.local_interval[node_set, place, 1]
     deltas, rates, ways = scratch.local_motion[DELTAS], scratch.local_motion[RATES], scratch.local_motion[FORCES]
-    slopes, point, kappa = scratch.slid[s, SPARE], scratch.point[1], tables.time_exponent[node_set]
-    combine(LOCAL_SLOPES, rates, S, None, slopes)
+    twice, kappa, drags = scratch.slid[s, SPARE], tables.time_exponent[node_set], scratch.trial
+    combine(LOCAL_SLOPES, rates, S, None, twice)
     for i in range(S):
+        deltas[i] = max(deltas[i], problem.knots[s, 0])
         sigma = begin + 0.5 * (LOCAL_SLOPES[S, i] + 1.0) * (end - begin)
         pace = h * kappa * sigma ** (kappa - 1.0) * 0.5 * (end - begin)
-        point[DELTA], point[RATE], point[WAY], point[SPEED] = deltas[i], rates[i], ways[i], ways[S + i]
-        point[ACCELERATION] = slopes[i] / pace if pace > 0.0 else scratch.point[0, ACCELERATION]
-        scratch.margin[i] = margin_of(problem, state, s, point)
+        twice[i] = twice[i] / pace if pace > 0.0 else scratch.point[0, ACCELERATION]
+    normal_forces(problem, s, S, deltas, rates, state.entry_rate[s], scratch.numbers)
+    for i in range(S):
+        drags[i] = friction_force(radius_of(problem, s), slider_of(problem, s), ways[i], scratch.numbers[i])
+    _margins_at(problem, tables, state, scratch, s, deltas, rates, ways[S:], drags, twice)
 
 
 @part(RUB_PEAK, types.void, types.int64, types.float64, types.int64, types.float64)
@@ -215,9 +260,9 @@ def peak_of_friction(problem, tables, state, scratch, node_set, h, s, limit):
             highest = i
     if highest < 0:
         return
-    largest = abs(slid[TANGENTIAL, highest])
-    own[PEAK] = max(own[PEAK], largest)
-    if largest < 0.95 * own[PEAK]:
+    known, largest = own[PEAK], abs(slid[TANGENTIAL, highest])
+    own[PEAK] = max(known, largest)
+    if largest < 0.95 * own[PEAK] or (limit >= 1.0 and _beside(tables, scratch, node_set, s, highest, known)):
         return
     begin, end = tables.local_interval[node_set, highest, 0], tables.local_interval[node_set, highest, 1]
     within = min(2.0 * (limit - begin) / (end - begin) - 1.0, 1.0)
@@ -232,8 +277,19 @@ def peak_of_friction(problem, tables, state, scratch, node_set, h, s, limit):
             values[i] = own[STIFFNESS] * abs(scratch.local_motion[FORCES, i] - shift)
     else:
         deltas, rates = scratch.local_motion[DELTAS], scratch.local_motion[RATES]
+        above(deltas, problem.knots[s, 0], deltas)
+        normal_forces(problem, s, S, deltas, rates, state.entry_rate[s], values)
         for i in range(S):
-            values[i] = own[MU] * max(
-                force_at(problem, s, deltas[i], rates[i], state.entry_rate[s], scratch.numbers), 0.0
-            )
+            values[i] = own[MU] * max(values[i], 0.0)
     own[PEAK] = max(own[PEAK], local_maximum(values, within, scratch.clipped))
+
+
+@merged
+def _beside(tables, scratch, node_set, s, highest, known):
+    """Whether the step has no maximum of |F_t| around its highest node: it lies beside the step, as F_t tells."""
+    drags, slopes = scratch.slid[s, TANGENTIAL], scratch.trial
+    combine(tables.summary[node_set], drags, S, None, slopes)
+    sign = 1.0 if drags[highest] > 0.0 else -1.0
+    if highest == S - 1:
+        return sign * slopes[7] >= 0.0  # still rising at the end, where the next step begins
+    return node_set == 0 and highest == 0 and sign * slopes[6] <= 0.0 and known >= sign * slopes[4]
