@@ -44,7 +44,6 @@ from solvers.compiled.state import (
     LOG_FULL,
     LOGGED,
     MOST_EVENTS_AT_ONCE,
-    NO_OUTPUT,
     RECORDED,
     REJECTED,
     RUNNING,
@@ -211,8 +210,7 @@ class Engine:
     def release(self) -> None:
         """Leave the workspace to another run; this run's state must not be read any more."""
         if not self.workspace.state.event_record.size:
-            if len(self.workspace.state.due) > 1:
-                self.workspace.replace(**NO_OUTPUT)
+            self.workspace.forget_outputs()
             self.prepared.spare_workspaces.append(self.workspace)
 
     def start(self) -> None:

@@ -14,6 +14,7 @@ from solvers.compiled.kernels import Problem, type_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned
 from solvers.compiled.parts import BORDERS, CIRCLES, ENERGY, EVERY_RUN, FRICTION, MANY_STOPS, TWO_STOPS, load
 from solvers.compiled.state import (
+    NO_OUTPUT,
     NO_ROWS,
     STATE,
     T_END,
@@ -59,13 +60,19 @@ class Workspace:
         begin_state(self.state, rest)
         self.rest = self.numbers.copy()
         self.own = self.state.x[: rest.size].reshape(2, -1)[:, :blocks]
-        self.replace(log=new_log(len(self.state.segment)))
+        self.log = new_log(len(self.state.segment))
+        self.replace(log=self.log)
 
     def begin(self, z: Array, duration: float, *accuracy: float) -> None:
         """The state of a run at t = 0 from the coordinates of the structure's own blocks."""
         self.numbers[:] = self.rest
         self.own += z.reshape(2, -1)
         self.state.now[T_END], self.accuracy[:] = duration, accuracy
+
+    def forget_outputs(self) -> None:
+        """Let the next run keep its end only, and a list of events as short as at first."""
+        if self.state.log is not self.log or len(self.state.due) > 1:
+            self.replace(log=self.log, **NO_OUTPUT)
 
     def replace(self, **arrays: Array) -> None:
         """Let other arrays be those of the state."""

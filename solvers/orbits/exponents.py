@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from solvers.compiled.state import T_END
 from solvers.exponential.method import Exponential
 from solvers.integration import prepared_run
 from solvers.problem import SolverError, Status, System
@@ -57,7 +58,7 @@ def lyapunov(
     run = prepared_run(system, q0, q_dot0, duration, None, Exponential() if method is None else method, True)
     borders = np.linspace(discard, duration, _BATCHES + 1)
     for border in borders[borders > 0.0]:  # the tangent's size is known where a stretch ends: at each border, too
-        run.engine.duration = float(border)
+        run.state.now[T_END] = border
         status = run.to_the_end(None)
         if status is not Status.DONE:
             raise SolverError(f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}")
