@@ -33,6 +33,7 @@ import types
 from collections import defaultdict
 from importlib.machinery import FileFinder, SourceFileLoader
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -164,13 +165,14 @@ def run_tests(target, number, everything):
 
 def run_example(path, number):
     """The same of an example, which has no name in itself."""
+    from matplotlib.figure import Figure
     from realisation import taken
 
     main = types.ModuleType("__main__")
     main.__file__, sys.modules["__main__"] = path, main
     sys.argv = [path] + ["--quick"] * ("--quick" in Path(path).read_text(encoding="utf-8"))
     try:
-        with taken(number):
+        with taken(number), patch.object(Figure, "savefig"):  # nothing is asserted of what is drawn
             exec(compiled(path), main.__dict__)
     except Exception as error:
         return [""], {"": f"{type(error).__name__}: {error}"}
