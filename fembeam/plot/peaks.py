@@ -105,9 +105,9 @@ def fold_curve(found: Fold, axes: Sequence[Axes] | None = None) -> Figure:
     ...                  elements=[fb.Element(0.5, Polynomial([0.0, 0.0, 2e7]))], damping=fb.ModalDamping(0.01),
     ...                  forces=[fb.PointForce(0.5, fb.Harmonic(0.2, 190.0))])
     >>> branch = scene.reduce(modes=1).branch("omega", (170.0, 210.0)).run()
-    >>> found = fb.study.fold(branch, "forces[0].signal.amplitude", (0.1, 0.3))
+    >>> found = fb.study.fold(branch, "forces[0].signal.amplitude", (0.19, 0.21))
     >>> fold_curve(found).axes[0].get_ylabel()
-    'forcing frequency ω / (rad/s)'
+    'drive frequency ω / rad s⁻¹'
     """
     figure, (upper, lower) = sheet(2, 1, (6.4, 4.8), axes, sharex=True, height_ratios=(1, 1))
     height = 1e3 * found.amplitude

@@ -152,15 +152,17 @@ def fold_curve(
     --------
     Duffing's oscillator q̈ + 2ζ q̇ + q + q³ = f cos ωt.
 
+    >>> from types import SimpleNamespace
     >>> from contacts import Polynomial
-    >>> from solvers import Contact, Tone, branch
+    >>> from solvers import Contact, branch
+    >>> spring = Contact([1.0], Polynomial([0.0, 0.0, 1.0]), always=True)
     >>> def make(omega, f):
-    ...     spring = Contact([1.0], Polynomial([0.0, 0.0, 1.0]), always=True)
-    ...     return System.modal([1.0], [0.05], [spring], [([1.0], Tone(f, omega))]), 2.0 * np.pi / omega
-    >>> folds = branch(lambda omega: make(omega, 0.2), (0.8, 1.6), [0.0, 0.0]).run().special
-    >>> curve = fold_curve(make, folds[0], 0.2, (0.02, 0.2), 0.8)
-    >>> "cusp" in [one.mark for one in curve.orbits]
-    True
+    ...     tone = SimpleNamespace(tones=lambda: (np.array([omega]), np.array([f + 0j])))
+    ...     return System.modal([1.0], [0.05], [spring], [([1.0], tone)]), 2.0 * np.pi / omega
+    >>> folds = branch(lambda omega: make(omega, 0.2), (1.1, 1.6), [0.0, 0.0]).run().special
+    >>> curve = fold_curve(make, folds[0], 0.2, (0.15, 0.2), 0.5)
+    >>> {one.mark for one in curve.orbits}
+    {'fold'}
     """
     low, high = span
     if fold.mark != "fold":
