@@ -54,7 +54,7 @@ def regime(run):
     return {("slip",): "sticks", ("stick", "slip"): "slips, sticks", (): "slips"}[tuple(run.transitions.event)]
 
 
-angles = np.linspace(0.1, 7.0, 70)
+angles = np.linspace(0.05, 6.95, 70)
 runs = [bounce(psi) for psi in angles]
 found = np.array([regime(run) for run in runs])
 assert set(angles[found == "sticks"]) == set(angles[angles < 1.0])

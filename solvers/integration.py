@@ -27,6 +27,7 @@ from solvers.compiled.state import (
     SAMPLED,
     STATUSES,
     STEPS,
+    State,
     T,
     event_row,
     slider_row,
@@ -62,7 +63,6 @@ from solvers.problem.run_arguments import (
 )
 
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
-_NEVER, _NOWHERE = np.array([math.inf]), np.empty((0, 0))  # no output is due
 _NOTHING = np.empty(0)  # latched by a law without memory
 
 
@@ -180,21 +180,25 @@ class _Run:
 
     def __init__(self, system: System, engine: Any, times: Array | None, tangent: Any) -> None:
         self.system, self.engine, self.times = system, engine, times
-        self.due, self.out, self.state = _NEVER, _NOWHERE, engine.state
         if times is not None:
-            self.due = np.append(np.minimum(times, engine.duration), math.inf)
-            self.out = np.empty((len(times), self.state.x.size))
+            due = np.append(np.minimum(times, engine.duration), math.inf)
+            engine.record(out=np.empty((len(times), self.state.x.size)), due=due)
         self.tangent: Any = None
         if tangent:
             from solvers.exponential.tangent import Tangent
 
             self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None, True)
-            self.state = engine.state  # with the event record
-        self.log = np.empty((max(256, 2 * len(system.contacts)), at.CODE + 1))
-        self.initial, self.latched = self.state.x[: 2 * engine.problem.k.size].copy(), self.memory
-        if times is not None and self.due[0] == 0.0:
-            self.out[0] = self.state.x
-            self.state.count[SAMPLED] = 1
+        state = self.state
+        self.initial, self.latched = state.x[: 2 * engine.problem.k.size].copy(), self.memory
+        if state.due[0] == 0.0:
+            state.out[0] = state.x
+            state.count[SAMPLED] = 1
+
+    @property
+    def state(self) -> State:
+        """What has been reached, and the outputs."""
+        found: State = self.engine.state
+        return found
 
     def _derivatives(self) -> dict[str, Array]:
         """Derivatives of the end, with and without what is latched."""
@@ -211,9 +215,8 @@ class _Run:
         rows = zip(self.system.contacts, self.engine.problem.parameters, strict=True)
         found = tuple(row[list(getattr(contact.law, "memory", ()))] for contact, row in rows)
         for contact, latched in zip(self.system.contacts, found, strict=True):
-            if (
-                contact.friction is not None
-            ):  # a slider is told as of a run that begins now; one that slips has no place
+            if contact.friction is not None:
+                # A slider is told as of a run that begins now; one that slips has no place.
                 law: Any = contact.law
                 latched[1] = latched[1] - law.arm * law.spin * self.time if latched[0] == 0.0 else 0.0
         return found
@@ -231,11 +234,11 @@ class _Run:
         """Block after block until done, failed or interrupted."""
         code = RUNNING
         try:
-            self.engine.start(self.log)
+            self.engine.start()
             while code in (RUNNING, LOG_FULL):
                 if code == LOG_FULL:
-                    self.log = np.concatenate((self.log, np.empty_like(self.log)))
-                code = self.engine.march(BLOCK_STEPS, self.log, self.out, self.due)
+                    self.engine.record(log=np.concatenate((self.state.log, np.empty_like(self.state.log))))
+                code = self.engine.march(BLOCK_STEPS)
                 if self.tangent:
                     self.tangent.follow()
                 if progress:
@@ -249,30 +252,30 @@ class _Run:
     def solution(self, status: Status, seconds: float) -> Solution:
         """Collect outputs, log and energy balance."""
         size, n = self.initial.size, self.system.size
-        back = self.engine.back
-        state, latched = self.state.x.copy(), self.memory
-        end = back.dot(state[:size])
+        back, state, latched = self.engine.back, self.state, self.memory
+        last = state.x.copy()
+        end = back.dot(last[:size])
         if self.times is None:
-            x, t, motion = state[None, :], self.state.now[T : T + 1].copy(), end[None, :]
+            x, t, motion = last[None, :], state.now[T : T + 1].copy(), end[None, :]
         else:
-            x = self.out[: self._sampled(status)]
+            x = state.out[: self._sampled(status)]
             t, motion = self.times[: len(x)], product(x[:, :size], back.T)
         works = x[:, size:] if self.times is None else x[:, size:].copy()  # so that all the samples can be let go
         own = 2 + 2 * len(self.system.contacts)
-        works, rubbed = works[:, :own], works[:, own:]
+        works, rubbed = works[:, :own], self._balanced(works[:, own:])
         complete = self.engine.keeps_ledger(self.times is not None)
-        ledger = partial(_energy, self.system, works, complete, motion, back, self.initial, self._balanced(rubbed))
+        ledger = partial(_energy, self.system, works, complete, motion, back, self.initial, rubbed)
         rows = self._rows()
         names = [contact.name for contact in self.system.contacts]
         log = partial(ContactLog.of_events, self._of_stops(rows), names)
         transitions = partial(Transitions.of_events, rows, self.system.contacts)
-        first, last = (self.initial, self.latched), (state, latched)
-        lost = partial(Losses.of_run, self.system.contacts, back, first, last, works, transitions, self._rubbed())
-        if status is Status.DONE and not self._balances(works, complete, motion, rows, self._balanced(rubbed)):
+        ends = (self.initial, self.latched), (last, latched)
+        lost = partial(Losses.of_run, self.system.contacts, back, *ends, works, transitions, self._rubbed())
+        if status is Status.DONE and not self._balances(works, complete, motion, rows, rubbed):
             status = Status.UNBALANCED
-        if status is Status.DONE and _overdrawn(self.system, rows):
+        if status is Status.DONE and len(self.engine.problem.friction) and _overdrawn(self.system, rows):
             status = Status.OVERDRAWN
-        count = self.state.count.tolist()
+        count = state.count.tolist()
         cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
         known = self.tangent is not None and status is Status.DONE
         more: dict[str, Any] = {**self._derivatives()} if known else {}
@@ -316,7 +319,7 @@ class _Run:
     def _of_stops(self, rows: Array) -> Array:
         """The events of elements whose contacts begin and end."""
         always = self.system.about_laws.get("always", partial(_always, self.system))
-        return rows[~always[rows[:, at.ELEMENT].astype(int)]] if always.any() else rows
+        return rows[~np.isin(rows[:, at.ELEMENT], always)] if always else rows
 
     def release(self) -> None:
         """Return working arrays for use by other runs."""
@@ -326,24 +329,26 @@ class _Run:
     def _sampled(self, status: Status) -> int:
         """Samples written; the last one may lie a rounding beyond the end."""
         written = int(self.state.count[SAMPLED])
-        if status is Status.DONE and written == len(self.out) - 1:
-            self.out[-1] = self.state.x
-            return len(self.out)
+        out = self.state.out
+        if status is Status.DONE and written == len(out) - 1:
+            out[-1] = self.state.x
+            return len(out)
         return written
 
     def _rows(self) -> Array:
         """The event list; contacts under way end last, at no time."""
-        logged = self.log[: self.state.count[LOGGED]].copy()
-        under_way = [s for s, segment in enumerate(self.state.segment.tolist()) if segment > 0]
+        state = self.state
+        logged = state.log[: state.count[LOGGED]].copy()
+        under_way = [s for s, segment in enumerate(state.segment.tolist()) if segment > 0]
         if not under_way:
             return logged
         rows = np.empty((len(under_way), at.CODE + 1))
         for s, row in zip(under_way, rows, strict=True):
-            event_row(self.engine.problem, self.state, s, math.nan, at.KNOT, math.nan, math.nan, row)
+            event_row(self.engine.problem, state, s, math.nan, at.KNOT, math.nan, math.nan, row)
         rubbing = [s for s in under_way if self.system.contacts[s].friction is not None]
         more = np.empty((len(rubbing), at.CODE + 1))
         for s, row in zip(rubbing, more, strict=True):
-            slider_row(self.engine.problem, self.state, s, self.time, row)
+            slider_row(self.engine.problem, state, s, self.time, row)
             row[[at.TIME, at.CLIPPED]] = math.nan, 0.0
         return np.concatenate((logged, rows, more))
 
@@ -363,9 +368,9 @@ def _overdrawn(system: System, rows: Array) -> bool:
     return False
 
 
-def _always(system: System) -> Any:
-    """(m,) elements whose force acts at both signs of δ, and never ends."""
-    return np.array([c.always and not getattr(c.law, "opens", False) for c in system.contacts], dtype=bool)
+def _always(system: System) -> list[int]:
+    """Elements whose force acts at both signs of δ, and never ends."""
+    return [s for s, c in enumerate(system.contacts) if c.always and not getattr(c.law, "opens", False)]
 
 
 def _exchanged(rows: Array) -> Array:

@@ -10,11 +10,22 @@ import pytest
 REALISATION = int(os.environ.get("FEMBEAM_REALISATION", "0"))  # 0 is the test's own
 
 _NAMES = "from solvers.compiled.kernels import *; from solvers.exponential.preparation import *; "
-_NAMES += "from solvers.exponential.method import advance_of; from solvers.stepping.loop import march_of; "
+_NAMES += "from solvers.exponential.method import advance_of; "
+_STEPPING = """
+import solvers, solvers.exponential.linearised
+from contacts import Hertz
+zero, plane, law = [[0.0, 0.0], [0.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]], Hertz(1e6)
+ball = solvers.System(plane, zero, zero, [solvers.Contact([1.0, 0.0], law)])
+disc = solvers.System(plane, zero, zero, [solvers.Contact(plane, law, 1e-4, map="annulus")])
+constant = solvers.Newmark(1e-4), solvers.RK4(1e-4), solvers.HenonRK2(1e-4, 1e-4)
+for system, methods in ((ball, constant), (disc, ())):
+    for method in (solvers.DormandPrince(), *methods):
+        solvers.integrate(system, [0.0, 0.0], [-0.5, 0.0], 1e-3, method=method)
+"""
 KERNELS = [
-    f"{_NAMES} load_parts(PROBLEM, range(26)); advance_of(False); march_of(True)",
-    f"{_NAMES} load_parts(PLANAR_PROBLEM, range(51)); advance_of(True); march_of(False)",
-    "import solvers.exponential.linearised",
+    f"{_NAMES} load_parts(PROBLEM, range(26)); advance_of(False)",
+    f"{_NAMES} load_parts(PLANAR_PROBLEM, range(51)); advance_of(True)",
+    _STEPPING,
 ]  # take equally long to compile
 
 
@@ -28,6 +39,7 @@ def pytest_sessionstart(session):
     if hasattr(session.config, "workerinput") or not session.config.getoption("numprocesses", None):
         return
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processors are taken
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each of many processes would compile all modules
     for process in [subprocess.Popen([sys.executable, "-c", code]) for code in KERNELS]:
         process.wait()
 
@@ -39,6 +51,15 @@ def pytest_collection_modifyitems(config, items):
     examples = [item for item in items if item.get_closest_marker("example")]
     config.hook.pytest_deselected(items=examples)
     items[:] = [item for item in items if not item.get_closest_marker("example")]
+
+
+@pytest.fixture
+def dots(monkeypatch):
+    """Figures are saved as dots, for tests that do not look at them: to draw takes most of the time of what writes."""
+    from matplotlib.figure import Figure
+
+    plain = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda _, place, **options: plain(Figure((0.1, 0.1)), place, **options))
 
 
 @pytest.hookimpl(wrapper=True)

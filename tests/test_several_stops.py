@@ -255,17 +255,17 @@ def test_a_run_without_samples_that_gains_energy_is_refused(monkeypatch):
 
 
 def test_random_scenes(monkeypatch):
-    """Motion, and every number of every contact, of 40 scenes of all kinds against the reference.
+    """Motion, and every number of every contact, of 15 scenes of all kinds against the reference.
 
     Two more begin at rest on the surface of a preloaded stop, with dashpots: what δ̇ is rounded to must not open it.
     """
     monkeypatch.syspath_prepend(str(Path(__file__).parent / "bench"))
     from random_scenes import judge
 
-    kinds = {seed: judge(seed)[1].kind for seed in (*range(2000, 2040), 931476, 930422)}
+    kinds = {seed: judge(seed)[1].kind for seed in (*range(2000, 2015), 931476, 930422)}
     allowed = "fine", "ill-conditioned", "the reference failed"
     assert {seed: kind for seed, kind in kinds.items() if kind not in allowed} == {}
-    assert list(kinds.values()).count("fine") > 30
+    assert list(kinds.values()).count("fine") > 12
 
 
 @pytest.mark.parametrize("size", [1e-15, 1e-9, 1e75, 1e150])

@@ -28,7 +28,7 @@ def fit_sliders(measured: Measured, most: int, spring: bool) -> Fit:
             break
         chosen = tried.with_one_more(chosen)
         rough = [Fit(measured, model, start, most=20) for start in tried.starts(chosen)]
-        fit = Fit(measured, model, min(rough, key=lambda one: one.squares).theta)
+        fit = _converged(Fit(measured, model, min(rough, key=lambda one: one.squares).theta))
         if not _better(squares, numbers, fit):
             break
         best, squares, numbers = fit, fit.squares, fit.theta.size
@@ -37,6 +37,20 @@ def fit_sliders(measured: Measured, most: int, spring: bool) -> Fit:
     if best is None:
         raise ValueError(_no_slip(measured, slope, squares))
     return best
+
+
+def _converged(fit: Fit) -> Fit:
+    """The fit, begun anew where it ended as long as the squares fall.
+
+    Least squares take a step in units of the largest slopes they have met; those by the memory vanish where a slider
+    begins at its limit, so that steps towards it become ever smaller.
+    """
+    while not fit.exact:
+        again = Fit(fit.measured, fit.model, fit.theta)
+        if not again.squares < 0.5 * fit.squares:
+            break
+        fit = again
+    return fit
 
 
 def _better(squares: float, numbers: int, fit: Fit) -> bool:

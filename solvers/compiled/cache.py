@@ -1,7 +1,9 @@
-"""Where machine code is kept between processes: a folder named by a digest of all that it is compiled from.
+"""Where machine code is kept between processes: folders named by digests of all that it is compiled from.
 
 numba takes a kernel from its cache as long as the kernel's own file is unchanged; functions it calls from other files
-may be new all the same. With a folder for each state of the sources no old machine code can be found.
+may be new all the same. With a folder for each state of the sources no old machine code can be found. All kernels call
+those of `GROUND`, and else of their own room alone: of a folder for each state of the ground, every room has a folder
+within for each state of its own. So a change of one method leaves the code of the others as it is.
 """
 
 from __future__ import annotations
@@ -28,14 +30,21 @@ from numba import config
 from numba.core.caching import FunctionCache
 
 HOME = Path(__file__).parent.parent
+GROUND = "compiled", "problem"  # rooms that kernels of every room may call
 PREFIX = "fembeam-kernels-"
 KEPT = 4  # folders of other sources, versions or interpreters that stay, so that changing between them compiles once
 DIGITS = 16  # of a digest
 UNUSED = 24 * 3600.0  # s without a start after which one beyond these is removed; until then a process may need it
 _LOOK, _LOOKS = 0.02, 100  # s between two looks whether another process still compiles, and how many in silence
 _PATIENCE = 300.0  # s to wait for it; one kernel takes seconds, so that a process that long at it is stopped or hangs
-_LOCKS = 16  # of functions that are compiled by themselves
+_LOCKS = 4096  # of functions that are compiled by themselves: so many that hardly two share one
 _LOCK = threading.RLock()  # numba's setting belongs to the process
+
+
+def _room(path: str) -> str:
+    """Folder of `HOME` that a source lies in; "." of those in none, and "" of the ground."""
+    name, *within = Path(path).relative_to(HOME).parts
+    return ("" if name in GROUND else name) if within else "."
 
 
 def _stamps() -> dict[str, tuple[int, int]]:
@@ -130,7 +139,9 @@ def _folder(name: str) -> Path | None:
 
 
 _STAMPS = _stamps()
-FOLDER = _folder(PREFIX + _digest(list(_STAMPS)))
+_OPENED: set[str] = set()  # rooms whose folder has been made
+_NAMES = {room: PREFIX + _digest([path for path in _STAMPS if _room(path) == room]) for room in map(_room, _STAMPS)}
+FOLDER = _folder(_NAMES[""])
 
 
 def is_current(function: Callable[..., Any]) -> bool:
@@ -224,17 +235,30 @@ class _Store(FunctionCache):
                 unlock_folder(held)
 
 
+def _folder_of(function: Callable[..., Any]) -> Path:
+    """The folder within ours for the sources of a function's room."""
+    assert FOLDER is not None
+    room = _room(function.__code__.co_filename)
+    if not room:
+        return FOLDER
+    if room not in _OPENED:
+        _opened(FOLDER, _NAMES[room])
+        _OPENED.add(room)
+    return FOLDER / _NAMES[room]
+
+
 def store(function: Callable[..., Any]) -> FunctionCache | None:
     """The cache of a function in our folder; None where its machine code is not to be kept."""
     with _LOCK:
         before = config.CACHE_DIR
         if not is_current(function):
             return None
-        config.CACHE_DIR = str(FOLDER)
+        place = _folder_of(function)
+        config.CACHE_DIR = str(place)
         try:
             found = _Store(function)
         except RuntimeError:  # numba finds no place to write to
             return None
         finally:
             config.CACHE_DIR = before
-        return found if Path(found.cache_path).parent == FOLDER else None  # elsewhere old code may lie
+        return found if Path(found.cache_path).parent == place else None  # elsewhere old code may lie

@@ -60,9 +60,9 @@ def margins_before(problem, state, s, delta, rate, time, batch, out):
 
 
 @inner
-def renew(problem, state, s, j, delta, rate, log):
+def renew(problem, state, s, j, delta, rate):
     """Renew what element s latches on its border j; a row of the log tells of it."""
-    t, row = state.now[T], log[state.count[LOGGED]]
+    t, row = state.now[T], state.log[state.count[LOGGED]]
     if state.event_record.shape[0]:
         write_event(state, RENEWAL, t, t, 0.0, s, j, state.x)
     event_row(problem, state, s, t, j, delta, rate, row)

@@ -40,7 +40,7 @@ DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAIN
         *[Status.CHATTER, Status.LOG_FULL, Status.LAW_NOT_FINITE, Status.GAINED],
     )
 )
-T, H_FLIGHT, H_CONTACT, LAST_EVENT = range(4)  # places in State.now
+T, H_FLIGHT, H_CONTACT, LAST_EVENT, T_END = range(5)  # places in State.now
 STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, RECORDED = range(8)  # places in State.count
 T_IN, PEAK_DELTA, PEAK_FORCE = range(3)  # columns of State.active
 MOST_EVENTS_AT_ONCE = 100
@@ -55,17 +55,27 @@ class State(NamedTuple):
     `begin_state` fills it; from then on kernels alone write to it. Units as in `kernels.Problem`.
     """
 
-    now: Annotated[Any, "4"]  # s: time, flight step, contact step, time of the last event
+    now: Annotated[Any, "5"]  # s: time, flight step, contact step, time of the last event, end of the run
     x: Annotated[Any, "X"]  # of the blocks, then the energy balance in J (impulses in N s), see `kernels`
     rate: Annotated[Any, "X"]  # of x, per s; stepping methods only
     segment: Annotated[Any, "int E"]  # of the law: 0 in flight, j > 0 between the stop's knots j-1 and j
     entry_rate: Annotated[Any, "E"]  # m/s, latched
     active: Annotated[Any, "E, 3"]  # contacts under way, SI units, columns named above
     count: Annotated[Any, "int 8"]  # steps, rejected steps, law calls, ..., as named above
+    log: Annotated[Any, "events, row"]  # the event list, see `problem.event_list`
+    out: Annotated[Any, "samples, X"]  # row i gets x at the time due[i]
+    due: Annotated[Any, "samples+1"]  # s, the last one infinite
     event_record: Annotated[Any, "rows, record"]  # contact steps and events, for the tangent; else no rows
 
 
 STATE = packed_type(State)
+NO_ROWS = {"events": 0, "row": at.CODE + 1, "samples": 0, "rows": 0, "record": 0}  # sizes of what is not written yet
+NO_OUTPUT = {"out": np.empty((0, 0)), "due": np.array([math.inf])}  # of a run that keeps its end only
+
+
+def new_log(elements: int) -> Any:
+    """An event list to be written."""
+    return np.empty((max(256, 2 * elements), at.CODE + 1))
 
 
 @inner
@@ -204,29 +214,29 @@ def slider_row(problem, state, s, t, row):
 
 
 @inner
-def log_slider(problem, state, s, log):
+def log_slider(problem, state, s):
     """Add such a row to the log."""
-    slider_row(problem, state, s, state.now[T], log[state.count[LOGGED]])
+    slider_row(problem, state, s, state.now[T], state.log[state.count[LOGGED]])
     state.count[LOGGED] += 1
 
 
 @kernel
-def log_begin(problem, state, log):
+def log_begin(problem, state):
     """Log all contacts that are under way as the run begins."""
     for s in range(problem.law.size):
         if acting_segment(problem, state, s) > 0:
-            row, delta = log[state.count[LOGGED]], state.active[s, PEAK_DELTA]
+            row, delta = state.log[state.count[LOGGED]], state.active[s, PEAK_DELTA]
             event_row(problem, state, s, state.now[T], at.BEGIN, delta, indentation_rate(problem, s, state.x), row)
             row[at.FROM], row[at.TO] = 0.0, row[at.FROM]
             state.count[LOGGED] += 1
             if rubs(problem, s):
-                log_slider(problem, state, s, log)
+                log_slider(problem, state, s)
 
 
 @inner
-def switch(problem, state, s, direction, log):
+def switch(problem, state, s, direction):
     """Move stop s one segment up or down."""
-    t, row = state.now[T], log[state.count[LOGGED]]
+    t, row = state.now[T], state.log[state.count[LOGGED]]
     if state.event_record.shape[0]:
         write_event(state, EVENT, t, t, 0.0, s, direction, state.x)
     level = problem.knots[s, state.segment[s] - (1 if direction < 0 else 0)]
@@ -234,19 +244,19 @@ def switch(problem, state, s, direction, log):
     state.segment[s] += direction
     end_event(problem, state, s, row)
     if rubs(problem, s) and (state.segment[s] == 0 or row[at.FROM] == 0.0):
-        log_slider(problem, state, s, log)
+        log_slider(problem, state, s)
     state.count[AT_ONCE] = state.count[AT_ONCE] + 1 if t == state.now[LAST_EVENT] else 0
     state.now[LAST_EVENT] = t
 
 
 @inlined
-def switch_on_surface(problem, state, log, locates):
+def switch_on_surface(problem, state, locates):
     """Switch every stop that is on an end of its segment and moves out of it; returns whether any did."""
     switched = False
     for s in range(problem.law.size):
         direction = _way_out(problem, state, s, locates)
         if direction != 0 and abs(indentation_rate(problem, s, state.x)) > rate_tolerance(problem, s, state.x):
-            switch(problem, state, s, direction, log)
+            switch(problem, state, s, direction)
             switched = True
     return switched
 
@@ -280,7 +290,8 @@ def in_contact(state):
 
 def begin_state(state: State, z: Any) -> None:
     """Make arrays of zeros the state of a run at t = 0 from block coordinates."""
-    state.now[1:] = np.inf, np.inf, -1.0
+    state.now[1:] = np.inf, np.inf, -1.0, np.inf
+    state.due[:] = np.inf
     state.x[: len(z)] = z
     state.entry_rate[:] = 1.0
 
@@ -288,8 +299,9 @@ def begin_state(state: State, z: Any) -> None:
 def new_state(z: Any, stops: int, rubbing: int = 0) -> State:
     """State of a run at t = 0 from block coordinates, with so many stops, some of them with friction."""
     kinds = [np.dtype(str(kind.dtype)) for kind in STATE.types]
-    shapes = shapes_of(State, {"X": len(z) + 2 + 2 * stops + ACCOUNTS * rubbing, "E": stops, "rows": 0, "record": 0})
+    shapes = shapes_of(State, {"X": len(z) + 2 + 2 * stops + ACCOUNTS * rubbing, "E": stops, **NO_ROWS})
     state = State._make(np.zeros(shape, kind) for shape, kind in zip(shapes, kinds, strict=True))
+    state = state._replace(log=new_log(stops))
     begin_state(state, z)
     return state
 

@@ -44,7 +44,6 @@ CODE, CONTACTS = range(2)  # columns of Outcomes.count
 REACHED, EXCHANGED, ENERGY = range(3)  # columns of Outcomes.number; three of energy, as in Scratch.energy
 _CUBE = types.Array(REAL, 3, "C")
 _RUN = types.FunctionType(ADVANCE)
-_NEVER, _NOWHERE = np.array([np.inf]), np.empty((0, 0))
 _state, _scratch = unpacker(STATE), unpacker(SCRATCH)
 _problem = unpacker(PLANAR_PROBLEM)  # whatever it is: both types have the same fields
 
@@ -100,15 +99,15 @@ def _end(problem, state, scratch, code, x, count, number, peak):
 
 @entry(
     types.void(
-        *(_RUN, *[types.int64] * 5, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, INTEGERS, REAL, types.int64, REAL, REAL),
-        *(MATRIX, MATRIX, VECTOR, MATRIX, types.Array(types.int64, 2, "C"), MATRIX, _CUBE),
+        *(_RUN, *[types.int64] * 5, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, INTEGERS, types.int64),
+        *(MATRIX, types.Array(types.int64, 2, "C"), MATRIX, _CUBE),
     )
 )
 def advance_many(
     run, problem_at, tables_at, state_at, scratch_at, energy_tables_at, numbers, rest, parameters, starts, gaps, cursor,
-    t_end, budget, rtol, landing_reach, log, out, due, x, count, number, peak,
+    budget, x, count, number, peak,
 ):  # fmt: skip
-    """Integrate a group of starts to ``t_end`` one after the other, for about ``budget`` steps altogether.
+    """Integrate a group of starts one after the other, for about ``budget`` steps altogether.
 
     ``run`` is `method.advance`; ``numbers`` is a workspace's memory and ``rest`` what it holds before a start is added,
     ``parameters`` what the laws have latched then, ``starts`` (k, 2N) and ``gaps`` (k, m) those of each run; without
@@ -127,12 +126,9 @@ def advance_many(
                     problem.radius[s] = math.copysign(gaps[i, s], problem.radius[s])
             cursor[BEGUN] = 1
         spent -= state.count[STEPS] + state.count[REJECTED]
-        code = run(
-            *(problem_at, tables_at, state_at, scratch_at, energy_tables_at),
-            *(t_end, budget, rtol, landing_reach, log, out, due),
-        )
+        code = run(problem_at, tables_at, state_at, scratch_at, energy_tables_at, budget)
         spent += state.count[STEPS] + state.count[REJECTED] + 1
-        for row in log[: state.count[LOGGED]]:
+        for row in state.log[: state.count[LOGGED]]:
             if row[at.FROM] > 0.0 and row[at.TO] == 0.0:  # a contact ends
                 _note(np.int64(row[at.ELEMENT]), row[at.DEEPEST], row[at.LARGEST], count[i], number[i], peak[i])
         state.count[LOGGED] = 0
@@ -170,11 +166,9 @@ class Worker:
             )
             problem_at = self.own.address
         workspace, parameters = engine.workspace, engine.prepared.problem.value.parameters
-        log = np.empty((max(256, 2 * len(engine.problem.law)), at.CODE + 1))
         self.arguments = (
             *(engine.advance, problem_at, *engine.addresses[1:], NO_ENERGY_TABLES.address),
-            *(workspace.numbers, workspace.rest, parameters, starts, gaps, self.cursor),
-            *(engine.duration, budget, engine.method.rtol, engine.landing_reach, log, _NOWHERE, _NEVER, *outcomes),
+            *(workspace.numbers, workspace.numbers.copy(), parameters, starts, gaps, self.cursor, budget, *outcomes),
         )
 
     def assign(self, first: int, beyond: int) -> None:

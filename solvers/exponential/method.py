@@ -28,11 +28,8 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.kernels import (
-    MATRIX,
     PLANAR_PROBLEM,
     PROBLEM,
-    REAL,
-    VECTOR,
     PlanarProblem,
     entry,
     merged,
@@ -47,11 +44,13 @@ from solvers.compiled.state import (
     LOG_FULL,
     LOGGED,
     MOST_EVENTS_AT_ONCE,
+    NO_OUTPUT,
     RECORDED,
     REJECTED,
     RUNNING,
     STATE,
     STEPS,
+    T_END,
     State,
     T,
     begin_contacts,
@@ -60,7 +59,7 @@ from solvers.compiled.state import (
     switch,
     switch_on_surface,
 )
-from solvers.exponential.contact.first_step import BEGUN, NEW, begin_steps, latest_entered
+from solvers.exponential.contact.first_step import BALANCED, BEGUN, NEW, begin_steps, latest_entered
 from solvers.exponential.contact.landing import landing_reach
 from solvers.exponential.contact.step import advance_contact
 from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy
@@ -72,75 +71,61 @@ from solvers.problem import Array, Forcing, System
 
 _problem, _planar_problem, _tables = unpacker(PROBLEM), unpacker(PLANAR_PROBLEM), unpacker(TABLES)
 _state, _scratch, _energy_tables = unpacker(STATE), unpacker(SCRATCH), unpacker(ENERGY_TABLES)
-ADVANCE = types.int64(*[types.int64] * 5, REAL, types.int64, REAL, REAL, MATRIX, MATRIX, VECTOR)
+ADVANCE = types.int64(*[types.int64] * 6)
 
 
 @merged
-def _advance(problem, tables_at, state_at, scratch_at, energy_at, t_end, budget, rtol, landing_reach, log, out, due):
-    """Advance the state to ``t_end`` or for about ``budget`` steps; returns a status code.
-
-    Row i of ``out`` gets the state at the time ``due[i]``; the last of these times is infinite. ``log`` gets a row per
-    event. ``landing_reach`` is that of `landing.landing_reach`.
-    """
+def _advance(problem, tables_at, state_at, scratch_at, energy_at, budget):
+    """Advance the state to the end of the run or for about ``budget`` steps; returns a status code."""
     tables, state, scratch = _tables(tables_at), _state(state_at), _scratch(scratch_at)
     energy_tables, control = _energy_tables(energy_at), scratch.control
     if not control[BEGUN]:
-        control[BEGUN], scratch.landing_reach[0] = 1, landing_reach
+        control[BEGUN], control[BALANCED] = 1, 1 if energy_tables.active > 0.0 else 0
         scratch.energy[FIRST] = own_energy(problem, tables, state.x)
         begin_contacts(problem, state)
-        log_begin(problem, state, log)
+        log_begin(problem, state)
         if in_contact(state):
             begin_steps(problem, tables, state, scratch, latest_entered(state))
     begun, rows = state.count[STEPS] + state.count[REJECTED], most_rows(problem)
     while state.count[STEPS] + state.count[REJECTED] - begun < budget:
-        if state.now[T] >= t_end:
+        if state.now[T] >= state.now[T_END]:
             note_energy(problem, tables, state, scratch)
             return DONE
-        if state.count[LOGGED] + rows > log.shape[0]:
+        if state.count[LOGGED] + rows > state.log.shape[0]:
             return LOG_FULL
         if state.event_record.shape[0] and state.count[RECORDED] + rows + 2 > state.event_record.shape[0]:
             return RUNNING
         if state.count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
             return CHATTER
         between = in_contact(state) and not control[NEW]  # within a contact a border is met by landing on it only
-        if not between and switch_on_surface(problem, state, log, True):
+        if not between and switch_on_surface(problem, state, True):
             if in_contact(state):
                 begin_steps(problem, tables, state, scratch, latest_entered(state))
             continue
         if in_contact(state):
-            code = advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol, log, out, due)
+            code = advance_contact(problem, tables, energy_tables, state, scratch)
             if code != RUNNING:
                 return code
             continue
         if energy_tables.active > 0.0:
             start_account(problem, state, scratch)
-        stop = fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due)
+        stop = fly(problem, tables, energy_tables, state, scratch, budget)
         if energy_tables.active > 0.0:
             account_state(problem, tables, energy_tables, state, scratch)
         if stop >= 0:
-            switch(problem, state, stop, np.int64(1), log)  # a literal would be compiled for itself
+            switch(problem, state, stop, np.int64(1))  # a literal would be compiled for itself
             begin_steps(problem, tables, state, scratch, stop)
     return RUNNING
 
 
-def _advance_line(
-    problem_at, tables_at, state_at, scratch_at, energy_at, t_end, budget, rtol, landing_reach, log, out, due
-):
+def _advance_line(problem_at, tables_at, state_at, scratch_at, energy_at, budget):
     """The loop of a `Problem`."""
-    problem = _problem(problem_at)
-    return _advance(
-        problem, tables_at, state_at, scratch_at, energy_at, t_end, budget, rtol, landing_reach, log, out, due
-    )
+    return _advance(_problem(problem_at), tables_at, state_at, scratch_at, energy_at, budget)
 
 
-def _advance_plane(
-    problem_at, tables_at, state_at, scratch_at, energy_at, t_end, budget, rtol, landing_reach, log, out, due
-):
+def _advance_plane(problem_at, tables_at, state_at, scratch_at, energy_at, budget):
     """That of a `PlanarProblem`."""
-    problem = _planar_problem(problem_at)
-    return _advance(
-        problem, tables_at, state_at, scratch_at, energy_at, t_end, budget, rtol, landing_reach, log, out, due
-    )
+    return _advance(_planar_problem(problem_at), tables_at, state_at, scratch_at, energy_at, budget)
 
 
 @lru_cache(maxsize=2)
@@ -197,12 +182,7 @@ class Engine:
     """One run: the problem with a block per tone, its tables, its state."""
 
     def __init__(self, method: Exponential, system: System, z: Array, forcing: Forcing, duration: float) -> None:
-        self.method, self.system, self.duration, self.landing_reach = (
-            method,
-            system,
-            duration,
-            landing_reach(method.rtol),
-        )
+        self.method, self.system, self.duration = method, system, duration
         forcing, prepared = prepare_run(system, forcing, duration, method.rtol)
         self.back = prepared.back
         packed = prepared.problem
@@ -216,7 +196,7 @@ class Engine:
         self.packed, self.problem, self.prepared = packed, packed.value, prepared
         self.advance = advance_of(isinstance(packed.value, PlanarProblem))
         self.workspace = prepared.workspace()
-        self.workspace.begin(z)
+        self.workspace.begin(z, duration, method.rtol, landing_reach(method.rtol))
         self.addresses = packed.address, prepared.tables.address, *self.workspace.addresses
 
     @property
@@ -224,16 +204,18 @@ class Engine:
         """The state reached."""
         return self.workspace.state
 
-    def record_events(self, event_record: Array) -> None:
-        """Record contact steps and events in an array, for the tangent."""
-        self.workspace.record_events(event_record)
+    def record(self, **arrays: Array) -> None:
+        """Let other arrays be those of the state that outputs go to: ``log``, ``out``, ``due``, ``event_record``."""
+        self.workspace.replace(**arrays)
 
     def release(self) -> None:
         """Leave the workspace to another run; this run's state must not be read any more."""
         if not self.workspace.state.event_record.size:
+            if len(self.workspace.state.due) > 1:
+                self.workspace.replace(**NO_OUTPUT)
             self.prepared.spare_workspaces.append(self.workspace)
 
-    def start(self, log: Array) -> None:
+    def start(self) -> None:
         """Nothing to do: the compiled loop starts by itself."""
 
     def keeps_ledger(self, sampled: bool) -> bool:
@@ -244,12 +226,9 @@ class Engine:
         """Whether the finished run holds more energy than it can have been given."""
         return has_gained(self.system, self.workspace.energy, self.problem, self.duration, exchanged, self.method.rtol)
 
-    def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
+    def march(self, budget: int) -> int:
         """Advance by about ``budget`` steps."""
-        energy_tables = (
-            self.prepared.energy_tables_for(_spacing(due)) if self.keeps_ledger(len(out) > 0) else NO_ENERGY_TABLES
-        )
-        return self.advance(
-            *(*self.addresses, energy_tables.address, self.duration, budget, self.method.rtol, self.landing_reach),
-            *(log, out, due),
-        )
+        energy_tables, due = NO_ENERGY_TABLES, self.state.due
+        if self.keeps_ledger(len(due) > 1):
+            energy_tables = self.prepared.energy_tables_for(_spacing(due))
+        return self.advance(*self.addresses, energy_tables.address, budget)

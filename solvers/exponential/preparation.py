@@ -13,7 +13,19 @@ from solvers.compiled.fields import packed_type, shapes_of
 from solvers.compiled.kernels import Problem, type_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned
 from solvers.compiled.parts import BORDERS, CIRCLES, ENERGY, EVERY_RUN, FRICTION, MANY_STOPS, TWO_STOPS, load
-from solvers.compiled.state import STATE, State, begin_state, frictions_of, gaps_of, most_borders, problem_of, radii_of
+from solvers.compiled.state import (
+    NO_ROWS,
+    STATE,
+    T_END,
+    State,
+    begin_state,
+    frictions_of,
+    gaps_of,
+    most_borders,
+    new_log,
+    problem_of,
+    radii_of,
+)
 from solvers.compiled.sums import padded
 from solvers.exponential.contact.many_stops import POOL
 from solvers.exponential.contact.node_response import START, Scratch
@@ -25,6 +37,7 @@ from solvers.problem import Array, Contact, Forcing, Memo, System, on_one_grid
 from solvers.problem.friction import ACCOUNTS
 
 TABLES, SCRATCH = packed_type(Tables), packed_type(Scratch)
+_KNOWN = "energy", "accuracy"  # arrays of the scratch that Python looks at
 _KINDS = {"tables": TABLES, "state": STATE, "scratch": SCRATCH, "energy_tables": ENERGY_TABLES}
 
 
@@ -42,20 +55,23 @@ class Workspace:
         self.numbers = self.block[: layout.slices[1][Scratch._fields.index("jacobian")][0].start]
         self.addresses = [words + start for start in layout.starts]
         self.state = State._make(layout.arrays(self.block, 0))
-        self.energy = layout.array(self.block, 1, Scratch._fields.index("energy"))
+        self.energy, self.accuracy = (layout.array(self.block, 1, Scratch._fields.index(name)) for name in _KNOWN)
         begin_state(self.state, rest)
         self.rest = self.numbers.copy()
         self.own = self.state.x[: rest.size].reshape(2, -1)[:, :blocks]
+        self.replace(log=new_log(len(self.state.segment)))
 
-    def begin(self, z: Array) -> None:
+    def begin(self, z: Array, duration: float, *accuracy: float) -> None:
         """The state of a run at t = 0 from the coordinates of the structure's own blocks."""
         self.numbers[:] = self.rest
         self.own += z.reshape(2, -1)
+        self.state.now[T_END], self.accuracy[:] = duration, accuracy
 
-    def record_events(self, event_record: Array) -> None:
-        """Let another array be the event record."""
-        self.state = self.state._replace(event_record=event_record)
-        self.layout.replace_array(self.block, 0, State._fields.index("event_record"), event_record)
+    def replace(self, **arrays: Array) -> None:
+        """Let other arrays be those of the state."""
+        self.state = self.state._replace(**arrays)
+        for name, array in arrays.items():
+            self.layout.replace_array(self.block, 0, State._fields.index(name), array)
 
 
 class Prepared(NamedTuple):
@@ -236,7 +252,7 @@ def _layout(**known: int) -> Layout:
     width = 2 * blocks + 2 + 2 * known["E"] + ACCOUNTS * known["F"]
     sizes = {
         **{"X": width, "X8": padded(width), "W8": max(padded(width + 2), 2 * own), "N8": own, "stages": START + 1},
-        **{"S": S, "M": many, "M8": padded(2 * many), "rows": 0, "record": 0},
+        **{"S": S, "M": many, "M8": padded(2 * many), **NO_ROWS},
         "numbers": padded(4 * blocks + 2 * S * (inputs + 2)) + 16 * known["tables"],
         **known,
     }

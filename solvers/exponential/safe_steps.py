@@ -22,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.compiled.kernels import copy, dot, indentation, indentation_rate, inlined, inner, is_circle, merged, row_of
-from solvers.compiled.state import SAMPLED, STEPS, T
+from solvers.compiled.state import SAMPLED, STEPS, T_END, T
 from solvers.exponential.circles.flight import circle_is_near, span_of_circle, span_of_circle_at
 from solvers.exponential.energy.flight_balance import (
     account_output,
@@ -90,15 +90,15 @@ def _target(tables, t, first, second, t_end):
 
 
 @inner
-def _sample(problem, tables, energy_tables, state, scratch, t, out, due):
+def _sample(problem, tables, energy_tables, state, scratch, t):
     """Write the outputs due within the step that began at t with the blocks' p and v in x = split_state[2], moved on.
 
     With sampled signals the balance of the state is that at t, and goes with x; else it follows from the mark.
     """
     size, with_energy, before = 2 * problem.k.size, energy_tables.active > 0.0, state.x
     accounted = with_energy and problem.table_dt.size > 0
-    while due[state.count[SAMPLED]] < state.now[T]:
-        wanted, row = due[state.count[SAMPLED]], out[state.count[SAMPLED]]
+    while state.due[state.count[SAMPLED]] < state.now[T]:
+        wanted, row = state.due[state.count[SAMPLED]], state.out[state.count[SAMPLED]]
         copy(before[size:], row[size:], state.x.size - size)
         fly_within(problem, tables, scratch, 2, t, wanted - t, accounted, energy_tables, row)
         join(problem, scratch.split_state[2], row)
@@ -164,11 +164,11 @@ def _near(problem, tables, scratch, x):
 
 
 @merged
-def _cross_cells(problem, tables, energy_tables, state, scratch, t_end, most, out, due):
+def _cross_cells(problem, tables, energy_tables, state, scratch, most):
     """Cross whole cells as long as no stop is near; returns how many, about ``most`` at most."""
     h, x, at, now, with_energy = problem.table_dt[0], scratch.split_state, 0, state.now, energy_tables.active > 0.0
     begin, offset = cell_of(problem, now[T])
-    end = min(int(t_end / h), begin + most, problem.table_start[1] - problem.table_start[0] - 1)
+    end = min(int(now[T_END] / h), begin + most, problem.table_start[1] - problem.table_start[0] - 1)
     cell, bounded = begin, begin
     if abs(offset) < 1e-7 * h:
         split(problem, state.x, x[0])
@@ -183,10 +183,10 @@ def _cross_cells(problem, tables, energy_tables, state, scratch, t_end, most, ou
             if _near(problem, tables, scratch, x[1 - at]):
                 break
             cell += 1
-            if due[state.count[SAMPLED]] < cell * h:
-                now[T] = min(cell * h, t_end)
+            if state.due[state.count[SAMPLED]] < cell * h:
+                now[T] = min(cell * h, now[T_END])
                 copy_split(x[at], x[2])
-                _sample(problem, tables, energy_tables, state, scratch, (cell - 1) * h, out, due)
+                _sample(problem, tables, energy_tables, state, scratch, (cell - 1) * h)
             if with_energy:
                 whole, begin_of_cell = tables.flight_step.size, (cell - 1) * h
                 exchanged = account_step(problem, tables, energy_tables, scratch, whole, begin_of_cell, at)
@@ -194,7 +194,7 @@ def _cross_cells(problem, tables, energy_tables, state, scratch, t_end, most, ou
             at = 1 - at
         if cell > begin:
             join(problem, x[at], state.x)
-            now[T] = min(cell * h, t_end)
+            now[T] = min(cell * h, now[T_END])
             state.count[STEPS] += cell - begin
             if with_energy:
                 start_account(problem, state, scratch)
@@ -254,25 +254,26 @@ def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell,
 
 
 @merged
-def fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due):
+def fly(problem, tables, energy_tables, state, scratch, budget):
     """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2)."""
-    now, sampled, with_energy = state.now, problem.table_dt.size > 0, energy_tables.active > 0.0
+    now, out, due = state.now, state.out, state.due
+    sampled, with_energy = problem.table_dt.size > 0, energy_tables.active > 0.0
     dt_cell, count = problem.table_dt[0] if sampled else np.inf, 0
     while count < budget:
         if sampled:
-            count += _cross_cells(problem, tables, energy_tables, state, scratch, t_end, budget - count, out, due)
+            count += _cross_cells(problem, tables, energy_tables, state, scratch, budget - count)
         if due[state.count[SAMPLED]] <= now[T]:
             copy(state.x, out[state.count[SAMPLED]], state.x.size)
             if with_energy:
                 account_output(problem, tables, energy_tables, state, scratch, now[T], out[state.count[SAMPLED]])
             state.count[SAMPLED] += 1
-        if now[T] >= t_end:
+        if now[T] >= now[T_END]:
             return -1
 
         # --- the time up to the next output, the end, or the end of the signals' cell
         first = due[state.count[SAMPLED]]
         second = due[min(state.count[SAMPLED] + 1, out.shape[0])]
-        target = _target(tables, now[T], first, second, t_end)
+        target = _target(tables, now[T], first, second, now[T_END])
         begin, span, rest, offset, cell = now[T], target - now[T], np.inf, 0.0, 0
         if sampled:
             cell, offset = cell_of(problem, now[T])
@@ -297,7 +298,7 @@ def fly(problem, tables, energy_tables, state, scratch, t_end, budget, out, due)
         state.count[STEPS] += 1
         count += 1
         if first < now[T]:
-            _sample(problem, tables, energy_tables, state, scratch, begin, out, due)
+            _sample(problem, tables, energy_tables, state, scratch, begin)
         if with_energy and sampled and cell_of(problem, now[T])[0] != cell:
             account_state(problem, tables, energy_tables, state, scratch)
         if stop >= 0:

@@ -13,7 +13,18 @@ from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.fields import shapes_of
 from solvers.compiled.kernels import PLANAR_PROBLEM, Problem
 from solvers.compiled.packed import Layout, Packed
-from solvers.compiled.state import HEAD, STATE, State, T, begin_state, gaps_of, law_parameters, most_borders, radii_of
+from solvers.compiled.state import (
+    HEAD,
+    NO_ROWS,
+    STATE,
+    State,
+    T,
+    begin_state,
+    gaps_of,
+    law_parameters,
+    most_borders,
+    radii_of,
+)
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.linearised import linearise_run
 from solvers.exponential.linearised_step import DERIVATIVES, VARIATION, Derivatives, Variation
@@ -53,7 +64,7 @@ class Tangent:
         if self.exact:
             self.y[-1, self.places] = -self.change.steady(0.0)
         self.latched[2 * n : 2 * n + own, self.places_latched[:own]] = np.eye(own)
-        engine.record_events(np.empty((_ROWS, HEAD + width + rows * S)))
+        engine.record(event_record=np.empty((_ROWS, HEAD + width + rows * S)))
         self.packed = [
             *(
                 engine.packed if same is engine.problem else Packed.of(same, PLANAR_PROBLEM)
@@ -108,7 +119,7 @@ def _layout(**known: int) -> Layout:
     """Shapes and places of the arrays of `Derivatives` and of the past `State`."""
     latched = known["l"]
     working = latched * (5 + latched) + 2 + known["P"] + known["B"]
-    sizes = {**known, "S": S, "STAGES": STAGES, "renewed": working, "rows": 0, "record": 0}
+    sizes = {**known, "S": S, "STAGES": STAGES, "renewed": working, **NO_ROWS}
     return Layout([DERIVATIVES, STATE], [shapes_of(Derivatives, sizes), shapes_of(State, sizes)])
 
 

@@ -69,7 +69,7 @@ def replayed(
     run = prepared_run(system, x[:n], x[n:], duration, times, method, False, memory)
     status = run.to_the_end(None)
     solution = run.solution(status, 0.0)
-    rows = run.log[: int(run.state.count[_LOGGED])].copy()
+    rows = run.state.log[: int(run.state.count[_LOGGED])].copy()
     run.release()
     if solution.status is not Status.DONE:
         raise SolverError(f"the run has no derivative to its end: {solution.status.value}", solution)

@@ -220,18 +220,18 @@ def border_apart(problem, state, space, h, s, j):
 
 
 @inner
-def renew_border(problem, state, space, s, j, log):
+def renew_border(problem, state, space, s, j):
     """Renew one border in the present state."""
     if rubs(problem, s):
         delta, rate = 0.0, 0.0  # it looks for itself
     else:
         delta, rate = margins_in(problem, state, s, state.x, space.trial, space.margin)
-    renew(problem, state, s, j, delta, rate, log)
+    renew(problem, state, s, j, delta, rate)
     note_event(state)
 
 
 @kernel
-def renew_together(problem, state, space, h, element, border, log):
+def renew_together(problem, state, space, h, element, border):
     """Renew the border landed on by a step of duration h, and all whose margins have fallen to zero with it.
 
     Which ones is judged from the state alone, before any is renewed. One that began at zero, as after its own renewal,
@@ -250,12 +250,12 @@ def renew_together(problem, state, space, h, element, border, log):
             before, rounding = max(space.at_start[s, j], space.one[j]), space.rounding[s, j]
             reached = before > rounding and space.present[s, j] <= max(8.0 * rounding, _TOGETHER * before)
             if reached or (s == element and j == border):
-                renew(problem, state, s, j, delta, rate, log)
+                renew(problem, state, s, j, delta, rate)
     note_event(state)
 
 
 @inner
-def renew_passed(problem, state, space, log):
+def renew_passed(problem, state, space):
     """Renew every border whose margin is below zero in the present state; whether there was any.
 
     After each the margins are read again: another border of the same segment is none of the next one.
@@ -267,7 +267,7 @@ def renew_passed(problem, state, space, log):
         delta, rate = _present(problem, state, space, s, state.now[T], state.x, state.rate)
         for j in range(problem.border_count[s]):
             if space.present[s, j] < -space.rounding[s, j]:
-                renew(problem, state, s, j, delta, rate, log)
+                renew(problem, state, s, j, delta, rate)
                 _present(problem, state, space, s, state.now[T], state.x, state.rate)
                 found = True
     if found:

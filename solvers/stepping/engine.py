@@ -17,6 +17,7 @@ from solvers.compiled.state import (
     H_FLIGHT,
     LAW_NOT_FINITE,
     RUNNING,
+    T_END,
     State,
     T,
     begin_contacts,
@@ -49,6 +50,7 @@ class Engine:
         if method.events == HENON:
             self.problem.knots[:, 1:] = math.inf  # kinks are not looked for
         self.state: State = new_state(z, len(system.contacts), sum(c.friction is not None for c in system.contacts))
+        self.state.now[T_END] = duration
         dt = 0.0 if method.adaptive else max(method.steps)
         least = negligible_energy(self.problem, np.sum(self.problem.load * self.problem.power, axis=1), dt)
         watch = watched(system, self.back @ z, least)
@@ -61,11 +63,15 @@ class Engine:
         self.rate, loop = rhs, march_of(isinstance(self.problem, PlanarProblem))
         self.loop: Any = partial(loop, method.step)
 
-    def start(self, log: Array) -> None:
+    def record(self, **arrays: Array) -> None:
+        """Let other arrays be those of the state that outputs go to: ``log``, ``out``, ``due``."""
+        self.state = self.state._replace(**arrays)
+
+    def start(self) -> None:
         """Find the segment of every stop and evaluate the first rate."""
         state = self.state
         begin_contacts(self.problem, state)
-        log_begin(self.problem, state, log)
+        log_begin(self.problem, state)
         state.count[CALLS] += self.rate(
             *(self.problem, 0.0, state.x, state.segment, state.entry_rate, state.rate, self.space.work[0])
         )
@@ -74,15 +80,15 @@ class Engine:
         """The energy balance is integrated along, always."""
         return True
 
-    def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
+    def march(self, budget: int) -> int:
         """Advance by at most ``budget`` steps."""
         method = self.method
         if self.state.now[T] == 0.0 and not np.isfinite(self.state.rate).all():
             return LAW_NOT_FINITE  # loads and starts were looked at before
         steps = (math.inf, math.inf) if method.adaptive else method.steps
         code = self.loop(
-            *(self.problem, self.state, self.space, self.duration, budget, steps, (method.rtol, self.atol)),
-            *(method.adaptive, method.events, log, out, due),
+            *(self.problem, self.state, self.space, budget, steps, (method.rtol, self.atol)),
+            *(method.adaptive, method.events),
         )
         return GAINED if code in (DONE, RUNNING) and self._gained() else code
 

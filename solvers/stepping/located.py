@@ -35,6 +35,7 @@ from solvers.compiled.state import (
     RUNNING,
     SAMPLED,
     STEPS,
+    T_END,
     T,
     acting_segment,
     begins_and_ends,
@@ -161,9 +162,9 @@ def _side(problem, state, space, s, theta, lowest, batch):
 
 
 @inner
-def _sample(state, space, h, out, due):
+def _sample(state, space, h):
     """Write the output samples that lie within the step."""
-    t = state.now[T]
+    t, out, due = state.now[T], state.out, state.due
     while due[state.count[SAMPLED]] <= t + h:
         theta = min(max((due[state.count[SAMPLED]] - t) / h, 0.0), 1.0) if h > 0.0 else 0.0
         row, u = out[state.count[SAMPLED]], 1.0 - theta
@@ -221,34 +222,34 @@ def _if_accurate(h, error):
 
 
 @inner
-def _switch_by_sign(problem, state, log):
+def _switch_by_sign(problem, state):
     """Put every stop on the piece its indentation lies in, one border at a time; returns whether any moved."""
     switched = False
     for s in range(problem.law.size):
         delta = indentation(problem, s, state.x)
         if delta > problem.knots[s, state.segment[s]]:
-            switch(problem, state, s, 1, log)
+            switch(problem, state, s, 1)
             switched = True
         elif state.segment[s] > 0 and delta <= problem.knots[s, state.segment[s] - 1]:
-            switch(problem, state, s, -1, log)
+            switch(problem, state, s, -1)
             switched = True
     return switched
 
 
 @kernel
-def look(problem, state, space, t_end, log, events):
+def look(problem, state, space, events):
     """Before a step: a status code if the run is over, SWITCHED if a stop switched or passed a border, else RUNNING."""
-    if state.now[T] >= t_end:
+    if state.now[T] >= state.now[T_END]:
         return DONE
-    if state.count[LOGGED] + most_rows(problem) > log.shape[0]:
+    if state.count[LOGGED] + most_rows(problem) > state.log.shape[0]:
         return LOG_FULL
     if state.count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
         return CHATTER
     if events == IGNORED:
-        switched = _switch_by_sign(problem, state, log)
+        switched = _switch_by_sign(problem, state)
     else:
-        switched = switch_on_surface(problem, state, log, events == LOCATED)
-    return SWITCHED if renew_passed(problem, state, space, log) or switched else RUNNING
+        switched = switch_on_surface(problem, state, events == LOCATED)
+    return SWITCHED if renew_passed(problem, state, space) or switched else RUNNING
 
 
 @kernel
@@ -262,18 +263,18 @@ def find(problem, state, space):
 
 
 @kernel
-def accept(problem, state, space, h, stop, direction, at_end, t_end, log, out, due):
+def accept(problem, state, space, h, stop, direction, at_end):
     """Record a step that ends on an event of ``stop`` (-1: of none) and go on from its end; returns a status code."""
     if not np.isfinite(dot(space.x_new, space.x_new, space.x_new.size)):
         return LAW_NOT_FINITE if _law_fails(problem, state, space, h) else DIVERGED
-    _sample(state, space, h, out, due)
+    _sample(state, space, h)
     _peaks(problem, state, space, h)
     copy(space.x_new, state.x, state.x.size)
     copy(space.rate_new, state.rate, state.x.size)
-    state.now[T] = t_end if at_end else state.now[T] + h
+    state.now[T] = state.now[T_END] if at_end else state.now[T] + h
     state.count[STEPS] += 1
     if stop >= 0:
-        switch(problem, state, stop, direction, log)
+        switch(problem, state, stop, direction)
     return RUNNING
 
 

@@ -35,6 +35,7 @@ from solvers.compiled.state import (
     RUNNING,
     STATE,
     STEP_TOO_SMALL,
+    T_END,
     State,
     T,
 )
@@ -142,20 +143,24 @@ def _entry_by_henon(problem, state, space, h):
 
 
 @shared
-def march(
-    step, rate_of, gained, problem, state, space, t_end, budget, steps, tolerances, adaptive, events, log, out, due
-):
-    """Advance the state to ``t_end`` or for ``budget`` steps; returns a status code.
+def march(step, rate_of, gained, problem, state, space, budget, steps, tolerances, adaptive, events):
+    """Advance the state to the end of the run or for ``budget`` steps; returns a status code.
 
     ``rate_of`` writes the rate of a state as `rhs` does, ``gained`` says whether the run gains energy; ``steps`` are
     the longest in flight and in contact, s, ``tolerances`` (rtol, atol).
     """
-    now, count, (dt_flight, dt_contact), (rtol, atol) = state.now, state.count, steps, tolerances
+    now, count, t_end, (dt_flight, dt_contact), (rtol, atol) = (
+        state.now,
+        state.count,
+        state.now[T_END],
+        steps,
+        tolerances,
+    )
     not_finite, by_hand = False, False
     nearest = 0.0  # a kink nearer than this has been reached: there rounding switches the law to and fro
     for _ in range(budget):
         # --- end of the run, and what can stop it early
-        code = look(problem, state, space, t_end, log, events)
+        code = look(problem, state, space, events)
         if code == SWITCHED:
             _renew(rate_of, problem, state, space)
             continue
@@ -186,7 +191,7 @@ def march(
         if events == LOCATED:
             theta, stop, direction, level, border = _first_event(problem, state, space, h, adaptive)
             if border >= 0 and theta == 0.0:  # the step begins on the border and goes across
-                renew_border(problem, state, space, stop, border, log)
+                renew_border(problem, state, space, stop, border)
                 _renew(rate_of, problem, state, space)
                 continue
             if theta == UNRESOLVED:
@@ -217,11 +222,11 @@ def march(
 
         # --- accept, record
         at_end = stop < 0 and h == tried and h >= t_end - now[T]
-        code = accept(problem, state, space, h, stop if border < 0 else -1, direction, at_end, t_end, log, out, due)
+        code = accept(problem, state, space, h, stop if border < 0 else -1, direction, at_end)
         if code != RUNNING:
             return code
         if border >= 0 and now[T] < t_end:
-            renew_together(problem, state, space, h, stop, border, log)
+            renew_together(problem, state, space, h, stop, border)
         if stop >= 0:
             _renew(rate_of, problem, state, space)
         if gained(problem, state, space):
@@ -235,11 +240,9 @@ def march(
     return RUNNING
 
 
-def _march_modes(step, problem, state, space, t_end, budget, steps, tolerances, adaptive, events, log, out, due):
+def _march_modes(step, problem, state, space, budget, steps, tolerances, adaptive, events):
     """`march` on decoupled modes."""
-    return march(
-        step, rhs, modal_gains, problem, state, space, t_end, budget, steps, tolerances, adaptive, events, log, out, due
-    )
+    return march(step, rhs, modal_gains, problem, state, space, budget, steps, tolerances, adaptive, events)
 
 
 @lru_cache(maxsize=2)
@@ -249,8 +252,8 @@ def march_of(planar: bool) -> Any:
     step = types.Tuple([REAL, types.int64])(
         *[problem, REAL, REAL, VECTOR, VECTOR, INTEGERS, VECTOR], *[VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL]
     )
-    known = types.FunctionType(step), problem, STATE, SPACE, REAL, types.int64, pair, pair
-    return entry(types.int64(*known, types.boolean, types.int64, MATRIX, MATRIX, VECTOR))(_march_modes)
+    known = types.FunctionType(step), problem, STATE, SPACE, types.int64, pair, pair
+    return entry(types.int64(*known, types.boolean, types.int64))(_march_modes)
 
 
 def new_space(

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from solvers.compiled.kernels import rhs
-from solvers.compiled.state import H_CONTACT, H_FLIGHT, matrix_problem_of, new_state
+from solvers.compiled.state import H_CONTACT, H_FLIGHT, T_END, matrix_problem_of, new_state
 from solvers.problem import Array, Forcing, System
 from solvers.stepping.energy_gain import LEAST, NOW, gains, negligible_energy, watched
 from solvers.stepping.engine import Engine
@@ -41,24 +41,24 @@ class MatrixEngine(Engine):
         self.problem = matrix_problem_of(system, forcing)
         self.back = eye_array(2 * system.size, format="csc")
         self.state = new_state(z, len(system.contacts))
-        self.state.now[[H_FLIGHT, H_CONTACT]] = method.steps
+        self.state.now[[H_FLIGHT, H_CONTACT, T_END]] = *method.steps, duration
         self.space = new_space(self.problem, self.state, method.work_rows, watched(system, z, 0.0), method.constants)
         self.open = np.zeros_like(self.state.segment)
         self.moving = slice(system.size, 2 * system.size)  # the rates in x, the accelerations and forces in its rate
         self.factors: dict[float, Factor] = {}
         self.loop = partial(march, method.matrix_step(self), self.rate, self.gained)
 
-    def start(self, log: Array) -> None:
+    def start(self) -> None:
         """Find what energy counts as rounding, the segment of every stop, and the first rate."""
         vectors, solve = self.problem.power[:, self.moving], self.factor(MASS).solve
         least = negligible_energy(self.problem, np.array([v @ solve(v) for v in vectors]), self.method.dt)
         self.space.watch[LEAST] = least
-        super().start(log)
+        super().start()
 
-    def march(self, budget: int, log: Array, out: Array, due: Array) -> int:
+    def march(self, budget: int) -> int:
         """Advance by at most ``budget`` steps."""
         with np.errstate(all="ignore"):  # the loop reports what is not finite
-            return super().march(budget, log, out, due)
+            return super().march(budget)
 
     def gained(self, problem: Any, state: Any, space: Any) -> bool:
         """Whether energy comes from nowhere."""

@@ -4,8 +4,9 @@
 
 A target is an example, a file of tests or one test; without any, all examples and all tests marked `chaotic` or `drawn`
 (--any: of files of tests all tests). Realisations 1 to 100 have other seeds and starts a rounding away, see
-`tests/realisation.py`; each target runs in a process of its own, examples with --quick where they know it. Rows go to
-the file --out, and what it holds is not computed again.
+`tests/realisation.py`; each target runs in a process of its own, examples with --quick where they know it. What they do
+not change, such as periodic motion, is tried five times: a target is settled where all margins of five realisations are
+above 1000 of their deviations. Rows go to the file --out, and what it holds is not computed again.
 
 A statement is a comparison in an assert: a < b has the margin b - a, of arrays the smallest. Printed is how often each
 target holds, and the statements whose mean margin is below 6 of its standard deviations. Margins are no Gaussians: one
@@ -17,6 +18,7 @@ import argparse
 import ast
 import builtins
 import contextlib
+import functools
 import io
 import json
 import multiprocessing
@@ -40,6 +42,7 @@ EXAMPLES = TESTS.parent / "examples"
 COMPARED = {"Lt": operator.lt, "LtE": operator.le, "Gt": operator.gt, "GtE": operator.ge, "Eq": operator.eq}
 MARK = re.compile(r"pytest\.mark\.(chaotic|drawn)")
 LONGEST = 1800  # s, of one target in one realisation
+FEW, SETTLED = 5, 1e3  # realisations, and deviations of all margins above which no more are computed
 
 test, statements = "", []  # under way: the test that runs; [test, where, text, margin] of what was asserted
 
@@ -191,9 +194,14 @@ def tried(target, number, everything):
 
 def compute(tasks, options):
     """Every task in a process of its own, some at once."""
-    for running, (target, number) in enumerate(tasks):
+    running = 0
+    for target, number in tasks:
         if running >= options.jobs:
             os.wait()
+            running -= 1
+        if number > FEW and is_settled(Path(target).name, options.out):
+            continue
+        running += 1
         if os.fork() == 0:
             signal.alarm(LONGEST)
             try:
@@ -219,6 +227,34 @@ def rows_of(path):
         return [json.loads(line) for line in file]
 
 
+def margins_of(rows):
+    """Margins in all realisations, and the place, of every statement: by target, test, text, and how often passed."""
+    margins, places = defaultdict(list), {}
+    for row in rows:
+        seen = defaultdict(int)
+        for name, where, text, gap in row["statements"]:
+            seen[name, text] += 1  # a line may be passed many times, always in this order
+            key = row["target"], name, text, seen[name, text]
+            margins[key].append(gap)
+            places[key] = where
+    return margins, places
+
+
+def ratio_of(margins):
+    """The mean margin in standard deviations."""
+    deviation = np.std(margins, ddof=1) if len(margins) > 1 else 0.0
+    return np.mean(margins) / deviation if deviation else np.inf
+
+
+@functools.cache
+def is_settled(target, path):
+    """Whether the first realisations of a target all held, with margins that other realisations do not change."""
+    first = [row for row in rows_of(path) if row["target"] == target and row["number"] <= FEW]
+    found = margins_of(first)[0].values()
+    held = len(first) == FEW and not any(row["failed"] for row in first)
+    return held and bool(found) and all(ratio_of(margins) > SETTLED for margins in found)
+
+
 def print_shares(rows):
     """How often every target held, and the seconds of processor it took."""
     held, seconds = defaultdict(list), defaultdict(list)
@@ -233,19 +269,12 @@ def print_shares(rows):
 
 def print_margins(rows, below):
     """Statements whose margin is small against its scatter, the smallest first."""
-    margins, places = defaultdict(list), {}
-    for row in rows:
-        seen = defaultdict(int)
-        for name, where, text, gap in row["statements"]:
-            seen[name, text] += 1  # a line may be passed many times, always in this order
-            key = row["target"], name, text, seen[name, text]
-            margins[key].append(gap)
-            places[key] = where
+    margins, places = margins_of(rows)
     thinnest = {}
     for key, found in margins.items():
         mean, deviation, least = np.mean(found), np.std(found, ddof=1) if len(found) > 1 else 0.0, min(found)
-        ratio = mean / deviation if deviation else np.inf
-        if least < 0 or (deviation and ratio < below):
+        ratio = ratio_of(found)
+        if least < 0 or ratio < below:
             text = f"{places[key]} {key[1].split('::')[-1]} {key[2]}"
             line = ratio, f"{mean:11.3g} {deviation:11.3g} {least:11.3g} {len(found):5}  {text}"
             thinnest[text] = min(line, thinnest.get(text, line))
@@ -270,8 +299,8 @@ def main():
     sys.path[:0] = [str(TESTS), str(TESTS.parent)]
     import conftest
 
-    for kernels in conftest.KERNELS:  # once for all processes
-        exec(kernels, {})
+    for kernels in [*conftest.KERNELS, "import matplotlib.pyplot, scipy.stats, skfem, fembeam.study"]:
+        exec(kernels, {})  # once for all processes
     watch_tests()
     known, names = {(row["target"], row["number"]) for row in rows_of(options.out)}, {Path(one).name for one in targets}
     wanted = [(one, number) for number in range(1, options.count + 1) for one in targets]

@@ -317,15 +317,15 @@ def passed(problem, state, scratch, element, border, w, x):
 
 
 @inner
-def renew_border(problem, state, scratch, element, border, log):
+def renew_border(problem, state, scratch, element, border):
     """Renew one border in the present state."""
     delta, rate = margins_of(problem, state, scratch, element, state.now[T], state.x, scratch.margin)
-    renew(problem, state, element, border, delta, rate, log)
+    renew(problem, state, element, border, delta, rate)
     note_event(state)
 
 
 @inner
-def renew_all(problem, state, scratch, element, border, log):
+def renew_all(problem, state, scratch, element, border):
     """Renew the border landed on, and all whose margins fell to zero with it since ``scratch.stages[START]``.
 
     Which ones is judged from the state alone, before any is renewed. One that began at zero, as after its own renewal,
@@ -350,5 +350,5 @@ def renew_all(problem, state, scratch, element, border, log):
             scratch.fired[j] = 1.0 if landed else 0.0
         for j in range(count):
             if scratch.fired[j] > 0.0:
-                renew(problem, state, s, j, delta, rate, log)
+                renew(problem, state, s, j, delta, rate)
     note_event(state)

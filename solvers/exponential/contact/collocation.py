@@ -49,6 +49,7 @@ from solvers.compiled.sums import combine, iterate_power_law, replace_values
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
 from solvers.exponential.contact.node_response import (
+    RTOL,
     force_of,
     largest_size,
     motion_of,
@@ -94,7 +95,7 @@ def _iterate(problem, tables, state, scratch, node_set, level):
 
 
 @merged
-def _set_accuracy(problem, tables, state, scratch, h, rtol):
+def _set_accuracy(problem, tables, state, scratch, h):
     """Tolerance of each stop's force, N: it changes no indentation rate by more than a twentieth of its tolerance.
 
     Returns whether a dashpot is so strong that iterations would diverge, by its slope in the last Newton iteration.
@@ -107,7 +108,7 @@ def _set_accuracy(problem, tables, state, scratch, h, rtol):
                 for r in range(problem.gap.size):
                     most = max(most, abs(tables.accelerance[r, u]) / scratch.reference_speed[element_of(problem, r)])
                 copy(scratch.force[u], scratch.guess[u], S)
-            scratch.force_tolerance[s] = 0.05 * rtol / (h * most)
+            scratch.force_tolerance[s] = 0.05 * scratch.accuracy[RTOL] / (h * most)
             stiff |= h * own_accelerance(problem, tables, s) * scratch.viscous[s] > 1.0
     for s in range(problem.law.size if not stiff else 0):
         scratch.viscous[s] = 0.0
@@ -122,10 +123,10 @@ def _is_last(change, before):
     return change * change <= max(before - change, change / 9.0)
 
 
-@part(SOLVE, types.boolean, types.int64, types.int64, types.float64)
-def solve_forces(problem, tables, state, scratch, node_set, level, rtol):
+@part(SOLVE, types.boolean, types.int64, types.int64)
+def solve_forces(problem, tables, state, scratch, node_set, level):
     """Solve for the forces by fixed-point iteration, else by Newton's method; returns whether a solution was found."""
-    if _set_accuracy(problem, tables, state, scratch, tables.contact_step[level], rtol):
+    if _set_accuracy(problem, tables, state, scratch, tables.contact_step[level]):
         return newton(problem, tables, state, scratch, node_set, level)
     before, alone = 0.0, _alone(problem, tables, state)
     law, unit = tables.power_law[max(alone, 0)], 1.0 / scratch.force_tolerance[max(alone, 0)] ** 2
@@ -170,8 +171,8 @@ def _largest(problem, tables, state, scratch, s):
     return largest_size(force), largest_size(slope[0])
 
 
-@part(ERROR, REAL, types.int64, types.int64, REAL)
-def step_error(problem, tables, state, scratch, node_set, level, rtol):
+@part(ERROR, REAL, types.int64, types.int64)
+def step_error(problem, tables, state, scratch, node_set, level):
     """Largest error of an indentation rate by the unresolved part of the forces, in units of the stop's tolerance.
 
     On an entry step the nodes are those of Gauss's rule for the stop that enters, not for the others.
@@ -207,7 +208,7 @@ def step_error(problem, tables, state, scratch, node_set, level, rtol):
         speed = scratch.reference_speed[element_of(problem, r)]
         if r < row_of(problem, element_of(problem, r)) + 2:  # how fast a place turns is no measure of its friction
             speed = max(speed, largest_size(scratch.motion[r, 1]))
-        error = scratch.per_row[r] / (rtol * speed)
+        error = scratch.per_row[r] / (scratch.accuracy[RTOL] * speed)
         if not error <= worst:
             worst = error
             if error != error:

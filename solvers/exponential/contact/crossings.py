@@ -39,7 +39,7 @@ from solvers.compiled.state import PEAK_FORCE, T_IN, T, acts, begins_and_ends, i
 from solvers.compiled.sums import above
 from solvers.exponential.circles.contact import radial_nodes, stays_in_circle
 from solvers.exponential.contact.many_stops import CONTINUING, ENTERING, add_block_motion, motion_at_nodes, uses_blocks
-from solvers.exponential.contact.node_response import motion_of, respond, ripple_of_stop
+from solvers.exponential.contact.node_response import RTOL, motion_of, respond, ripple_of_stop
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import largest_indentation
 from solvers.exponential.flight import energy_norms
@@ -218,7 +218,7 @@ def choose_sides(problem, tables, state, scratch):
 
 
 @inner
-def first_bend(problem, tables, state, scratch, node_set, level, is_new, rtol):
+def first_bend(problem, tables, state, scratch, node_set, level, is_new):
     """(time after the start of the step, stop) of the first bend on it; no stop is -1.
 
     A stop that begins on its bend (``is_new``), or was taken across it by the landing of another stop, gets the side of
@@ -236,7 +236,9 @@ def first_bend(problem, tables, state, scratch, node_set, level, is_new, rtol):
         largest = abs(begin)
         for i in range(S + 1):
             largest = max(largest, abs(values[i]))
-        harmless = 0.01 * rtol * scratch.reference_speed[s] if tables.bend[s] == RATE else scratch.force_tolerance[s]
+        harmless = scratch.force_tolerance[s]
+        if tables.bend[s] == RATE:
+            harmless = 0.01 * scratch.accuracy[RTOL] * scratch.reference_speed[s]
         if largest <= harmless:
             continue
         on = scratch.side[s] * begin < 0.0 or (is_new and abs(begin) <= _ON * largest)

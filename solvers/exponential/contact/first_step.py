@@ -27,7 +27,7 @@ from solvers.exponential.contact.peaks import pressed_speed, state_peaks
 from solvers.exponential.flight import energy_norms
 from solvers.exponential.tables import EXPONENT, STIFFNESS
 
-LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN = range(6)  # places in Scratch.control
+LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN, BALANCED = range(7)  # places in Scratch.control
 ENTRY, SEGMENT = 1, 2  # values of NEW: the first step of a contact, or of a segment of its law; 0 for other steps
 _LEAST = 1e-60  # m/s, of a reference speed
 _PRESSED = 1e-3  # the least in units of the speed which the force would give: what presses at rest moves by rounding

@@ -40,6 +40,7 @@ from solvers.compiled.state import (
     PEAK_DELTA,
     PEAK_FORCE,
     SAMPLED,
+    T_END,
     T,
     rate_tolerance,
     surface_tolerance,
@@ -49,8 +50,9 @@ from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import land_on_circle
 from solvers.exponential.contact.borders import margins_later, margins_of, passed
 from solvers.exponential.contact.crossings import CLEAR, TOO_LONG, before_landing, side_at
+from solvers.exponential.contact.first_step import BALANCED
 from solvers.exponential.contact.landing_step import INDENTATION, ROOT, TIME, landing_step, start_landing
-from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, START
+from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, REACH, RTOL, START
 from solvers.exponential.contact.peaks import state_peaks
 
 _MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
@@ -67,7 +69,7 @@ def landing_reach(rtol: float) -> float:
 
 
 @inner
-def _error(problem, scratch, part, rtol):
+def _error(problem, scratch, part):
     """Largest error of an indentation rate in the step just taken, in units of the stop's tolerance.
 
     It is estimated by a ``part`` of the embedded difference.
@@ -76,7 +78,7 @@ def _error(problem, scratch, part, rtol):
     combine(scratch.stages, E5, STAGES, None, scratch.stages[DIFFERENCE])
     for r in range(problem.gap.size):
         error = part * abs_dot(problem.read_rate[r], scratch.stages[DIFFERENCE], 2 * problem.k.size)
-        error /= rtol * scratch.reference_speed[element_of(problem, r)]
+        error /= scratch.accuracy[RTOL] * scratch.reference_speed[element_of(problem, r)]
         if not error <= worst:
             worst = error
     return worst
@@ -90,7 +92,7 @@ def _difference(problem, r, d, span):
 
 
 @inner
-def _error_in_time(problem, scratch, span, rtol):
+def _error_in_time(problem, scratch, span):
     """The same of a step in time, from both embedded differences of rate and indentation."""
     fifth, third, worst = scratch.stages[DIFFERENCE], scratch.stages[BATCH], 0.0
     combine(scratch.stages, E5, STAGES, None, fifth)
@@ -99,7 +101,7 @@ def _error_in_time(problem, scratch, span, rtol):
         error = _difference(problem, r, fifth, span)
         if error > 0.0:
             error *= error / math.hypot(error, 0.1 * _difference(problem, r, third, span))
-        error /= rtol * scratch.reference_speed[element_of(problem, r)]
+        error /= scratch.accuracy[RTOL] * scratch.reference_speed[element_of(problem, r)]
         if not error <= worst:
             worst = error
     return worst
@@ -119,16 +121,16 @@ def _goes_ahead(scratch, size):
 
 
 @inner
-def _step(problem, tables, state, scratch, variable, stop, span, with_energy):
+def _step(problem, tables, state, scratch, variable, stop, span):
     """A step from ``scratch.stages[START]`` to ``scratch.stages[LANDED]``."""
     state.count[CALLS] += landing_step(
-        *(problem, tables, with_energy, variable, stop, span, scratch.stages[START]),
+        *(problem, tables, scratch.control[BALANCED] > 0, variable, stop, span, scratch.stages[START]),
         *(state.segment, state.entry_rate, scratch.side, scratch.stages),
     )
 
 
 @merged
-def _length_to(problem, tables, state, scratch, variable, stop, span, landed, time, with_energy):
+def _length_to(problem, tables, state, scratch, variable, stop, span, landed, time):
     """Length of the step that ends, in ``scratch.stages[LANDED]``, at a time before the landing; inf if not found."""
     w, x, size, tries = scratch.stages[START], scratch.stages[LANDED], state.x.size, 0
     t = w[size]
@@ -136,7 +138,7 @@ def _length_to(problem, tables, state, scratch, variable, stop, span, landed, ti
     kappa = tables.time_exponent[1 + stop]
     length = span * (1.0 - (left ** (1.0 / kappa) if variable == ROOT else left))
     while True:
-        _step(problem, tables, state, scratch, variable, stop, length, with_energy)
+        _step(problem, tables, state, scratch, variable, stop, length)
         late, tries = x[size] - time, tries + 1
         pace = 1.0 if variable == TIME else indentation_rate(problem, stop, x)  # d(variable)/dt
         if variable == ROOT:
@@ -157,22 +159,23 @@ def _begin_peaks(problem, state, scratch):
 
 
 @inner
-def _accept(problem, tables, state, scratch, variable, stop, level, span, t_end, out, due, with_energy):
+def _accept(problem, tables, state, scratch, variable, stop, level, span):
     """Move the state to the landing in ``scratch.stages[LANDED]``, or to the end of the run; write samples between."""
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
-    landed, t = x[size], state.now[T]
+    landed, t, t_end = x[size], state.now[T], state.now[T_END]
     _begin_peaks(problem, state, scratch)
     copy(x, state.x, size)
     while True:
-        time = min(due[state.count[SAMPLED]], t_end)
+        due = state.due[state.count[SAMPLED]]
+        time = min(due, t_end)
         if time > landed:
             break
-        length = _length_to(problem, tables, state, scratch, variable, stop, span, landed, time, with_energy)
+        length = _length_to(problem, tables, state, scratch, variable, stop, span, landed, time)
         if length == np.inf:
             copy(w, state.x, size)
             return False
-        if time == due[state.count[SAMPLED]]:
-            copy(x, out[state.count[SAMPLED]], size)
+        if time == due:
+            copy(x, state.out[state.count[SAMPLED]], size)
             state.count[SAMPLED] += 1
         if time == t_end:
             copy(x, state.x, size)
@@ -191,7 +194,7 @@ def _accept(problem, tables, state, scratch, variable, stop, level, span, t_end,
 @inlined
 def _furthest(problem, tables, scratch):
     """Longest landing, s: within the reach of the fastest block, and within a cell of the sampled signals."""
-    furthest = scratch.landing_reach[0] / tables.fastest
+    furthest = scratch.accuracy[REACH] / tables.fastest
     return min(furthest, problem.table_dt[0]) if problem.table_dt.size else furthest
 
 
@@ -227,14 +230,14 @@ def may_land(problem, tables, state, scratch, stop, direction, near):
     if direction < 0 and state.segment[stop] == 1:
         last = _LAST
         if tables.time_exponent[1 + stop] == 2.0:
-            last = min(_LAST_ROOT * scratch.landing_reach[0] ** 2, _MOST_ROOT)
+            last = min(_LAST_ROOT * scratch.accuracy[REACH] ** 2, _MOST_ROOT)
         return delta <= last * state.active[stop, PEAK_DELTA]
     level = _level(problem, state, stop, direction)
     return state.segment[stop] == 0 or abs(level - delta) <= 0.2 * max(level, delta)
 
 
 @merged
-def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
+def land(problem, tables, state, scratch, stop, direction, near):
     """Try to land on a border of ``stop``, about ``near`` s ahead.
 
     Returns ``stop`` if it succeeded, another stop whose border is crossed before, or -1.
@@ -248,7 +251,7 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
     w, x = scratch.stages[START], scratch.stages[LANDED]
     variable = ROOT if leaving and kappa > 1.0 else INDENTATION
     span = -w[size + 1] if variable == ROOT else _level(problem, state, stop, direction) - scratch.start_motion[stop, 0]
-    _step(problem, tables, state, scratch, variable, stop, span, with_energy)
+    _step(problem, tables, state, scratch, variable, stop, span)
     landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and kappa == 4.0 else _PART
     if scratch.viscous[stop] > 0.0:  # too strong a dashpot for an explicit step
         part = 1.0
@@ -259,7 +262,7 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
         return -1
     if not (
         _goes_ahead(scratch, size)
-        and _error(problem, scratch, part, rtol) <= 1.0
+        and _error(problem, scratch, part) <= 1.0
         and direction * indentation_rate(problem, stop, x) >= 0.0  # it has not turned back
     ):
         return -1
@@ -269,7 +272,7 @@ def land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, ou
     if other != CLEAR:
         return max(other, -1)
     level = _level(problem, state, stop, direction)
-    done = _accept(problem, tables, state, scratch, variable, stop, level, span, t_end, out, due, with_energy)
+    done = _accept(problem, tables, state, scratch, variable, stop, level, span)
     return stop if done else -1
 
 
@@ -294,7 +297,7 @@ def _rises(problem, state, scratch, s, border, time):
 
 
 @merged
-def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_end, out, due, with_energy):
+def land_on_bend(problem, tables, state, scratch, stop, border, near):
     """Try to land on the bend of ``stop``, or on a border of its law, about ``near`` s ahead; whether it succeeded.
 
     A border that is passed before is noted in ``scratch.landed``: -1 if none is, and less if that cannot be told.
@@ -311,10 +314,10 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
     before, apart, span = 0.0, _apart(problem, tables, state, scratch, stop, border, w), near
     if (apart if border >= 0 else abs(apart)) <= 1e-6 * largest:  # it begins there: the secant needs another point
         before = 0.9 * near
-        _step(problem, tables, state, scratch, np.int64(TIME), stop, before, with_energy)
+        _step(problem, tables, state, scratch, np.int64(TIME), stop, before)
         apart = _apart(problem, tables, state, scratch, stop, border, x)
     for _ in range(_MOST_TRIES):
-        _step(problem, tables, state, scratch, np.int64(TIME), stop, span, with_energy)
+        _step(problem, tables, state, scratch, np.int64(TIME), stop, span)
         value = _apart(problem, tables, state, scratch, stop, border, x)
         if abs(value) <= enough:
             break
@@ -324,7 +327,7 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
         if not 0.1 * near < following <= furthest or following == span:
             return False
         before, apart, span = span, value, following
-    if not (abs(value) <= 1e-6 * largest and _error_in_time(problem, scratch, span, rtol) <= 1.0):
+    if not (abs(value) <= 1e-6 * largest and _error_in_time(problem, scratch, span) <= 1.0):
         return False
     if border >= 0 and _rises(problem, state, scratch, stop, border, 1e-3 * span):  # it has been below zero before
         return False
@@ -337,4 +340,4 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_en
     if not lower < indentation(problem, stop, x) < upper:
         return False
     variable = np.int64(TIME)  # a literal would be compiled for itself
-    return _accept(problem, tables, state, scratch, variable, stop, 0.0, span, t_end, out, due, with_energy)
+    return _accept(problem, tables, state, scratch, variable, stop, 0.0, span)

@@ -44,6 +44,7 @@ DELTAS, RATES, FORCES, KNOWN = range(
 )  # rows of `Scratch.local_motion`: m, m/s, N at points around a node; the values they are interpolated from
 
 
+RTOL, REACH = range(2)  # places in Scratch.accuracy
 _KINK = 1e-2  # of a smooth signal the jumps are a tenth of this or less, see `solvers.problem.common_grid`
 _SEEN = 4.0  # times the last two coefficients of a signal: a difference up to this is what they stand for
 
@@ -88,11 +89,11 @@ class Scratch(NamedTuple):
     side: Annotated[Any, "E"]  # +1 or -1: side of its law's bend on which each stop is, see `crossings`
     side_at_begin: Annotated[Any, "E"]  # the same at the start of the step tried
     bend_values: Annotated[Any, "S+2"]  # of one stop at the nodes and at the end, then the largest, see `crossings`
-    landing_reach: Annotated[Any, "1"]  # radians of the fastest block that a landing may take
+    accuracy: Annotated[Any, "2"]  # rtol; radians of the fastest block that a landing may take
     duration: Annotated[Any, "1"]  # s: estimate for the contact begun last, as if nothing else acted on the body
     energy_sums: Annotated[Any, "2+L, numbers"]  # see `energy.flight_balance` and `contact_balance`
     energy: Annotated[Any, "3"]  # J, see `energy.check`
-    control: Annotated[Any, "int 6"]  # of the step control, places named in `step`
+    control: Annotated[Any, "int 7"]  # of the step control, places named in `step`
     start_motion: Annotated[Any, "E, 2"]  # δ and δ̇ at the start of the step
     node_time: Annotated[Any, "S"]  # s, of the nodes of the step tried
     slid: Annotated[Any, "G, 4, S"]  # ξ, ξ̇ and F_t at the nodes, then numbers of a moment; see `circles.friction`

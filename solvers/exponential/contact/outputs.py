@@ -12,6 +12,7 @@ from solvers.compiled.state import (
     RECORDED,
     SAMPLED,
     STEPS,
+    T_END,
     T,
     acting_segment,
     begins_and_ends,
@@ -31,15 +32,16 @@ _BRIEF = 1.0  # radians of the fastest block in which nodes miss nothing of δ̇
 
 
 @merged
-def sample_step(problem, tables, energy_tables, state, scratch, node_set, level, t_end, out, due):
+def sample_step(problem, tables, energy_tables, state, scratch, node_set, level):
     """Write the samples inside the converged step, and the state at the end of the run if it is inside."""
-    t, h, begin, row = state.now[T], tables.contact_step[level], 0.0, state.x
+    t, h, begin, row, t_end = state.now[T], tables.contact_step[level], 0.0, state.x, state.now[T_END]
     while True:
-        sampled = due[state.count[SAMPLED]] <= min(t + h, t_end)
+        due = state.due[state.count[SAMPLED]]
+        sampled = due <= min(t + h, t_end)
         if not sampled and t + h < t_end:
             return
-        span = due[state.count[SAMPLED]] - t if sampled else t_end - t
-        following = out[state.count[SAMPLED]] if sampled else scratch.stages[START]
+        span = due - t if sampled else t_end - t
+        following = state.out[state.count[SAMPLED]] if sampled else scratch.stages[START]
         copy(row, following, state.x.size)
         state_within(problem, tables, state, scratch, node_set, h, begin, span, following, energy_tables.active > 0.0)
         if not sampled:
@@ -49,9 +51,10 @@ def sample_step(problem, tables, energy_tables, state, scratch, node_set, level,
 
 
 @merged
-def end_run(problem, tables, state, scratch, node_set, level, t_end):
+def end_run(problem, tables, state, scratch, node_set, level):
     """End the run within the step, in the state that `sample_step` has put into ``scratch.stages[START]``."""
-    x, share = scratch.stages[START], (t_end - state.now[T]) / tables.contact_step[level]
+    x, t_end = scratch.stages[START], state.now[T_END]
+    share = (t_end - state.now[T]) / tables.contact_step[level]
     place = share ** (1.0 / tables.time_exponent[node_set])
     for s in range(problem.law.size):
         if acting_segment(problem, state, s) > 0 and begins_and_ends(problem, s):

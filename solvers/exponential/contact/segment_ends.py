@@ -9,21 +9,19 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import MATRIX, REAL, VECTOR, indentation
+from solvers.compiled.kernels import REAL, indentation
 from solvers.compiled.parts import FIRST_END, GO_BEYOND, LAND, LAND_IN_TIME, part
 from solvers.exponential.contact.borders import UNRESOLVED, border_ahead, renew_all, renew_border
 from solvers.exponential.contact.crossings import first_bend
 from solvers.exponential.contact.landing import land, land_on_bend
 from solvers.exponential.contact.node_response import LANDED
 
-_OUTPUT = REAL, REAL, MATRIX, VECTOR, types.boolean  # types of rtol, t_end, out, due, with_energy
 
-
-@part(LAND, types.UniTuple(types.int64, 2), types.int64, types.int64, REAL, *_OUTPUT)
-def land_first(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy):
+@part(LAND, types.UniTuple(types.int64, 2), types.int64, types.int64, REAL)
+def land_first(problem, tables, state, scratch, stop, direction, near):
     """Land on the border met first, be it that of another stop; (stop, direction), or (-1, 0) if not possible."""
     for _ in range(problem.law.size + 1):
-        landed = land(problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy)
+        landed = land(problem, tables, state, scratch, stop, direction, near)
         if landed == stop or landed < 0:
             return landed, direction
         above = indentation(problem, landed, scratch.stages[LANDED]) > problem.knots[landed, state.segment[landed]]
@@ -31,13 +29,13 @@ def land_first(problem, tables, state, scratch, stop, direction, near, rtol, t_e
     return -1, 0
 
 
-@part(FIRST_END, types.Tuple((REAL, types.int64)), types.int64, types.int64, types.boolean, REAL)
-def first_end(problem, tables, state, scratch, node_set, level, is_new, rtol):
+@part(FIRST_END, types.Tuple((REAL, types.int64)), types.int64, types.int64, types.boolean)
+def first_end(problem, tables, state, scratch, node_set, level, is_new):
     """(time after the start of the step tried, stop) of the first bend or border on it; no stop is -1.
 
     Of a border ``scratch.border`` holds which it is, else -1. The stop is `UNRESOLVED` if the step is too long to tell.
     """
-    first, stop = first_bend(problem, tables, state, scratch, node_set, level, is_new, rtol)
+    first, stop = first_bend(problem, tables, state, scratch, node_set, level, is_new)
     time, element, border = border_ahead(problem, tables, state, scratch, node_set, level)
     scratch.border[0] = border if time < first else -1
     if element == UNRESOLVED and level < tables.contact_step.size - 1:
@@ -45,12 +43,12 @@ def first_end(problem, tables, state, scratch, node_set, level, is_new, rtol):
     return (time, element) if time < first else (first, stop)
 
 
-@part(LAND_IN_TIME, types.Tuple((types.int64, types.boolean)), types.int64, REAL, *_OUTPUT)
-def land_in_time(problem, tables, state, scratch, stop, first, rtol, t_end, out, due, with_energy):
+@part(LAND_IN_TIME, types.Tuple((types.int64, types.boolean)), types.int64, REAL)
+def land_in_time(problem, tables, state, scratch, stop, first):
     """Land on a bend or border of ``stop``, or on a border met before; (stop, whether it succeeded)."""
     border, near = scratch.border[0], first
     for _ in range(problem.law.size + 1):
-        if land_on_bend(problem, tables, state, scratch, stop, border, near, rtol, t_end, out, due, with_energy):
+        if land_on_bend(problem, tables, state, scratch, stop, border, near):
             scratch.border[0] = border
             return stop, True
         if scratch.border[0] < 0 or scratch.landed[0] < 0:
@@ -59,13 +57,13 @@ def land_in_time(problem, tables, state, scratch, stop, first, rtol, t_end, out,
     return stop, False
 
 
-@part(GO_BEYOND, types.void, types.int64, types.boolean, MATRIX)
-def go_beyond(problem, state, scratch, stop, alone, log):
+@part(GO_BEYOND, types.void, types.int64, types.boolean)
+def go_beyond(problem, state, scratch, stop, alone):
     """What ends on a bend goes on beyond it: the other side, or numbers latched on a border."""
     border = scratch.border[0]
     if border < 0:
         scratch.side[stop] = -scratch.side[stop]
     elif alone:
-        renew_border(problem, state, scratch, stop, border, log)
+        renew_border(problem, state, scratch, stop, border)
     else:
-        renew_all(problem, state, scratch, stop, border, log)
+        renew_all(problem, state, scratch, stop, border)

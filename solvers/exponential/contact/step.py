@@ -12,9 +12,7 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.kernels import (
-    MATRIX,
     REAL,
-    VECTOR,
     acceleration_of,
     contact_forces,
     copy,
@@ -37,6 +35,7 @@ from solvers.compiled.state import (
     STEP,
     STEP_TOO_SMALL,
     STEPS,
+    T_END,
     T,
     acts,
     in_contact,
@@ -76,8 +75,8 @@ _ORDER = 15.0  # the error estimate falls like h^15
 _ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # an error with steps √2 times shorter, over that before
 
 
-@part(PRESSED, types.boolean, MATRIX)
-def _switch_pressed(problem, state, log):
+@part(PRESSED, types.boolean)
+def _switch_pressed(problem, state):
     """Switch every stop at rest on its surface that other stops' forces press into it; returns whether any did."""
     switched = False
     for s in range(problem.law.size):
@@ -88,7 +87,7 @@ def _switch_pressed(problem, state, log):
         batch = state.active[s, :3]  # of a contact not begun yet
         rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, batch)
         if acceleration_of(problem, s, state.x, state.rate) > 0.0:
-            switch(problem, state, s, np.int64(1), log)
+            switch(problem, state, s, np.int64(1))
             switched = True
     return switched
 
@@ -146,7 +145,7 @@ def _predict(problem, tables, state, scratch, level):
 
 
 @merged
-def _attempt(problem, tables, state, scratch, node_set, level, rtol):
+def _attempt(problem, tables, state, scratch, node_set, level):
     """Attempt one contact step; (error in units of the tolerance, time of a bend it crosses, stop of that bend).
 
     With inf comes the time of a bend or border that is in its way and the stop, else inf and -1; of a border
@@ -156,46 +155,45 @@ def _attempt(problem, tables, state, scratch, node_set, level, rtol):
     scratch.border[0] = -1
     free_response(problem, tables, state, scratch, node_set, level)
     _predict(problem, tables, state, scratch, level)
-    if not solve_forces(problem, tables, state, scratch, node_set, level, rtol):
+    if not solve_forces(problem, tables, state, scratch, node_set, level):
         return np.inf, first, bent
     end_state(problem, tables, state, scratch, node_set, level)
     if leaves_segment(problem, tables, state, scratch, node_set, level):
         return 1.0 if bottom else np.inf, first, bent
     if problem.parts[FIRST_END]:
-        first, bent = first_end(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0, rtol)
+        first, bent = first_end(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0)
     if bent == UNRESOLVED:
         return np.inf, np.inf, -1
     if bent >= 0:
         return 1.0 if bottom else np.inf, first, bent
-    error = step_error(problem, tables, state, scratch, node_set, level, rtol)
+    error = step_error(problem, tables, state, scratch, node_set, level)
     return min(error, 1.0) if bottom else error, first, bent
 
 
 @merged
-def _try_landing(problem, tables, state, scratch, stop, direction, near, rtol, t_end, log, out, due, with_energy):
+def _try_landing(problem, tables, state, scratch, stop, direction, near):
     """Land on the border met first and switch its stop, if it is near enough; whether it was done."""
-    stop, direction = land_first(
-        problem, tables, state, scratch, stop, direction, near, rtol, t_end, out, due, with_energy
-    )
+    stop, direction = land_first(problem, tables, state, scratch, stop, direction, near)
     if stop < 0:
         return False
     state.count[STEPS] += 1
-    if state.now[T] < t_end:
-        switch(problem, state, stop, direction, log)
+    if state.now[T] < state.now[T_END]:
+        switch(problem, state, stop, direction)
         if in_contact(state):
             begin_steps(problem, tables, state, scratch, stop)
     return True
 
 
-@part(ACCEPT, types.void, *[types.int64] * 3, REAL, types.int64, REAL, MATRIX, MATRIX, VECTOR)
-def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent, t_end, log, out, due):
+@part(ACCEPT, types.void, *[types.int64] * 3, REAL, types.int64)
+def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent):
     """Complete the step found: samples, the end of the run if it is within, energy, event record, next step."""
     h = tables.contact_step[level]
     end = state.now[T] + h
-    if end >= t_end or due[state.count[SAMPLED]] <= end:
-        sample_step(problem, tables, energy_tables, state, scratch, node_set, level, t_end, out, due)
-    if end >= t_end:
-        end_run(problem, tables, state, scratch, node_set, level, t_end)
+    over = end >= state.now[T_END]
+    if over or state.due[state.count[SAMPLED]] <= end:
+        sample_step(problem, tables, energy_tables, state, scratch, node_set, level)
+    if over:
+        end_run(problem, tables, state, scratch, node_set, level)
         return
     for r in range(problem.gap.size):
         if acts(problem, state, r):
@@ -207,51 +205,47 @@ def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wan
     finish_step(problem, tables, state, scratch, node_set, level)
     _adapt(tables, scratch, level, node_set, wanted, error)
     if bent >= 0:  # crossed within the shortest step
-        go_beyond(problem, state, scratch, bent, True, log)
+        go_beyond(problem, state, scratch, bent, True)
         scratch.control[NEW] = SEGMENT if scratch.border[0] >= 0 else 0
     state.count[STEPS] += 1
 
 
-@part(CONTACT, types.int64, REAL, REAL, MATRIX, MATRIX, VECTOR)
-def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol, log, out, due):
+@part(CONTACT, types.int64)
+def advance_contact(problem, tables, energy_tables, state, scratch):
     """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
-    control, bottom, with_energy = scratch.control, tables.contact_step.size - 1, energy_tables.active > 0.0
+    control, bottom = scratch.control, tables.contact_step.size - 1
     near, stop, direction = _nearest_surface(problem, state, scratch)
-    if near <= 0.0 and switch_on_surface(problem, state, log, True):
+    if near <= 0.0 and switch_on_surface(problem, state, True):
         if in_contact(state):
             begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
-    if control[NEW] == ENTRY and problem.parts[PRESSED] and _switch_pressed(problem, state, log):
+    if control[NEW] == ENTRY and problem.parts[PRESSED] and _switch_pressed(problem, state):
         begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
     if (
         stop >= 0
         and may_land(problem, tables, state, scratch, stop, direction, near)
-        and _try_landing(
-            problem, tables, state, scratch, stop, direction, near, rtol, t_end, log, out, due, with_energy
-        )
+        and _try_landing(problem, tables, state, scratch, stop, direction, near)
     ):
         return RUNNING
     node_set = control[NODE_SET] if control[NEW] else 0
     longest = 0.8 * near
     if problem.table_dt.size:
-        longest = min(longest, t_end - state.now[T] + problem.table_dt[0])
+        longest = min(longest, state.now[T_END] - state.now[T] + problem.table_dt[0])
     wanted = control[NEXT_LEVEL]
     level = level_of(tables, longest) if longest < tables.contact_step[wanted] else wanted
     copy(scratch.side, scratch.side_at_begin, scratch.side.size)
     while True:
-        error, first, bent = _attempt(problem, tables, state, scratch, node_set, level, rtol)
+        error, first, bent = _attempt(problem, tables, state, scratch, node_set, level)
         if error <= 1.0:
             break
         landed = first == 0.0 and scratch.border[0] >= 0  # it begins on the border and goes across
         if bent >= 0 and not landed:
-            bent, landed = land_in_time(
-                problem, tables, state, scratch, bent, first, rtol, t_end, out, due, with_energy
-            )
+            bent, landed = land_in_time(problem, tables, state, scratch, bent, first)
         if landed:
             state.count[STEPS] += 1
-            if state.now[T] < t_end:
-                go_beyond(problem, state, scratch, bent, first == 0.0, log)
+            if state.now[T] < state.now[T_END]:
+                go_beyond(problem, state, scratch, bent, first == 0.0)
             control[NEW], control[NODE_SET], control[NEXT_LEVEL] = SEGMENT, 0, max(level, wanted)
             if rubs(problem, bent):  # it may have stuck where its contact began
                 control[NODE_SET] = entry_nodes(problem, tables, state, bent, control[NEXT_LEVEL])
@@ -265,7 +259,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch, t_end, rtol,
             continue
         level = min(bottom, level + (1 + int(2.0 / _ORDER * math.log2(error / _GOAL)) if error < np.inf else 2))
         wanted = level
-    _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent, t_end, log, out, due)
+    _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent)
     return RUNNING
 
 
