@@ -24,7 +24,7 @@ from fembeam.scene.signals import is_of_signal
 from fembeam.support import Part, Printed, require
 from solvers.orbits import codes, counts, delayed
 from solvers.problem import counted, dataframe
-from solvers.sensitivities import Nearby, sensitivity
+from solvers.sensitivities import Nearby, indentation_change, sensitivity
 
 if TYPE_CHECKING:
     import solvers
@@ -120,31 +120,23 @@ class Sensitivity(Printed):
 
     def indentation(self, stop: int | str = 0) -> Vector:
         """Of δ(t) of a stop, (k,) m or rad, its gap's own change included; stops as for `Run.indentation`."""
-        return -self._of_element(self.q, self._own.q, stop, True)
+        return self._of_stop(stop)[0]
 
     def indentation_rate(self, stop: int | str = 0) -> Vector:
         """Of δ̇(t), m/s or rad/s, likewise."""
-        return -self._of_element(self.q_dot, self._own.q_dot, stop, False)
+        return self._of_stop(stop)[1]
 
     @property
     def _own(self) -> Any:
         """The solution, of which the samples are part."""
         return self.found.solution
 
-    def _of_element(self, changed: Vector, motion: Vector, stop: int | str, with_gap: bool) -> Vector:
-        """w·dq + dw·q, and the change of the gap."""
+    def _of_stop(self, stop: int | str) -> tuple[Vector, Vector]:
+        """Of δ and δ̇ at fixed times."""
         number = self.run.number(stop)
         contact = self.run.readout.model.system.contacts[number]
-        require(contact.map == "line", "derivatives of an indentation are those of a stop on a line", stop,
-                "Sensitivity.indentation", "ask for displacements")  # fmt: skip
-        found = changed @ contact.direction
-        if self.systems is not None:
-            found = found + self._at_samples(motion) @ self.systems.derivative(
-                lambda one: one.contacts[number].direction
-            )
-            if with_gap:
-                found = found + self.systems.derivative(lambda one: one.contacts[number].gap)
-        return np.asarray(found)
+        own = self._at_samples(self._own.q), self._at_samples(self._own.q_dot)
+        return indentation_change(contact, number, self.systems, own, (self.q, self.q_dot))
 
     def _at_samples(self, motion: Vector) -> Vector:
         """Rows of the solution at the samples."""
@@ -317,7 +309,6 @@ def of_run(run: Run, parameter: str | None, start: ArrayLike | None) -> Sensitiv
         raise ValueError("a run read from a file has no model to be derived from; simulate it again")
     require((parameter is None) != (start is None), "give a parameter or a direction of the start", (parameter, start),
             "Run.sensitivity", "e.g. 'stops[0].gap'")  # fmt: skip
-    _check_stops(model, "Run.sensitivity")
     times = run.t if run.sampled else np.array([made.duration])
     x, n = made.start, len(model.omega)
     options = {"method": made.solver, "memory": run.began or None}
@@ -328,13 +319,6 @@ def of_run(run: Run, parameter: str | None, start: ArrayLike | None) -> Sensitiv
     varied = _Varied(model, path_of(model.scene, parameter))
     found = sensitivity(model.system, x[:n], x[n:], made.duration, times, varied.systems, varied.start(x), **options)
     return _warned(Sensitivity(varied.path, varied.value, run, found, 0.0, varied.models, varied.systems))
-
-
-def _check_stops(model: Model, where: str) -> None:
-    """Raise ValueError for stops whose derivatives are not known: circular clearances, and those with friction."""
-    beyond = [one.name for one in model.contact_rows if one.is_circle or one.friction]
-    require(not beyond, "derivatives are of stops on lines, without friction", beyond, where,
-            "take differences of runs")  # fmt: skip
 
 
 def _direction(model: Model, start: Any) -> Vector:
@@ -374,7 +358,6 @@ def of_amplitude(orbit: Orbit, z: Any, parameter: str) -> float:
 def of_orbit(orbit: Orbit, parameter: str, times: Vector | None = None) -> Sensitivity:
     """See `Orbit.sensitivity`; at ``times`` (s since ``found.phase``, ascending) instead of those of the run."""
     model, found = orbit.model, orbit.found
-    _check_stops(model, "Orbit.sensitivity")
     varied, n = _Varied(model, path_of(model.scene, parameter)), len(model.omega)
     later, system = varied.systems.map(lambda one: delayed(one, found.phase)), delayed(found.system, found.phase)
     known = found.state[:n], found.state[n:], found.period

@@ -132,5 +132,5 @@ def _replaced(item: Any, path: list[str], value: float) -> Any:
 def changes_structure(path: str) -> bool:
     """Whether a parameter changes the mode shapes or frequencies: anything but signals, gaps and laws."""
     part = re.sub(r"^(bodies\[\d+\]\.)+", "", path)
-    place = re.fullmatch(r"\w+\[\d+\]\.(z|on|to)(\[\d+\])?", part)
+    place = re.fullmatch(r"\w+\[\d+\]\.(z|on|to|direction|tangent|directions)(\[\d+\])*", part)
     return not (is_of_signal(path) or part.startswith(("stops", "elements"))) or place is not None

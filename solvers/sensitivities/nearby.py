@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from solvers.problem import Array, System, dense
+from solvers.sensitivities.elements import motion_of
 
 _STENCILS = {  # offsets in steps, weights per step with errors of fourth order, and of second order
     0: ((-2, -1, 1, 2), (1 / 12, -2 / 3, 2 / 3, -1 / 12), (-1 / 4, 0.0, 0.0, 1 / 4)),
@@ -73,14 +75,67 @@ def combined(weights: tuple[float, ...], values: list[Any]) -> Any:
     return sum(weight * (value - first) for weight, value in zip(weights, values, strict=True))
 
 
+@dataclass(frozen=True, eq=False)
+class ElementChange:
+    """Derivative of an element's data: its rows (m, n) and their offsets (m,), see `elements`; |c|; μ, k_t and R Ω."""
+
+    rows: Array
+    offsets: Array
+    clearance: float
+    mu: float
+    stiffness: float
+    surface: float
+
+    @classmethod
+    def of(cls, nearby: Nearby, s: int) -> ElementChange:
+        """Of element s."""
+
+        def of(read: Callable[[Any], Any]) -> Array:
+            return nearby.derivative(lambda one: read(one.contacts[s]))
+
+        numbers = (_clearance, _mu, _stiffness, _surface)
+        return cls(of(lambda one: one.rows), of(lambda one: one.row_gaps), *(float(of(read)) for read in numbers))
+
+
+def indentation_change(
+    contact: Any, s: int, nearby: Nearby | None, motion: tuple[Array, Array], change: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Changes (k,) of δ and δ̇ of element s for those of q and q̇ (k, n) at fixed times."""
+    (q, q_dot), (d_q, d_q_dot) = motion, change
+    y, y_dot = -contact.rows @ q.T - contact.row_gaps[:, None], -contact.rows @ q_dot.T
+    moved, sped, clearance = -contact.rows @ d_q.T, -contact.rows @ d_q_dot.T, 0.0
+    if nearby is not None:
+        one = ElementChange.of(nearby, s)
+        moved, sped = moved - one.rows @ q.T - one.offsets[:, None], sped - one.rows @ q_dot.T
+        clearance = one.clearance * np.sign(contact.circle)
+    along = motion_of(contact, 0.0, y, y_dot)
+    rate = (along.press * sped + along.turning * moved).sum(axis=0)
+    return (along.press * moved).sum(axis=0) - clearance, rate
+
+
+def _clearance(contact: Any) -> float:
+    return contact.gap if contact.map == "annulus" else 0.0
+
+
+def _mu(contact: Any) -> float:
+    return contact.friction.mu if contact.friction else 0.0
+
+
+def _stiffness(contact: Any) -> float:
+    return contact.friction.stiffness if contact.friction else 0.0
+
+
+def _surface(contact: Any) -> float:
+    return contact.law.arm * contact.spin if contact.friction else 0.0
+
+
 class Change:
-    """Derivative of the data: matrices, directions (E, n), gaps (E,), knots, loads' vectors (L, n) and signals."""
+    """Derivative of the data: matrices, elements, knots, loads' vectors (L, n) and signals."""
 
     def __init__(self, system: System, nearby: Nearby, duration: float) -> None:
         self.nearby = nearby
         self.M, self.B, self.K = (self._matrix(name) for name in ("M", "by_rate", "K"))
-        self.directions = nearby.derivative(_directions)
-        self.gaps = nearby.derivative(lambda one: [contact.gap for contact in one.contacts])
+        self.elements = [ElementChange.of(nearby, s) for s in range(len(system.contacts))]
         self.vectors = nearby.derivative(_vectors)
         self.signals = [self._signal(system, i, duration) for i in range(len(nearby.systems[0].loads))]
         self.laws = [self._law(s) for s in range(len(nearby.systems[0].contacts))]
@@ -92,6 +147,11 @@ class Change:
     def structural(self) -> bool:
         """Whether matrices or loads' vectors change."""
         return any(np.any(one) for one in (self.M, self.B, self.K, self.vectors))
+
+    @cached_property
+    def turned(self) -> bool:
+        """Whether rows of elements change."""
+        return any(np.any(one.rows) for one in self.elements)
 
     @property
     def forced(self) -> bool:
@@ -147,11 +207,6 @@ class Change:
             return np.asarray(waves.real.sum(axis=-1))
 
         return slope
-
-
-def _directions(system: System) -> Array:
-    """(E, n)."""
-    return np.array([contact.direction for contact in system.contacts]).reshape(len(system.contacts), system.size)
 
 
 def _vectors(system: System) -> Array:

@@ -22,6 +22,7 @@ from solvers.sensitivities.stretches import (
     Stretch,
     acting_at_start,
     grouped,
+    motion_at,
     replayed,
 )
 
@@ -92,7 +93,7 @@ def sensitivity(
     Raises
     ------
     NoDerivativeError : a contact grazes, to 1e-9 of the motion, or comes as near without being met.
-    ValueError : bad input, a law with an infinite slope at its surface, panels beyond count, friction.
+    ValueError : bad input, a law with an infinite slope at its surface, panels beyond count.
     SolverError : the run fails.
 
     Notes
@@ -118,12 +119,6 @@ def sensitivity(
     from solvers.problem.run_arguments import check_slopes
 
     check_slopes(system)
-    for i, contact in enumerate(system.contacts):
-        if contact.friction is not None:
-            raise ValueError(
-                f"sensitivities take contacts without friction, and contact {i} has some; the derivative of the end is "
-                "given by integrate(tangent=True), or tangent=Parameter(...)"
-            )
     asked = _Asked(system, _state(q0, q_dot0), duration, np.atleast_1d(np.asarray(times, dtype=float)))
     method = Exponential() if method is None else method
     asked.method = replace(method, ledger=False) if isinstance(method, Exponential) else method
@@ -190,11 +185,10 @@ class _Asked:
         """Sizes of the displacements; NoDerivativeError for a stop that is touched but not entered."""
         self.span, self.depth = (np.zeros(len(self.system.contacts)) for _ in range(2))
         for s, contact in enumerate(self.system.contacts):
-            delta = -solution.q @ contact.direction
+            delta = motion_at(contact, solution.q.T, solution.q_dot.T).delta
             mine = rows[rows[:, at.ELEMENT] == s]
-            self.span[s] = np.abs(delta).max() + 1e-300
+            self.span[s] = np.abs(delta + contact.gap * (-1.0 if contact.outer else 1.0)).max() + 1e-300
             deepest = np.nanmax(np.append(mine[:, at.DEEPEST], 0.0))
-            delta = delta - contact.gap
             deepest = max(deepest, float((np.abs(delta) if contact.always else delta).max()))
             self.depth[s] = max(deepest, 1e-9 * self.span[s])
         self._check_apart(solution)
@@ -224,8 +218,8 @@ class _Asked:
     def _tops(self, solution: Solution, s: int) -> list[tuple[float, float, float]]:
         """Times of the maxima of δ below zero between samples, the distance of samples there, and δ of cubics."""
         contact, t = self.system.contacts[s], solution.t
-        delta, rate = -solution.q @ contact.direction - contact.gap, -solution.q_dot @ contact.direction
-        found = []
+        motion, found = motion_at(contact, solution.q.T, solution.q_dot.T), []
+        delta, rate = motion.delta, motion.rate
         for i in np.flatnonzero((rate[:-1] > 0.0) & (rate[1:] <= 0.0) & (delta[:-1] < 0.0) & (delta[1:] < 0.0)):
             h, x = t[i + 1] - t[i], rate[i] / (rate[i] - rate[i + 1])
             rest = 1.0 - x
@@ -316,7 +310,7 @@ class _Walk:
     def _check_start(self) -> None:
         """NoDerivativeError for a stop that begins on its surface without contact, if the parameter moves it."""
         for s, span in enumerate(self.asked.span):
-            near = abs(self.flow.motion_of(0.0, s)[0]) <= GRAZING * span
+            near = abs(self.flow.motion_of(0.0, s).delta[0]) <= GRAZING * span
             if near and not self.acting.segment[s] and self.flow.change(0.0, s)[0][-1] != 0.0:
                 raise NoDerivativeError(
                     f"no derivative: contact {s} is touched at the start, so that it differs on both sides; "
@@ -366,22 +360,23 @@ class _Walk:
         inside = list(stretch.edges[1:-1])
         places = list(stretch.panels[0].clock.place(stretch.edges[1:-1]))
         for panel in stretch.panels:
-            forces = self.flow.pass_panel(panel, stretch.acting)
-            self._look(panel, forces, stretch.acting)
+            changes = self.flow.pass_panel(panel, self.acting)
+            self._look(panel, changes, self.acting)
             while places and places[0] <= panel.high:
                 self._keep(inside.pop(0))
                 places.pop(0)
         self._keep(stretch.end)
 
-    def _look(self, panel: Any, forces: dict[int, Array], acting: Acting) -> None:
+    def _look(self, panel: Any, changes: dict[int, tuple[Array, Array]], acting: Acting) -> None:
         """Peaks within a panel, and how rough the derivatives are there."""
-        for s, change in forces.items():
+        for s, (change, forces) in changes.items():
             bent = self.flow.bend(panel.times, s, acting)
             if bent is not None:
                 places = panel.low + (panel.high - panel.low) * zeros(bent)
                 self.bends += panel.clock.time(np.clip(places, 0.0, 1.0)).tolist()
-            size = np.abs(change).max(axis=0)
-            tail = np.abs(coefficients(change)[-2:]).max(axis=0)
+            along = forces.transpose(1, 0, 2)
+            size = np.abs(along).max(axis=(0, 1))
+            tail = np.abs(coefficients(along)[-2:]).max(axis=(0, 1))
             scale = self._sizes.setdefault(s, np.zeros(len(size)))
             np.maximum(scale, size, out=scale)
             self.flow.roughness = max(self.flow.roughness, float((tail / np.where(scale > 0.0, scale, 1.0)).max()))
