@@ -55,6 +55,8 @@ def _numbers(path: str, item: Any) -> dict[str, float]:
         return {path: item}
     if isinstance(item, tuple) and all(isinstance(entry, float) for entry in item):
         return {f"{path}[{i}]": entry for i, entry in enumerate(item)}
+    if isinstance(item, tuple) and all(is_dataclass(entry) for entry in item):
+        return {name: value for i, entry in enumerate(item) for name, value in _numbers(f"{path}[{i}]", entry).items()}
     if isinstance(item, dict):
         return {name: value for key, part in item.items() for name, value in _numbers(f"{path}.{key}", part).items()}
     if not is_dataclass(item):
