@@ -1,5 +1,8 @@
 """Derivatives of runs and orbits with circular clearances and friction: closed forms, differences, the tangent."""
 
+from dataclasses import replace
+from itertools import islice
+
 import numpy as np
 import pytest
 from test_friction import EYE, SHARP, wall
@@ -10,7 +13,7 @@ from test_stops_with_friction import TUBE
 import fembeam as fb
 from contacts import Hertz, KelvinVoigt, PiecewiseLinear
 from fembeam.scene import with_value
-from solvers import Contact, Friction, Nearby, NoDerivativeError, System, integrate, sensitivity
+from solvers import Contact, Friction, Nearby, NoDerivativeError, System, integrate, lyapunov, sensitivity
 
 # --- closed forms ----------------------------------------------------------------------------------------------------
 
@@ -172,6 +175,49 @@ def test_an_orbit(path):
     near = {k: with_value(scene, path, found.value + k * step).reduce(modes=2).orbit(start=orbit) for k in (-1.0, 1.0)}
     expected = (near[1.0].state - near[-1.0].state) / (2.0 * step)
     np.testing.assert_allclose(found.state, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
+RUBS = [None, fb.Friction(0.02, 1.5e5)]
+
+
+@pytest.mark.parametrize("friction", RUBS, ids=["smooth", "rubs"])
+def test_branches_basins_and_exponents(friction):
+    """Studies of the scene: orbits along clearance and amplitude, what starts come to, the exponent of the orbit."""
+    model = tube(KelvinVoigt(2e5, 20.0), friction=friction).reduce(modes=2)
+    spans = {"stops[0].clearance": (1.6e-4, 2.4e-4), "forces[0].signal.amplitude": (50.0, 70.0)}
+    spans |= {} if friction is None else {"stops[0].friction.mu": (0.015, 0.025)}
+    for path, span in spans.items():
+        orbits = list(islice(model.branch(path, span), 3))
+        last = orbits[-1]
+        scene = with_value(model.scene, path, last.parameter)
+        again = scene.reduce(modes=2).orbit(start=last)
+        np.testing.assert_allclose(again.extremes((0.4, "x")), last.extremes((0.4, "x")), rtol=1e-6)
+    orbit = model.orbit()
+    largest = max(abs(m) for m in orbit.multipliers if abs(m) < 1.0 - 1e-6)
+    found = lyapunov(model.system, *np.split(orbit.state, 2), 8.0, discard=1.0)
+    assert found.value == pytest.approx(np.log(largest) / orbit.found.period, rel=0.05)
+    basins = fb.study.basins(
+        model, "displacement", (-1e-4, 1e-4), "velocity", (-0.01, 0.01), 2, z=(0.4, "x"), settle=30
+    )
+    assert len(basins.attractors) == 1
+
+
+@pytest.mark.parametrize("friction", RUBS, ids=["smooth", "rubs"])
+def test_random_response(friction):
+    """Means over time and over realisations of one noise agree within their scatter."""
+    scene = tube(KelvinVoigt(2e5, 20.0), friction=friction)
+    loads = [fb.PointForce(0.6, fb.BandNoise(1.0, (0.0, 600.0), seed=i), direction=d) for i, d in enumerate("xy")]
+    model = replace(scene, forces=loads).reduce(modes=2)
+
+    def mean_square(one):
+        return float(np.mean(one.simulate(0.4, 1e-3).displacement(0.4, "x")[100:] ** 2))
+
+    ensemble = fb.study.ensemble(model, 6, mean_square)
+    values, watch = ensemble.values[""], {"x": lambda run: run.displacement(0.4, "x")}
+    long = fb.study.stationary(model, 8.0, 1e-3, watch, discard=0.2)
+    power = long.power(0) if friction is None else long.wear(0)
+    assert power.value > 0.0
+    assert abs(values.mean() - long["x"].variance.value) < 4.0 * values.std(ddof=1)
 
 
 def test_a_direction_changes_rows():
