@@ -401,3 +401,16 @@ def test_a_data_set_has_friction(tube, monkeypatch):
         assert about == {"units": unit}
     plain, _, _ = hole(friction=None).reduce(modes=4).simulate(0.01, 1e-3).to_xarray()
     assert "friction" not in plain
+
+
+def test_a_law_that_pulls_is_told():
+    """Where N < 0 friction has no force: `check` says so, of laws that do pull alone."""
+    said = "the law pulls as a contact opens, N < 0; friction has no force there"
+    for law, pulls in (
+        (KelvinVoigt(2e5, 20.0), True),
+        (KelvinVoigt(2e5, 20.0, clamp=True), False),
+        (Hertz(1e8), False),
+    ):
+        scene = fb.Scene(fb.Frame.straight(1.0, TUBE, bending_only=True), [fb.Clamped("A")],
+                         stops=[fb.AnnularStop("B", law, 2e-4, friction=RUB)])  # fmt: skip
+        assert any(said in one for one in scene.check()) == pulls
