@@ -344,3 +344,36 @@ def test_what_takes_stops_on_lines_alone_says_so(run):
     with pytest.raises(ValueError, match=r"the modes must move the place of 'annular stop at 0\.4 m' along both"):
         model.scene.reduce(modes=[0]).simulate(0.01)
     assert np.isnan(backbone(model, (0.4, "x"), np.array([1e-3]))).all()
+
+
+def test_the_log_has_the_angles_of_entry_and_exit(run):
+    """Without friction too: those of the path at these times, which cubics through the samples give."""
+    log = run.contacts
+    fine = run.model.simulate(float(run.t[-1]), np.sort(np.concatenate([log.t_in, log.t_out[~np.isnan(log.t_out)]])),
+                              run.made.start, solver=METHOD)  # fmt: skip
+    angle = np.arctan2(*fine.place_in_clearance().T[::-1])
+    for times, angles in ((log.t_in, log.angle_in), (log.t_out, log.angle_out)):
+        ended = ~np.isnan(times)
+        np.testing.assert_allclose(angles[ended], angle[np.searchsorted(fine.t, times[ended])], atol=1e-6)
+    assert {"angle_in", "angle_out"} <= set(log.named_arrays())
+    line = fb.Scene(
+        fb.Beam(0.3, fb.Section.circle(2e11, 7800.0, 0.01)),
+        [fb.Clamped(0.0)],
+        stops=[fb.Stop(0.3, LAW)],
+        base=fb.Harmonic(1e-3, 90.0),
+    )
+    plain = line.reduce(modes=1).simulate(0.1).contacts
+    assert len(plain) > 0
+    assert "angle_in" not in plain.named_arrays()
+
+
+def test_whirl_is_animated(run, tmp_path):
+    """The place moves in its circle beside the tube, with the way it came."""
+    assert fb.plot.animate(run, tmp_path / "whirl.gif", frames=3).stat().st_size > 1000
+    t = float(run.t[len(run.t) // 2])
+    figure = fb.plot.frame(run, t, window=(t - 0.01, t + 0.01))
+    _, beside = figure.axes
+    at = 1e3 * run.place_in_clearance()[int(np.argmin(abs(run.t - t)))]
+    np.testing.assert_allclose(np.ravel(beside.lines[-1].get_data()), at, rtol=1e-9)
+    assert "clearance" in beside.get_title()
+    assert beside.get_xlabel() == "x / mm"

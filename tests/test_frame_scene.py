@@ -9,6 +9,7 @@ from frames import portal, space_l, turned
 import fembeam as fb
 from contacts import Hysteretic, KelvinVoigt
 from fembeam.response import coordinates
+from fembeam.scene import with_value
 
 STEEL = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
 LAW = Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.6)
@@ -183,3 +184,48 @@ def test_mechanisms():
     assert np.count_nonzero(free.omega == 0.0) == 3
     turning = fb.Scene(space_l(turned(3)), [fb.Pinned("A")]).reduce(modes=4, elements=4)
     assert np.count_nonzero(turning.omega == 0.0) == 3
+
+
+def pressed(force, upper=0.0, space=False):
+    """Euler's column, clamped below, in one member or in two; in space its weak axis is the other one."""
+    nodes = {"A": (0, 0), "B": (0.3, 0), "C": (1.0, 0)}
+    nodes = {name: (*at, 0) for name, at in nodes.items()} if space else nodes
+    up = {"up": "z"} if space else {}
+    members = [fb.Member("A", "B", STEEL, axial_force=force, **up), fb.Member("B", "C", STEEL, axial_force=upper, **up)]
+    return fb.Scene(fb.Frame(nodes, members), [fb.Clamped("A")])
+
+
+@pytest.mark.parametrize("space", [False, True], ids=["plane", "space"])
+def test_a_frame_that_buckles_is_refused_with_the_critical_force(space):
+    """Euler: π² EI/4L², the sentence names the member that loses most and its force then."""
+    critical = np.pi**2 * STEEL.bending_stiffness / 4.0
+    assert pressed(-0.999 * critical, -0.999 * critical, space).reduce(modes=1).omega[0] > 0.0
+    for force in (1.001 * critical, 100.0 * critical):
+        with pytest.raises(ValueError, match="axial_force of member 'B-C' must stay above") as refused:
+            pressed(-force, -force, space).reduce(modes=1)
+        assert "with all axial forces in proportion" in str(refused.value)
+        said = float(str(refused.value).split("above ")[1].split(" N")[0])
+        assert said == pytest.approx(-critical, rel=1e-4)
+
+
+def test_one_member_that_buckles_is_named():
+    with pytest.raises(
+        ValueError, match=r"of member 'A-B' must stay above .* where the frame buckles as it is held, got"
+    ):
+        pressed(-1e6).reduce(modes=1)
+
+
+def test_a_joined_frame_that_buckles_is_refused():
+    lower = fb.Frame({"A": (0, 0), "B": (0.3, 0)}, [fb.Member("A", "B", STEEL)])
+    upper = fb.Frame({"C": (0, 0), "D": (0.7, 0)}, [fb.Member("C", "D", STEEL, axial_force=-1e5)])
+    scene = fb.Scene(lower, [fb.Clamped("A")], bodies=[fb.Scene(upper)], joints=[fb.Joint("B", to=(1, "C"))])
+    with pytest.raises(ValueError, match="axial_force of member 'C-D' must stay above"):
+        scene.reduce(modes=1)
+
+
+def test_numbers_of_members_can_be_varied():
+    """A softer first member, by its path, is the frame made so; in space with the way of its height."""
+    scene = pressed(-10.0, space=True)
+    changed = with_value(scene, "beam.members[0].axial_force", -100.0)
+    expected = pressed(-100.0, space=True).reduce(modes=2).omega
+    np.testing.assert_allclose(changed.reduce(modes=2).omega, expected, rtol=1e-12)

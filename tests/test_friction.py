@@ -21,7 +21,6 @@ from solvers import (
     integrate_many,
     orbit,
 )
-from solvers.sensitivities import sensitivity
 
 SHARP = DormandPrince(1e-12)
 METHODS = [SHARP, Exponential(1e-12)]
@@ -443,11 +442,6 @@ def test_friction_must_be_one():
 def test_other_methods_refuse(method):
     with pytest.raises(ValueError, match="takes contacts without friction, and contact 0 has some"):
         integrate(wall(), [0.0, 0.0], [1.0, 0.0], 1.0, method=method)
-
-
-def test_sensitivities_refuse():
-    with pytest.raises(ValueError, match="sensitivities take contacts without friction, and contact 0 has some"):
-        sensitivity(wall(), [0.0, 0.0], [1.0, 0.0], 1.0)
 
 
 def test_a_whirl_without_loads_is_not_periodic_and_that_is_said():

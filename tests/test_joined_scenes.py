@@ -273,5 +273,16 @@ def test_held_twice():
     """Supports on both places of a joint hold one dof twice."""
     scene = scene_of([AT_B], HELD)
     scene = fb.Scene(scene.beam, [*scene.supports, fb.Fixed("B", "x")])
-    with pytest.raises(ValueError, match="a joint makes equal"):
+    with pytest.raises(ValueError, match="another one holds under another name, or by a joint"):
         scene.reduce(2)
+
+
+def test_a_body_that_a_joint_moves_is_told():
+    """Coordinates that meet, or begin at the joint, say nothing; others are moved, and the check says how far."""
+    far = fb.Frame({"C": (5, 5), "D": (6, 5)}, [fb.Member("C", "D", fb.Section.rectangle(2.1e11, 7850.0, 0.02, 0.01))])
+    near = fb.Frame.polyline({"A": (0, 0), "B": (1, 0)}, fb.Section.rectangle(2.1e11, 7850.0, 0.02, 0.01))
+    said = fb.Scene(near, [fb.Clamped("A")], bodies=[fb.Scene(far)], joints=[fb.Joint("B", (1, "C"))]).check()
+    assert [one for one in said if "moved by (-4, -5, 0) m, so that its 'C' meets" in one]
+    for joint in (fb.Joint("B", (1, "A")), fb.Joint("A", (1, "A"))):
+        said = fb.Scene(near, [fb.Clamped("A")], bodies=[fb.Scene(near)], joints=[joint]).check()
+        assert not [one for one in said if "moved by" in one]

@@ -1,6 +1,7 @@
 """Friction of stops in scenes: identities, the matrix level, balance, readout, files, parts of runs, bad input."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 import fembeam as fb
 import solvers
 from contacts import Hertz, KelvinVoigt, WaltonBraun
+from fembeam.model import run_csv
 from fembeam.response import backbone, states
 from fembeam.scene_file import SceneFileError, json_schema, read
 from fembeam.study.measure import cut
@@ -46,7 +48,7 @@ def frame(**options):
 def hole(z=0.4, **options):
     """A tube pushed about in a hole near its middle; with ``spin`` a shaft."""
     spin, bending = options.pop("spin", 0.0), options.pop("bending_only", True)
-    stop = fb.AnnularStop(z, LAW, 2e-4, friction=RUB, **options)
+    stop = fb.AnnularStop(z, LAW, 2e-4, **{"friction": RUB, **options})
     loads = [fb.PointForce(0.6, fb.Harmonic(60.0, 210.0), direction="x"),
              fb.PointForce(0.6, fb.Harmonic(30.0, 130.0, 1.0), direction="y")]  # fmt: skip
     body = fb.Frame.straight(1.0, TUBE, spin, bending_only=bending)
@@ -359,8 +361,6 @@ def test_the_main_method_gives_the_same(corner, tube, rolled):
 
 def test_what_does_not_follow_friction_says_so(tube, corner):
     for run in (tube, corner):
-        with pytest.raises(ValueError, match="derivatives are of stops on lines, without friction"):
-            run.sensitivity("damping.zeta")
         with pytest.raises(ValueError, match="RK4 takes contacts without friction"):
             run.model.simulate(0.01, solver=solvers.RK4(1e-5))
 
@@ -386,3 +386,30 @@ def test_figures_tell_stick_from_slip(tube):
         fb.plot.forces_in_clearance(tube, axes=fb.plot.orbit_in_clearance(tube).axes[0])
     with pytest.raises(ValueError, match="the window must hold at least 2 samples"):
         fb.plot.forces_in_clearance(tube, window=(3.0, 4.0))
+
+
+def test_a_data_set_has_friction(tube, monkeypatch):
+    """F_t and the loss by friction over time and stop; a stand-in keeps what xarray would be given."""
+    given = SimpleNamespace(Dataset=lambda variables, axes, about: (variables, axes, about))
+    monkeypatch.setattr(run_csv, "optional", lambda package, wanted: given)
+    variables, _, _ = tube.to_xarray()
+    for name, expected, unit in (("friction", tube.friction(0), "N"), ("friction_loss", tube.friction_loss[:, 0], "J")):
+        axes, values, about = variables[name]
+        assert axes == ("t", "stop")
+        np.testing.assert_array_equal(values[:, 0], expected)
+        assert about == {"units": unit}
+    plain, _, _ = hole(friction=None).reduce(modes=4).simulate(0.01, 1e-3).to_xarray()
+    assert "friction" not in plain
+
+
+def test_a_law_that_pulls_is_told():
+    """Where N < 0 friction has no force: `check` says so, of laws that do pull alone."""
+    said = "the law pulls as a contact opens, N < 0; friction has no force there"
+    for law, pulls in (
+        (KelvinVoigt(2e5, 20.0), True),
+        (KelvinVoigt(2e5, 20.0, clamp=True), False),
+        (Hertz(1e8), False),
+    ):
+        scene = fb.Scene(fb.Frame.straight(1.0, TUBE, bending_only=True), [fb.Clamped("A")],
+                         stops=[fb.AnnularStop("B", law, 2e-4, friction=RUB)])  # fmt: skip
+        assert any(said in one for one in scene.check()) == pulls

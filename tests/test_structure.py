@@ -1,5 +1,7 @@
 """Structures by their matrices: what is checked and told, massless dofs, units, given modes."""
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy import linalg, sparse
@@ -55,6 +57,8 @@ def test_a_lost_dof_shows_in_the_mass():
 
 
 BAD = [
+    (lambda: fb.Structure([[2.0 + 0.1j]], [[1.0]]), "K must be real; its largest imaginary part is, got 0.1"),
+    (lambda: fb.Structure(sparse.csr_array([[2.0]]), sparse.csr_array([[1.0 + 1e-9j]])), "M must be real"),
     (lambda: fb.Structure(np.ones((2, 3)), M), r"K must be square, got \(2, 3\) in Structure"),
     (lambda: fb.Structure(K, np.eye(3)), r"M must have the shape of K, \(2, 2\), got \(3, 3\)"),
     (lambda: fb.Structure(K, M, np.eye(3)), r"C must have the shape of K"),
@@ -162,3 +166,12 @@ def test_given_modes_are_the_structure_they_came_from():
 def test_given_modes_that_do_not_fit_are_refused(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_complex_numbers_without_imaginary_parts_are_real():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = fb.Structure([[8.0 + 0.0j]], sparse.csr_array([[2.0 + 0.0j]]))
+    assert fb.Scene(found).reduce(modes=1).omega == pytest.approx([2.0])
+    with pytest.raises(ValueError, match="shapes must be real; its largest imaginary part is, got 1"):
+        fb.Structure.of_modes([10.0], [[1.0 + 1.0j]], [("a", "x")])

@@ -193,6 +193,7 @@ ZERO = np.zeros((2, 2))
         ((np.eye(2), np.array([[0.0, 1.0], [-1.0, 0.0]]), ZERO), "C must be symmetric"),
         ((np.eye(2), ZERO, np.eye(3)), r"M, C, K must have one shape, got \(2, 2\), \(2, 2\), \(3, 3\)"),
         ((np.eye(2)[0], ZERO, ZERO), r"M must be square, got shape \(1, 2\)"),
+        ((np.eye(2), ZERO, (4.0 + 0.2j) * np.eye(2)), "K must be real, got imaginary parts up to 0.2"),
     ],
 )
 def test_matrices_are_refused(matrices, message):

@@ -1,6 +1,9 @@
 """The scripts of `examples/` for sphinx-gallery: in course order, with headings and the figures they write.
 
-Links of the pages to scripts, and to the course as a whole, lead to their pages in the gallery.
+Links of the pages to scripts, and to the course as a whole, lead to their pages in the gallery. Its pictures are kept
+in `_static/course`, so that a build that runs no scripts has them too; after one that runs them
+
+    python docs/_ext/course.py        renews the kept pictures by those of the last build
 """
 
 import re
@@ -13,6 +16,7 @@ from sphinx_gallery.scrapers import figure_rst
 HOME = Path(__file__).resolve().parent.parent
 EXAMPLES = HOME.parent / "examples"
 COPIES = HOME / "_build" / "examples"
+KEPT, WIDTH, COLOURS = HOME / "_static" / "course", 240, 32  # pictures of some 5 kB
 SCRIPT = re.compile(r"\[([^\]]+)\]\((?:\.\./)+examples/(\w+)\.py\)")
 COURSE = re.compile(r"\[([^\]]+)\]\((?:\.\./)+examples/README\.md\)")
 HEADER = """Course
@@ -30,7 +34,26 @@ def copy() -> None:
         shutil.copy(path, COPIES)
     (COPIES / "GALLERY_HEADER.rst").write_text(HEADER, encoding="utf-8")
     for path in EXAMPLES.glob("*.py"):
-        (COPIES / path.name).write_text(headed(path.read_text(encoding="utf-8")), encoding="utf-8")
+        text = headed(path.read_text(encoding="utf-8")) + pictured(path.stem)
+        (COPIES / path.name).write_text(text, encoding="utf-8")
+
+
+def pictured(name: str) -> str:
+    """What tells the gallery which picture a script has, if one is kept."""
+    path = KEPT / f"{name}.png"
+    return f'\n# sphinx_gallery_thumbnail_path = "{path.relative_to(HOME).as_posix()}"\n' if path.exists() else ""
+
+
+def keep() -> None:
+    """Small copies of the pictures of the last build, but for those that stand for none."""
+    from PIL import Image
+
+    KEPT.mkdir(exist_ok=True)
+    for path in sorted((HOME / "gallery" / "images").glob("sphx_glr_*_001.png")):
+        with Image.open(path) as image:
+            small = image.convert("RGB").resize((WIDTH, round(WIDTH * image.height / image.width)), Image.LANCZOS)
+        name = path.stem.removeprefix("sphx_glr_").removesuffix("_001")
+        small.quantize(COLOURS).save(KEPT / f"{name}.png", optimize=True)
 
 
 def headed(code: str) -> str:
@@ -81,3 +104,7 @@ def setup(app: object) -> dict[str, bool]:
     app.connect("config-inited", lambda app, config: copy(), priority=1)
     app.connect("source-read", linked)
     return {"parallel_read_safe": True}
+
+
+if __name__ == "__main__":
+    keep()

@@ -134,7 +134,8 @@ def check(
         steps["output step dt, 20 in the shortest period kept"] = 2 * math.pi / (20 * fastest(model))
     if shortest < math.inf:
         steps["output step dt to see the force, 20 in a contact"] = shortest / 20
-    found = [*model.scene.doubts, *said, *units.doubts(model), *sampling.of_run(model, duration, dt, discard)]
+    moved = getattr(model.scene.beam, "doubts", [])
+    found = [*model.scene.doubts, *moved, *said, *units.doubts(model), *sampling.of_run(model, duration, dt, discard)]
     found += [*failed, *of_contacts(model, touched)]
     modes = _suggested_modes(model.scene, shortest)
     return Check(model, touched, steps | _limits(model), modes, _correlation_time(model), found)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -114,7 +114,16 @@ def of_contacts(model: Model, touched: list[Touched]) -> list[str]:
     if short:
         found.append(f"contacts with {_listed(model, short)} excite modes above the {len(model.omega)} kept: forces "
                      "and contact times are this model's only; see suggested modes, or ask [mode_count]")  # fmt: skip
+    pulling = [stop for stop, row in enumerate(model.contact_rows) if row.friction and _pulls(row.law)]
+    if pulling:
+        found.append(f"{_listed(model, pulling)}: the law pulls as a contact opens, N < 0; friction has no force there")
     return found
+
+
+def _pulls(law: Any) -> bool:
+    """Whether a law is negative somewhere as a contact opens: just above its surface, at up to 10 m/s."""
+    depths, speeds = np.meshgrid(np.geomspace(1e-9, 1e-4, 6), -np.geomspace(1e-3, 10.0, 5))
+    return bool(np.min(law.force(depths.ravel(), speeds.ravel(), -speeds.ravel())) < 0.0)
 
 
 def _listed(model: Model, stops: list[int]) -> str:

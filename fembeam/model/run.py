@@ -289,7 +289,8 @@ class Run(Histories, Printed):
     def to_xarray(self, z: ArrayLike | None = None) -> Any:
         """Displacement and velocity over t and z (m; None: the mesh), stops and coordinates as a Dataset of xarray.
 
-        SI units in the attributes. ImportError without xarray.
+        With friction also F_t and the loss by friction of every stop. SI units in the attributes. ImportError without
+        xarray.
         """
         from fembeam.model.run_csv import to_xarray
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fembeam.model.run import Run, Vector
     from fembeam.support import Part
 
-CONTACT_UNITS = {"t_in": "s", "t_out": "s", "energy_loss": "J"}
+CONTACT_UNITS = {"t_in": "s", "t_out": "s", "energy_loss": "J", "angle_in": "rad", "angle_out": "rad"}
 CONTACT_QUANTITIES = {"speed_in": "speed", "speed_out": "speed", "peak_indentation": "indentation",
                       "peak_force": "force", "impulse": "impulse"}  # fmt: skip
 FRICTION_UNITS = {"t_in": "s", "t_out": "s", "angle_in": "rad", "angle_out": "rad", "speed_in": "m/s",
@@ -192,6 +192,7 @@ def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
         "velocity": (("t", "z"), run.velocity(place), {"units": "m/s"}),
         "indentation": (("t", "stop"), _side_by_side(run, run.indentation), {"units": run.unit("indentation")}),
         "force": (("t", "stop"), _side_by_side(run, run._normal_force), {"units": run.unit("force")}),
+        **_friction_variables(run),
         "q": (("t", "coordinate"), run.q, {"units": "m √kg"}),
         "q_dot": (("t", "coordinate"), run.q_dot, {"units": "m √kg/s"}),
     }
@@ -202,6 +203,18 @@ def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
     }
     axes["name"] = "stop", list(run.names)
     return optional("xarray", "a data set").Dataset(variables, axes, {"status": run.status, "scene": run.scene})
+
+
+def _friction_variables(run: Run) -> dict[str, Any]:
+    """F_t and the loss by friction of every stop, NaN and 0 of one without; none in a run without friction."""
+    if not run.rubs.any():
+        return {}
+    without = np.full(len(run.t), np.nan)
+    force = _side_by_side(run, lambda stop: run.friction(stop) if run.rubs[stop, 1] else without)
+    return {
+        "friction": (("t", "stop"), force, {"units": "N"}),
+        "friction_loss": (("t", "stop"), run.friction_loss, {"units": "J"}),
+    }
 
 
 def _side_by_side(run: Run, history: Callable[[int], Vector]) -> Vector:

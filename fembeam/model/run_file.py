@@ -20,7 +20,7 @@ from fembeam.scene import Source
 from fembeam.support import versions, written_whole
 from solvers.problem import FrictionLog, Losses, Transitions, columns_of, optional
 
-FORMAT = 4
+FORMAT = 5
 HDF5 = (".h5", ".hdf5")
 MOST_WORDS = 1 << 28  # bytes
 SIGNATURE, ZIPPED = b"\x89HDF\r\n\x1a\n", b"PK"  # of HDF5 and npz

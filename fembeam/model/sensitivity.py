@@ -25,7 +25,7 @@ from fembeam.scene.signals import is_of_signal
 from fembeam.support import Part, Printed, require
 from solvers.orbits import codes, counts, delayed
 from solvers.problem import counted, dataframe
-from solvers.sensitivities import Nearby, sensitivities, sensitivity
+from solvers.sensitivities import Nearby, indentation_change, sensitivities, sensitivity
 
 if TYPE_CHECKING:
     import solvers
@@ -121,31 +121,23 @@ class Sensitivity(Printed):
 
     def indentation(self, stop: int | str = 0) -> Vector:
         """Of δ(t) of a stop, (k,) m or rad, its gap's own change included; stops as for `Run.indentation`."""
-        return -self._of_element(self.q, self._own.q, stop, True)
+        return self._of_stop(stop)[0]
 
     def indentation_rate(self, stop: int | str = 0) -> Vector:
         """Of δ̇(t), m/s or rad/s, likewise."""
-        return -self._of_element(self.q_dot, self._own.q_dot, stop, False)
+        return self._of_stop(stop)[1]
 
     @property
     def _own(self) -> Any:
         """The solution, of which the samples are part."""
         return self.found.solution
 
-    def _of_element(self, changed: Vector, motion: Vector, stop: int | str, with_gap: bool) -> Vector:
-        """w·dq + dw·q, and the change of the gap."""
+    def _of_stop(self, stop: int | str) -> tuple[Vector, Vector]:
+        """Of δ and δ̇ at fixed times."""
         number = self.run.number(stop)
         contact = self.run.readout.model.system.contacts[number]
-        require(contact.map == "line", "derivatives of an indentation are those of a stop on a line", stop,
-                "Sensitivity.indentation", "ask for displacements")  # fmt: skip
-        found = changed @ contact.direction
-        if self.systems is not None:
-            found = found + self._at_samples(motion) @ self.systems.derivative(
-                lambda one: one.contacts[number].direction
-            )
-            if with_gap:
-                found = found + self.systems.derivative(lambda one: one.contacts[number].gap)
-        return np.asarray(found)
+        own = self._at_samples(self._own.q), self._at_samples(self._own.q_dot)
+        return indentation_change(contact, number, self.systems, own, (self.q, self.q_dot))
 
     def _at_samples(self, motion: Vector) -> Vector:
         """Rows of the solution at the samples."""
@@ -340,17 +332,9 @@ def _made(run: Run) -> tuple[Model, tuple[Vector, Vector, float], dict[str, Any]
     made, model = run.made, run.model
     if model is None or made is None:
         raise ValueError("a run read from a file has no model to be derived from; simulate it again")
-    _check_stops(model, "Run.sensitivity")
     q, q_dot = np.split(made.start[: 2 * len(model.omega)], 2)
     times = run.t if run.sampled else np.array([made.duration])
     return model, (q, q_dot, made.duration), {"times": times, "method": made.solver, "memory": run.began or None}
-
-
-def _check_stops(model: Model, where: str) -> None:
-    """Raise ValueError for stops whose derivatives are not known: circular clearances, and those with friction."""
-    beyond = [one.name for one in model.contact_rows if one.is_circle or one.friction]
-    require(not beyond, "derivatives are of stops on lines, without friction", beyond, where,
-            "take differences of runs")  # fmt: skip
 
 
 def _direction(model: Model, start: Any) -> Vector:
@@ -399,7 +383,6 @@ def of_orbit_by_each(orbit: Orbit, parameters: Sequence[str], times: Vector | No
     the whole period.
     """
     model, found = orbit.model, orbit.found
-    _check_stops(model, "Orbit.sensitivity")
     varied, n = [_Varied(model, path_of(model.scene, one)) for one in parameters], len(model.omega)
     later = [one.systems.map(lambda system: delayed(system, found.phase)) for one in varied]
     system = delayed(found.system, found.phase)

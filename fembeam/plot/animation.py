@@ -40,7 +40,8 @@ def animate(
     """Write a run as a moving picture: deflected beams, stops, impactors, an arrow for every contact force.
 
     The arrow is the largest force in the time nearest to its picture, so that no contact is lost between pictures. Of
-    a frame or structure the deflected lines are shown, magnified as the title says.
+    a frame or structure the deflected lines are shown, magnified as the title says, and beside them how the places of
+    its annular stops, at most three, whirl in their circles.
 
     Parameters
     ----------

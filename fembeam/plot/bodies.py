@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from fembeam.plot.clearance import Whirl
 from fembeam.plot.figure import heading
 from fembeam.plot.style import BLUE, GREY, RED
 from fembeam.support import is_finite, require
@@ -25,6 +26,7 @@ SHOWN = 0.12  # of the body's size, the largest displacement drawn
 COLUMNS = 3
 SIDES = np.array([-1.0, 1.0])
 THIN = 0.25  # of the size of a body, the least half side of the box it is drawn in
+MOST_CIRCLES = 3  # annular stops shown beside a moving body
 ZOOM = 0.72  # of the box of three axes, so that their names stay inside
 
 
@@ -134,16 +136,24 @@ def deflected_figure(run: Run, t: float | None, scale: float | None, axes: Axes 
 
 
 class BodyStage:
-    """One picture of a moving body: its lines at rest and deflected, at one scale throughout."""
+    """One picture of a moving body: its lines at rest and deflected, at one scale throughout, and places in circles."""
 
     def __init__(self, run: Run, samples: NDArray[np.int64], pace: str) -> None:
+        from fembeam.plot.window import Figure
+
         self.run, self.samples, self.pace, shapes = run, samples, pace, run.shapes
         self.q, size = run.with_supports(run.q, shapes.moving)[samples], size_of(shapes)
         largest = max(float(np.linalg.norm(displacements(shapes, q), axis=1).max()) for q in self.q)
         self.factor = _round(SHOWN * size / largest) if largest > 0 else 1.0
-        self.figure, (self.axis,) = panels(shapes, 1)
+        circles = np.flatnonzero(run.circles[:, 0])[:MOST_CIRCLES].tolist()
+        columns = 1 + len(circles)
+        self.figure = Figure(figsize=(5.0 + 3.0 * len(circles), 3.6), layout="constrained")
+        options: Any = {"projection": "3d"} if in_space(shapes) else {}
+        self.axis = self.figure.add_subplot(1, columns, 1, **options)
         draw(self.axis, shapes, None, GREY, 0.8)
         finish(self.axis, shapes, SHOWN * size)
+        axes = [self.figure.add_subplot(1, columns, 2 + i) for i in range(len(circles))]
+        self.whirls = [Whirl(axis, run, stop, samples) for axis, stop in zip(axes, circles, strict=True)]
         self.curves: list[Any] = []
 
     def show(self, number: int) -> list[Any]:
@@ -154,7 +164,7 @@ class BodyStage:
         self.curves = draw(self.axis, self.run.shapes, moved, BLUE, 1.8)
         now = float(self.run.t[self.samples[number]])
         self.axis.set_title(f"t = {now:.4f} s, displacements x {self.factor:g}{self.pace}", fontsize=8)
-        return self.curves
+        return [*self.curves, *(artist for whirl in self.whirls for artist in whirl.show(number))]
 
 
 def _sample(run: Run, t: float | None) -> int:

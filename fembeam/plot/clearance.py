@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.rig_words import length
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from fembeam.model import Run
 
 FINER = 8  # times the samples
+TRAIL = 25  # pictures
 ROUND = np.linspace(0.0, 2.0 * np.pi, 361)
 
 
@@ -143,6 +145,37 @@ def forces_in_clearance(
     legend(axis, axes is None, "outside lower center", **({"ncols": 2} if axes is None else {"loc": "lower right"}))
     heading([axis], f"Forces at {run.name(number)} / N", axes is None, run=run)
     return figure
+
+
+class Whirl:
+    """The place of an annular stop as it moves in its circle, with the way it came, red where it is in contact."""
+
+    def __init__(self, axis: Axes, run: Run, stop: int, samples: NDArray[np.int64]) -> None:
+        self.run, self.samples = run, samples
+        radius = float(run.circles[stop, 0])
+        self.path, size = 1e3 * run.place_in_clearance(stop), 1e3 * abs(radius)
+        self.touching = np.sign(radius) * (np.linalg.norm(self.path, axis=1) - size) > 0.0
+        axis.plot(size * np.cos(ROUND), size * np.sin(ROUND), "--", color=GREY, linewidth=0.8)
+        shown = self.path[samples[0] : samples[-1] + 1]
+        axis.plot(*shown.T, color=GREY, linewidth=0.3)
+        self.trail = axis.plot([], [], color=BLUE, linewidth=1.2)[0]
+        self.pressed = axis.plot([], [], color=RED, linewidth=1.6)[0]
+        self.place = axis.plot([], [], "o", color=BLUE, markersize=6)[0]
+        x, y = (_way(direction) for direction in run.acting[stop][1])
+        axis.set(xlabel=f"{x} / mm", ylabel=f"{y} / mm")
+        axis.set_title(f"{run.name(stop)}, clearance {length(abs(radius))}", fontsize=8)
+        axis.set_aspect("equal", adjustable="datalim")
+        axis.locator_params(nbins=5)
+
+    def show(self, number: int) -> list[Any]:
+        """Move the place to one picture; its way is that of the last `TRAIL` pictures."""
+        first, now = int(self.samples[max(number - TRAIL, 0)]), int(self.samples[number])
+        way, touching = self.path[first : now + 1], self.touching[first : now + 1]
+        self.trail.set_data(*way.T)
+        self.pressed.set_data(*np.where((touching | np.append(touching[1:], False))[:, None], way, np.nan).T)
+        self.place.set_data(*self.path[[now]].T)
+        self.place.set_color(RED if self.touching[now] else BLUE)
+        return [self.trail, self.pressed, self.place]
 
 
 def _way(direction: Any) -> str:

@@ -289,7 +289,7 @@ def _frames_unpacked(words: Mapping[str, Any], arrays: Mapping[str, Any], body: 
 def _frame_as_words(forces: FrameForces) -> dict[str, Any]:
     """The frame, the nodes of its mesh along the members, names of its section forces."""
     frame = forces.mesh.frame
-    members = [asdict(one) | {"up": None if one.up is None else one.up[:3]} for one in frame.members]
+    members = [asdict(one) for one in frame.members]
     about = {"nodes": frame.nodes, "members": members, "spin": frame.spin, "bending_only": frame.bending_only}
     return {"frame": about, "borders": [s.tolist() for s in forces.mesh.borders], "names": forces.names}
 

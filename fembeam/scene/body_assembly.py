@@ -20,7 +20,7 @@ from fembeam.scene.assembly import DEFAULT_MODES, UNIT, Matrices, Vector, moving
 from fembeam.scene.places import place_words, told
 from fembeam.scene.rotors import Disk, gyroscopic, turned
 from fembeam.scene.signals import support_motion
-from fembeam.structures import COMPONENTS, Assembled, Six, following
+from fembeam.structures import COMPONENTS, Assembled, Six, check_buckling, following
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -168,6 +168,7 @@ def _made(scene: Scene, elements: int | None, modes: int | None, places: tuple[A
         return scene.beam.assembled(elements if meshed else None, modes, places)
     count = DEFAULT_MODES if modes is None else int(modes)
     coarse = scene.beam.coarse(count, places)
+    check_buckling(scene.beam, lambda body: _free_stiffness(scene, body.coarse(count, places)))
     own = _of(scene, coarse, count, _held(scene, coarse), condense=True)
     basis = reduction.modal_basis(own.M, own.K, min(count, own.M.shape[0]), root=own.root)
     if not np.any(basis.omega):  # all of them rigid-body modes
@@ -176,6 +177,12 @@ def _made(scene: Scene, elements: int | None, modes: int | None, places: tuple[A
     if elements is not None:
         return scene.beam.assembled(elements, modes, places)
     return scene.beam.assembled(None, count, places, float(basis.omega[:count][-1]))
+
+
+def _free_stiffness(scene: Scene, assembled: Assembled) -> Vector:
+    """K (N, N) on the dofs that supports leave, springs among it."""
+    free = np.setdiff1d(np.arange(assembled.M.shape[0]), _held(scene, assembled))
+    return np.asarray(_with_parts(scene, assembled)[1][free][:, free].toarray())
 
 
 def _holding(scene: Scene) -> dict[Any, list[str]]:
@@ -279,7 +286,8 @@ def _held(scene: Scene, assembled: Assembled) -> Any:
             require(single, "a support must hold a node of the body", f"{dof} at {told(support.z)}",
                     f"supports[{index}] of Scene", "given modes have theirs")  # fmt: skip
             number = int(row.indices[0])
-            require(number not in found, f"supports must not hold one dof twice ({dof} at {told(support.z)}, which a "
-                    "joint makes equal to another)", index, f"supports[{index}] of Scene", "keep one")  # fmt: skip
+            require(number not in found, f"supports must not hold one dof twice ({dof} at {told(support.z)}, which "
+                    "another one holds under another name, or by a joint)", index, f"supports[{index}] of Scene",
+                    "keep one")  # fmt: skip
             found.add(number)
     return np.array(sorted(found), dtype=int)

@@ -55,6 +55,8 @@ def _numbers(path: str, item: Any) -> dict[str, float]:
         return {path: item}
     if isinstance(item, tuple) and all(isinstance(entry, float) for entry in item):
         return {f"{path}[{i}]": entry for i, entry in enumerate(item)}
+    if isinstance(item, tuple) and all(is_dataclass(entry) for entry in item):
+        return {name: value for i, entry in enumerate(item) for name, value in _numbers(f"{path}[{i}]", entry).items()}
     if isinstance(item, dict):
         return {name: value for key, part in item.items() for name, value in _numbers(f"{path}.{key}", part).items()}
     if not is_dataclass(item):
@@ -132,5 +134,5 @@ def _replaced(item: Any, path: list[str], value: float) -> Any:
 def changes_structure(path: str) -> bool:
     """Whether a parameter changes the mode shapes or frequencies: anything but signals, gaps and laws."""
     part = re.sub(r"^(bodies\[\d+\]\.)+", "", path)
-    place = re.fullmatch(r"\w+\[\d+\]\.(z|on|to)(\[\d+\])?", part)
+    place = re.fullmatch(r"\w+\[\d+\]\.(z|on|to|direction|tangent|directions)(\[\d+\])*", part)
     return not (is_of_signal(path) or part.startswith(("stops", "elements"))) or place is not None

@@ -5,6 +5,7 @@ Imports: `support`, `beams`, `reduction`. Begin with `assembled`.
 """
 
 from fembeam.structures.assembled import COMPONENTS, Assembled
+from fembeam.structures.buckling import check_buckling
 from fembeam.structures.directions import (
     TURN,
     UP,

@@ -31,6 +31,7 @@ ENTRIES = 8  # names shown of a long list
 
 def matrix(name: str, values: Any, where: str) -> sparse.csr_matrix:
     """A given matrix as sparse CSR, square, finite, symmetric to rounding; ValueError with the number that is wrong."""
+    values = real(name, values, where)
     try:
         found = sparse.csr_matrix(values, dtype=float)
     except (TypeError, ValueError) as error:
@@ -40,6 +41,16 @@ def matrix(name: str, values: Any, where: str) -> sparse.csr_matrix:
     require(bool(np.isfinite(found.data).all()), f"{name} must be finite", "NaN or infinite entries", where,
             "check the export; held dofs may carry 1e36 or inf on the diagonal")  # fmt: skip
     return found
+
+
+def real(name: str, values: Any, where: str) -> Any:
+    """Values without their imaginary parts; ValueError where there are any."""
+    if not np.iscomplexobj(values):
+        return values
+    turned = float(np.abs(np.imag(values.data if sparse.issparse(values) else values)).max(initial=0.0))
+    require(turned == 0.0, f"{name} must be real; its largest imaginary part is", turned, where,
+            "give damping as C, as ratios of modes or as dashpots: motion in time has no complex K")  # fmt: skip
+    return values.real if sparse.issparse(values) else np.real(values)
 
 
 def symmetric(name: str, given: sparse.csr_matrix, labels: Sequence[Label], where: str) -> sparse.csr_matrix:

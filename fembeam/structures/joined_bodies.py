@@ -107,6 +107,19 @@ class JoinedBodies:
             require(gap <= APART * size, rule, f"{gap:.4g} m between them", f"joints[{index}] of Scene",
                     "correct the coordinates, or turn the body")  # fmt: skip
 
+    @property
+    def doubts(self) -> list[str]:
+        """Sentences on bodies that joints move though their places neither meet nor are the origin of the body."""
+        found = []
+        for joint in self.joints:
+            number, place = joint.to if np.any(self.shifts[joint.to[0]]) else (joint.body, joint.place)
+            at, shift = self.bodies[number].position(place), self.shifts[number]
+            if at is not None and np.any(at) and np.linalg.norm(shift) > APART * np.linalg.norm(at):
+                way = ", ".join(f"{x:.4g}" for x in shift)
+                found.append(f"body {number} is moved by ({way}) m, so that its {place!r} meets what it is joined to: "
+                             "right if its coordinates are its own, else correct them")  # fmt: skip
+        return list(dict.fromkeys(found))
+
     @cached_property
     def _points(self) -> list[list[Vector]]:
         """Where the named places of every body are, as far as it is known."""

@@ -75,8 +75,9 @@ class Member:
                             "member is several of constant section")  # fmt: skip
         require(self.a != self.b, "a and b must be two nodes", self.a, where, "join it to another node")
         if self.up is not None:
-            object.__setattr__(self, "up", direction_of(self.up, f"up of {where}"))
-            require(not any(self.up[3:]), "up must be a direction, not a rotation", self.up, where, "write 'y'")
+            way = direction_of(self.up, f"up of {where}")
+            require(not any(way[3:]), "up must be a direction, not a rotation", self.up, where, "write 'y'")
+            object.__setattr__(self, "up", way[:3])
         object.__setattr__(self, "release", _releases(self.release, where))
         object.__setattr__(self, "offset", _offsets(self.offset, where))
         require_finite("axial_force", self.axial_force, where, "give N, tension positive")
@@ -114,7 +115,7 @@ def axes_of(member: Member, along: Vector, plane: bool) -> Vector:
     where = f"Member {member.name!r}"
     vertical = np.hypot(along[0], along[2]) <= ALIGNED
     usual = np.array([-along[1], along[0], 0.0]) if plane else np.array([0.0, float(not vertical), float(vertical)])
-    wanted = usual if member.up is None else np.array(member.up[:3])
+    wanted = usual if member.up is None else np.array(member.up)
     normal = (wanted @ usual) * usual if plane else wanted - (wanted @ along) * along
     size = float(np.linalg.norm(normal))
     shown = tuple(float(f"{x:.4g}") for x in wanted)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fembeam.structures.assembled import COMPONENTS, Assembled
-from fembeam.structures.checks import Label, labelled, placed
+from fembeam.structures.checks import Label, labelled, placed, real
 from fembeam.structures.named_body import NamedBody, checked_edges
 from fembeam.support import require
 
@@ -49,6 +49,7 @@ class GivenModes(NamedBody):
         points: Mapping[str, Any] | None = None,
         lines: Iterable[Sequence[Any]] = (),
     ) -> None:
+        omega, shapes = real("omega", omega, WHERE), real("shapes", shapes, WHERE)
         w, phi = np.atleast_1d(np.array(omega, dtype=float)), np.array(shapes, dtype=float)
         valid = w.ndim == 1 and w.size > 0 and bool(np.all(np.isfinite(w) & (w >= 0)) and np.all(np.diff(w) >= 0))
         require(valid, "omega must be (n,), finite, at least 0 and ascending", omega, WHERE, "give rad/s")
@@ -58,7 +59,7 @@ class GivenModes(NamedBody):
         names = labelled(labels, len(phi), WHERE)
         gamma: dict[str, Vector] = {}
         for direction, given in (participation or {}).items():
-            value = np.array(given, dtype=float)
+            value = np.array(real("participation", given, WHERE), dtype=float)
             require(direction in COMPONENTS[:3], "participation must be named 'x', 'y' or 'z'", direction, WHERE,
                     "write {'x': ...}")  # fmt: skip
             fits = value.shape == w.shape and bool(np.isfinite(value).all())

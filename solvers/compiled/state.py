@@ -182,7 +182,7 @@ def event_row(problem, state, s, t, guard, delta, delta_dot, row):
     balance = 2 * problem.k.size + 2 + 2 * s
     row[at.ELEMENT], row[at.TIME], row[at.GUARD] = s, t, guard
     row[at.FROM], row[at.TO] = acting_segment(problem, state, s), 0.0
-    row[at.DELTA], row[at.RATE], row[at.FORCE], row[at.CODE] = delta, delta_dot, np.nan, -1.0
+    row[at.DELTA], row[at.RATE], row[at.FORCE], row[at.CODE] = delta, delta_dot, angle_of(problem, s, state.x), -1.0
     row[at.IMPULSE], row[at.WORK] = state.x[balance + 1], state.x[balance]
     row[at.DEEPEST], row[at.LARGEST] = state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE]
     row[at.CLIPPED] = 1.0 if abs(delta_dot) < problem.floor[s] else 0.0

@@ -60,6 +60,7 @@ class Tangent:
         self.y, self.entry, self.shift, self.end_rate, self.latched = (layout.array(self.block, 0, i) for i in _CARRIED)
         begin_state(State._make(layout.arrays(self.block, 1)), state.x[:size])
         self.places = places_among_tones(n, size // 2 - n)
+        self.tones = np.setdiff1d(np.arange(width), self.places)  # and accounts: they do not change
         self.y[: 2 * n, self.places] = system.blocks.inverse.T
         if self.exact:
             self.y[-1, self.places] = -self.change.steady(0.0)
@@ -86,6 +87,7 @@ class Tangent:
         """Move the derivatives to the time the engine has reached, and empty its event record."""
         engine = self.engine
         linearise_run(*self.addresses, not self.history)
+        self.y[:, self.tones] = 0.0  # rounding there would not decay
         if not np.all(np.isfinite(self.y)):
             raise SolverError(f"the tangent is not finite any more at t = {engine.state.now[T]:g} s: a contact grazes")
         size = _size(self.y)

@@ -32,6 +32,13 @@ def dense(matrix: Any) -> Array:
 
 def square_matrix(name: str, matrix: Any, skew: bool = False) -> Any:
     """A finite copy of a symmetric or a ``skew`` matrix: sparse by columns if it was sparse, else dense."""
+    if np.iscomplexobj(matrix):
+        turned = float(abs(np.imag(matrix.data if hasattr(matrix, "toarray") else matrix)).max(initial=0.0))
+        if turned > 0.0:
+            raise ValueError(
+                f"{name} must be real, got imaginary parts up to {turned:g}; losses are those of C, or laws"
+            )
+        matrix = matrix.real
     if hasattr(matrix, "toarray"):
         from scipy.sparse import csc_array
 

@@ -70,6 +70,8 @@ class ContactLog(Columns):
     ----------
     stop : index of the stop. name : what it is called. t_in, t_out : s. speed_in, speed_out : m/s, both positive.
     peak_indentation : m. peak_force : N. impulse : N s. energy_loss : J taken out of the beam.
+    angle_in, angle_out : rad, of the place in its circular clearance, that of a contact still open as at the end; NaN
+        of other stops; tables leave them out where no contact has one.
     entry_rate_clipped : whether the entry speed was below the law's floor (also for a contact that began at t = 0);
         every law has one, 1e-3 m/s where none was given, whether or not its force depends on that speed.
     """
@@ -83,11 +85,18 @@ class ContactLog(Columns):
     peak_force: Array
     impulse: Array
     energy_loss: Array
+    angle_in: Array
+    angle_out: Array
     entry_rate_clipped: Any
     names: tuple[str, ...] = field(default=(), kw_only=True)
 
     def __len__(self) -> int:
         return len(self.stop)
+
+    def named_arrays(self) -> dict[str, Any]:
+        """The columns by name, without those of angles where there are none."""
+        bare = np.all(np.isnan(self.angle_in)) and np.all(np.isnan(self.angle_out))
+        return {k: v for k, v in super().named_arrays().items() if not (bare and k in ("angle_in", "angle_out"))}
 
     def __repr__(self) -> str:
         open_ones = int(np.isnan(self.t_out).sum())
@@ -109,6 +118,8 @@ class ContactLog(Columns):
             peak_force=ends[:, at.LARGEST].copy(),
             impulse=ends[:, at.IMPULSE] - first[:, at.IMPULSE],
             energy_loss=ends[:, at.WORK] - first[:, at.WORK],
+            angle_in=first[:, at.FORCE].copy(),
+            angle_out=ends[:, at.FORCE].copy(),
             entry_rate_clipped=first[:, at.CLIPPED].astype(bool),
             names=tuple(names),
         )
@@ -196,6 +207,7 @@ def _make_whole(row: Array, rest: Array, later: float) -> None:
     row[2], row[4] = later + rest[2], rest[4]
     row[5:7] = np.maximum(row[5:7], rest[5:7])
     row[7:9] += rest[7:9]
+    row[10] = rest[10]
 
 
 @dataclass(frozen=True, eq=False)

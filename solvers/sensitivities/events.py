@@ -14,7 +14,9 @@ import numpy as np
 
 from solvers.problem import Array
 from solvers.problem import event_list as at
+from solvers.problem.friction import CODE, FREE, MU, STIFFNESS
 from solvers.sensitivities import laws
+from solvers.sensitivities.elements import forces_of
 from solvers.sensitivities.flow import Flow
 from solvers.sensitivities.stretches import Acting, after
 
@@ -35,8 +37,10 @@ def cross(flow: Flow, t: float, row: Array, acting: Acting, span: float, last: A
     s = int(row[at.ELEMENT])
     following = after(flow.system, acting, row)
     if row[at.GUARD] == at.BEGIN:
-        _latch_at_start(flow, t, s)
-        return acting, np.zeros(flow.columns)
+        return _latch_at_start(flow, t, s, acting), np.zeros(flow.columns)
+    if flow.slider(s, acting) is not None and row[at.GUARD] >= 0.0:
+        _renew_slider(flow, t, s, acting, following)
+        return following, np.zeros(flow.columns)
     memory = row[at.GUARD] >= 0.0
     rate, acceleration = flow.rates(t, s, acting)
     moved, sped = flow.change(t, s)
@@ -45,20 +49,56 @@ def cross(flow: Flow, t: float, row: Array, acting: Acting, span: float, last: A
         shift = _at_border(flow, t, row, acting, (moved, sped, rate, acceleration), last)
     else:
         shift = _at_knot(flow, t, row, acting, (moved, rate, acceleration), span)
-    jump = _jump(flow, row, acting, following)
-    flow.y -= np.outer(flow.push[s], jump * shift)
-    flow.impulse[s] -= jump * shift
     if entering:
         floored = abs(row[at.RATE]) < flow.system.contacts[s].law.entry_rate_floor
         flow.entry[s] = 0.0 if floored else np.sign(rate) * (sped + acceleration * shift)
+        following = _begin_slider(flow, t, s, following, shift, False)
+    normal, forces = _jump(flow, t, row, acting, following)
+    flow.y -= np.outer(flow.push[s].T @ forces, shift)
+    flow.impulse[s] -= normal * shift
     return following, shift
 
 
-def _latch_at_start(flow: Flow, t: float, s: int) -> None:
-    """A contact under way at the start latches its rate then."""
-    rate = flow.motion_of(t, s)[1]
+def _latch_at_start(flow: Flow, t: float, s: int, acting: Acting) -> Acting:
+    """A contact under way at the start latches its rate then, and the place of its slider if it has none."""
+    rate = float(flow.motion_of(t, s).rate[0])
     floor = flow.system.contacts[s].law.entry_rate_floor
     flow.entry[s] = 0.0 if abs(rate) < floor else np.sign(rate) * flow.change(t, s)[1]
+    slider = flow.slider(s, acting)
+    if slider is None or slider.numbers[CODE] != FREE:
+        return acting
+    return _begin_slider(flow, t, s, acting, np.zeros(flow.columns), True)
+
+
+def _begin_slider(flow: Flow, t: float, s: int, acting: Acting, shift: Array, under_way: bool) -> Acting:
+    """Stick or slip as a contact begins: s = ξ then."""
+    slider = flow.slider(s, acting)
+    if slider is None:
+        return acting
+    motion = flow.motion_of(t, s)
+    begun = acting.changed(s, rows=slider.begun(motion, acting.rows[s], acting.entry_rate[s], under_way))
+    flow.latched[s][:] = 0.0
+    if flow.slider(s, begun).sticks:  # type: ignore[union-attr]
+        flow.latched[s][1] = flow.way_change(t, s) + motion.speed[0] * shift
+    return begun
+
+
+def _renew_slider(flow: Flow, t: float, s: int, acting: Acting, following: Acting) -> None:
+    """What a slider latches where slip ends, s = ξ - F_t/k_t: its rate is zero then, so that dt* does not matter."""
+    flow.latched[s][:] = 0.0
+    slider = flow.slider(s, following)
+    if slider is None or not slider.sticks:
+        return
+    numbers = slider.numbers
+    _, _, pressed = flow.at_instant(t, s, acting)
+    before: Any = flow.slider(s, acting)
+    normal = flow.force(t, s, acting)
+    force, share = before.force(np.zeros(1), normal)[0], before.share(normal)[0]
+    flow.latched[s][1] = flow.way_change(t, s) - share / numbers[STIFFNESS] * pressed
+    if numbers[MU]:
+        one = flow.by.elements[s]
+        changed = one.mu / numbers[MU] - one.stiffness / numbers[STIFFNESS]
+        flow.latched[s][1, flow.own] -= force / numbers[STIFFNESS] * changed
 
 
 def _at_knot(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[Any, ...], span: float) -> Array:
@@ -104,19 +144,24 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
     return shift
 
 
-def _jump(flow: Flow, row: Array, before: Acting, then: Acting) -> float:
-    """By how much the force jumps."""
-    s = int(row[at.ELEMENT])
+def _jump(flow: Flow, t: float, row: Array, before: Acting, then: Acting) -> tuple[float, Array]:
+    """By how much N jumps, and by how much the forces (m,) on the rows."""
+    s, found = int(row[at.ELEMENT]), []
+    for acting in (before, then):
+        normal = np.array([0.0 if acting.segment[s] == 0 else _force_beside(flow, row, before, then, acting)])
+        found.append((normal[0], forces_of(flow.motion_of(t, s), flow.slider(s, acting), normal)[:, 0]))
+        if acting.segment[s] == 0:
+            found[-1] = 0.0, 0.0 * found[-1][1]
+    return float(found[1][0] - found[0][0]), found[1][1] - found[0][1]
+
+
+def _force_beside(flow: Flow, row: Array, before: Acting, then: Acting, acting: Acting) -> float:
+    """N on one side of an event."""
+    s, rate = int(row[at.ELEMENT]), float(row[at.RATE])
     law: Any = flow.system.contacts[s].law
-    rate, forces = float(row[at.RATE]), []
     if row[at.GUARD] >= 0.0:
-        delta = float(row[at.DELTA])
-        forces = [laws.force(law, a.rows[s], (delta, rate), then.entry_rate[s])[0] for a in (before, then)]
-        return float(forces[1] - forces[0])
+        return float(laws.force(law, acting.rows[s], (float(row[at.DELTA]), rate), then.entry_rate[s])[0])
     border = min(before.segment[s], then.segment[s])
     knot = 0.0 if border == 0 else law.knots[border - 1]
-    for acting in (before, then):
-        place = knot * (1.0 - _OFF) if acting.segment[s] == border else knot * (1.0 + _OFF) + 1e-300
-        none = acting.segment[s] == 0
-        forces.append(0.0 if none else laws.force(law, acting.rows[s], (place, rate), then.entry_rate[s])[0])
-    return float(forces[1] - forces[0])
+    place = knot * (1.0 - _OFF) if acting.segment[s] == border else knot * (1.0 + _OFF) + 1e-300
+    return float(laws.force(law, acting.rows[s], (place, rate), then.entry_rate[s])[0])

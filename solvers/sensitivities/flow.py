@@ -1,11 +1,13 @@
 """The variational equation along a known motion, from one event to the next.
 
-    Y' = A Y + Σ b_s dF_s + G,    dF = ∂F/∂δ dδ + ∂F/∂δ̇ dδ̇ + ∂F/∂(entry rate) d(entry rate) + ∂F/∂L dL + ∂F/∂p
-    dδ = -w·dq - (dw·q + dgap),   M G = -dM q̈ - dC q̇ - dK q + Σ (dv s + v ds) + Σ dw F
+    Y' = A Y + Σ b_r df_r + G,    y = -rows·q - offsets,    dy = -rows·dq - (d rows·q + d offsets)
 
-Columns of Y: by the start [q, q̇], by what laws have latched then, and last by the parameters, to which alone the
-explicit terms belong. Flights are exact; while forces act, the forces at a panel's nodes are the unknowns. What a panel
-does is linear in the state at its start: all panels of a stretch are solved at once, then passed one after the other.
+    M G = -dM q̈ - dC q̇ - dK q + Σ (dv s + v ds) + Σ d rows f
+
+with the changes df of the forces on the rows from `elements`. Columns of Y: by the start [q, q̇], by what laws have
+latched then, and last by the parameters, to which alone the explicit terms belong. Flights are exact; while forces act,
+the forces at a panel's nodes are the unknowns. What a panel does is linear in the state at its start: all panels of a
+stretch are solved at once, then passed one after the other.
 """
 
 from __future__ import annotations
@@ -17,7 +19,17 @@ from typing import Any
 import numpy as np
 
 from solvers.problem import Array, System, dense
+from solvers.problem.friction import MU, SLIDER, STIFFNESS
 from solvers.sensitivities import laws
+from solvers.sensitivities.elements import (
+    ElementMotion,
+    Linear,
+    Slider,
+    acceleration_of,
+    forces_of,
+    linear,
+    motion_of,
+)
 from solvers.sensitivities.nearby import Change
 from solvers.sensitivities.panels import Panels, S, moved, propagator, running
 from solvers.sensitivities.stretches import Acting, Motion
@@ -30,19 +42,18 @@ class Flow:
 
     def __init__(self, system: System, motion: Motion, by: Change, start: Array, latched: list[Array]) -> None:
         self.system, self.motion, self.by = system, motion, by
-        blocks, n = system.blocks, system.size
+        blocks, n, contacts = system.blocks, system.size, system.contacts
         self.k, self.c, self.T = blocks.k, blocks.c, blocks.T
-        self.w = np.array([one.direction for one in system.contacts]).reshape(-1, n)
-        self.gaps = np.array([one.gap for one in system.contacts])
-        self.push = self.w @ system.push.T
-        self.read, self.read_rate = -self.w @ self.T[:n], -self.w @ self.T[n:]
+        self.rows = [one.rows for one in contacts]
+        self.push = [rows @ system.push.T for rows in self.rows]
+        self.read = [np.stack((-rows @ self.T[:n], -rows @ self.T[n:])) for rows in self.rows]  # (2, m, 2n)
         self.accelerate = np.linalg.inv(dense(system.M))
         self.y = blocks.inverse @ start
         self.columns = start.shape[1]
         self.own = slice(self.columns - len(by), self.columns)  # of the parameters
         self.latched = latched  # (l, m) of every element
-        self.entry, self.impulse = (np.zeros((len(self.w), self.columns)) for _ in range(2))
-        self.largest = np.zeros((len(self.w), self.columns))  # change of each force so far
+        self.entry, self.impulse = (np.zeros((len(contacts), self.columns)) for _ in range(2))
+        self.largest = np.zeros((len(contacts), self.columns))  # change of each element's forces so far
         self.roughness = 0.0
 
     @property
@@ -55,29 +66,47 @@ class Flow:
         """(d, 2n) of them those by the parameters."""
         return np.asarray((self.T @ self.y[:, self.own]).T)
 
-    def motion_of(self, t: Any, s: int) -> tuple[Any, Any]:
-        """δ and δ̇ of an element at times."""
-        q, q_dot = self.motion.at(t)
-        return -self.w[s] @ q - self.gaps[s], -self.w[s] @ q_dot
+    def _of_rows(self, t: Any, s: int) -> tuple[Array, Array]:
+        """Motion y and ẏ (m, k) of an element's rows at times (k,)."""
+        q, q_dot = self.motion.at(np.atleast_1d(t))
+        return -self.rows[s] @ q - self.system.contacts[s].row_gaps[:, None], -self.rows[s] @ q_dot
 
-    def force(self, t: Any, s: int, acting: Acting) -> Array:
-        """F (k,) at times."""
-        inside = self._inside(s, acting, *self.motion_of(t, s))
+    def motion_of(self, t: Any, s: int) -> ElementMotion:
+        """ElementMotion of an element at times."""
+        return motion_of(self.system.contacts[s], np.atleast_1d(t), *self._of_rows(t, s))
+
+    def slider(self, s: int, acting: Acting) -> Slider | None:
+        """Friction of an element."""
+        return Slider.of(self.system.contacts[s], acting.rows[s])
+
+    def force(self, t: Any, s: int, acting: Acting, motion: ElementMotion | None = None) -> Array:
+        """N (k,) at times."""
+        motion = self.motion_of(t, s) if motion is None else motion
+        inside = self._inside(s, acting, motion)
         return laws.force(self.system.contacts[s].law, acting.rows[s], inside, acting.entry_rate[s])
+
+    def forces(self, t: Any, s: int, acting: Acting) -> Array:
+        """Forces (m, k) on the rows at times."""
+        motion = self.motion_of(t, s)
+        return forces_of(motion, self.slider(s, acting), self.force(t, s, acting, motion))
 
     def bend(self, t: Array, s: int, acting: Acting) -> Array | None:
         """What changes its sign at kinks of a law within its segment, at times; None without any."""
-        inside = self._inside(s, acting, *self.motion_of(t, s))
-        return laws.bend(self.system.contacts[s].law, inside, acting.entry_rate[s])
+        motion, slider = self.motion_of(t, s), self.slider(s, acting)
+        found = laws.bend(self.system.contacts[s].law, self._inside(s, acting, motion), acting.entry_rate[s])
+        if found is None and slider is not None and not slider.sticks:
+            normal = self.force(t, s, acting, motion)
+            return normal if self.system.contacts[s].law.jump or normal.min() < 0.0 else None  # μN is cut at zero
+        return found
 
-    def _inside(self, s: int, acting: Acting, delta: Any, rate: Any) -> tuple[Any, Any]:
+    def _inside(self, s: int, acting: Acting, motion: ElementMotion) -> tuple[Array, Array]:
         """δ kept within the segment of the law, and δ̇."""
         contact = self.system.contacts[s]
         knots = (-np.inf if contact.always else 0.0, *contact.law.knots, np.inf)
         low, high = knots[acting.segment[s] - 1], knots[acting.segment[s]]
         low = low + _INSIDE * abs(low) + 1e-300 if np.isfinite(low) else low  # above zero, where a force may jump
         high = high * (1.0 - _INSIDE)
-        return np.clip(delta, low, high), rate
+        return np.clip(motion.delta, low, high), motion.rate
 
     def rate(self, t: Array, acting: Acting) -> Array:
         """[q̇, q̈] (2n, k) of the motion at times (k,)."""
@@ -86,27 +115,42 @@ class Flow:
         for vector, signal in system.loads:
             push += np.outer(np.asarray(vector), np.broadcast_to(signal(t), t.shape))
         for s in acting.elements:
-            push += np.outer(self.w[s], self.force(t, s, acting))
+            push += self.rows[s].T @ self.forces(t, s, acting)
         return np.concatenate((q_dot, self.accelerate @ push))
 
     def rates(self, t: float, s: int, acting: Acting) -> tuple[float, float]:
         """δ̇ and δ̈ of an element."""
-        speed, acceleration = self.rate(np.array([t]), acting).reshape(2, -1)
-        return -float(self.w[s] @ speed), -float(self.w[s] @ acceleration)
+        y_dot, y_twice = -self.rows[s] @ self.rate(np.array([t]), acting).reshape(2, -1, 1)
+        motion = self.motion_of(t, s)
+        return float(motion.rate[0]), float(acceleration_of(motion, y_dot, y_twice)[0])
 
     def change(self, t: float, s: int) -> tuple[Array, Array]:
         """dδ and dδ̇ (m,) of an element at fixed time."""
-        moved, sped = self.read[s] @ self.y, self.read_rate[s] @ self.y
-        explicit = self._explicit(t, s)
-        moved[self.own] += explicit[0]
-        sped[self.own] += explicit[1]
-        return moved, sped
+        motion, (moved_rows, sped) = self.motion_of(t, s), self._rows_change(t, s)
+        press, turning = motion.press[:, 0], motion.turning[:, 0]
+        found = press @ moved_rows, press @ sped + turning @ moved_rows
+        found[0][self.own] -= np.sign(self.system.contacts[s].circle) * self.by.elements[s].clearance
+        return found
 
-    def _explicit(self, t: Any, s: int) -> tuple[Any, Any]:
-        """Changes (..., d) of δ and δ̇ by the parameters with the motion held fixed."""
-        q, q_dot = self.motion.at(t)
-        turned = self.by.directions[:, s].T
-        return -q.T @ turned - self.by.gaps[:, s], -q_dot.T @ turned
+    def way_change(self, t: float, s: int) -> Array:
+        """dξ (m,) of an element with friction at fixed time."""
+        motion = self.motion_of(t, s)
+        found, one = motion.rub[:, 0] @ self._rows_change(t, s)[0], self.by.elements[s]
+        found[self.own] += one.clearance * motion.angle[0] + one.surface * t
+        return np.asarray(found)
+
+    def _rows_change(self, t: float, s: int) -> tuple[Array, Array]:
+        """Changes dy and dẏ (m, columns) of an element's rows at fixed time."""
+        moved_rows, sped = self.read[s] @ self.y
+        for one, more in zip((moved_rows, sped), self._explicit(t, s), strict=True):
+            one[:, self.own] += more[:, 0]
+        return moved_rows, sped
+
+    def _explicit(self, t: Any, s: int) -> tuple[Array, Array]:
+        """Changes of y and ẏ (m, k, d) by the parameters with the motion held fixed."""
+        one = self.by.elements[s]
+        y, y_dot = (np.moveaxis(-one.rows @ x, 0, -1) for x in self.motion.at(np.atleast_1d(t)))
+        return y - one.offsets.T[:, None], y_dot
 
     def over_laws(self, s: int, acting: Acting, read: Callable[[Any, Array], Any]) -> Any:
         """Derivatives (..., d) by the parameters of what is read off a law, with what it has latched held fixed."""
@@ -121,26 +165,57 @@ class Flow:
 
         return self.by.over_laws(s, of)
 
-    def force_change(self, t: Array, s: int, acting: Acting) -> tuple[Array, Array]:
-        """∂F/∂(δ, δ̇) (2, k), and the change (k, m) of a force by all but these, at times (k,)."""
+    def force_change(self, t: Array, s: int, acting: Acting) -> Linear:
+        """Changes of an element's forces by its motion, and by all but that, at times (k,)."""
         law: Any = self.system.contacts[s].law
-        inside, rate = self._inside(s, acting, *self.motion_of(t, s)), acting.entry_rate[s]
+        motion, slider = self.motion_of(t, s), self.slider(s, acting)
+        inside, rate = self._inside(s, acting, motion), acting.entry_rate[s]
         slopes = laws.slopes(law, acting.rows[s], inside, rate)
-        other = np.outer(slopes[2], self.entry[s])
-        if len(self.latched[s]):
-            other += laws.by_latched(law, acting.rows[s], inside, rate).T @ self.latched[s]
-        other[:, self.own] += self.over_laws(s, acting, lambda one, own: laws.force(one, own, inside, rate))
-        for slope, explicit in zip(slopes[:2], self._explicit(t, s), strict=True):
-            other[:, self.own] += slope[:, None] * explicit
-        return slopes[:2], other
+        by_law = np.outer(slopes[2], self.entry[s])
+        if len(self.latched[s]) and slider is None:
+            by_law += laws.by_latched(law, acting.rows[s], inside, rate).T @ self.latched[s]
+        by_law[:, self.own] += self.over_laws(s, acting, lambda one, own: laws.force(one, own, inside, rate))
+        if circle := self.system.contacts[s].circle:
+            by_law[:, self.own] -= np.outer(slopes[0], np.sign(circle) * self.by.elements[s].clearance)
+        found = linear(motion, slider, self.force(t, s, acting, motion), slopes[:2], by_law)
+        if slider is not None:
+            self._add_friction(t, s, acting, motion, slider, found)
+        for one, normal, explicit in zip(found.slopes, found.normal, self._explicit(t, s), strict=True):
+            found.other[..., self.own] += np.einsum("abk,bkd->akd", one, explicit)
+            found.normal_other[:, self.own] += np.einsum("ak,akd->kd", normal, explicit)
+        return found
+
+    def _add_friction(
+        self, t: Array, s: int, acting: Acting, motion: ElementMotion, slider: Slider, found: Linear
+    ) -> None:
+        """Add what its slider's place, and the parameter, change a force by at fixed motion and N."""
+        normal, drawn = self.force(t, s, acting, motion), slider.drawn(motion.way)
+        stiffness = slider.numbers[STIFFNESS] if slider.sticks else 0.0
+        found.other[...] -= stiffness * motion.rub[..., None] * self.latched[s][1]
+        one, contact = self.by.elements[s], self.system.contacts[s]
+        changed = np.outer(
+            slider.share(normal) * normal, one.mu / slider.numbers[MU] if slider.numbers[MU] else 0.0 * one.mu
+        )
+        if slider.sticks:
+            changed = np.outer(drawn, one.stiffness) + stiffness * np.outer(
+                np.broadcast_to(t, drawn.shape), one.surface
+            )
+        if contact.circle:
+            turns = (drawn - (motion.way - slider.numbers[SLIDER])) / contact.gap
+            changed = changed + stiffness * np.outer(motion.angle + turns, one.clearance)
+            lengthened = np.outer(slider.force(motion.way, normal), one.clearance / contact.gap)
+            found.other[:2, :, self.own] += lengthened * motion.rub[:2, :, None]
+        found.other[..., self.own] += changed * motion.rub[..., None]
 
     def at_instant(self, t: float, s: int, acting: Acting) -> tuple[float, float, Array]:
-        """F, dF/dt and dF (m,) at fixed time of an element that acts."""
+        """N, dN/dt and dN (m,) at fixed time of an element that acts."""
         times = np.array([t])
-        slopes, other = self.force_change(times, s, acting)
-        rate, acceleration = self.rates(t, s, acting)
-        changed = other[0] + slopes[0, 0] * (self.read[s] @ self.y) + slopes[1, 0] * (self.read_rate[s] @ self.y)
-        return float(self.force(times, s, acting)[0]), float(slopes[:, 0] @ (rate, acceleration)), changed
+        change, moved_rows = self.force_change(times, s, acting), self.read[s] @ self.y
+        law: Any = self.system.contacts[s].law
+        inside = self._inside(s, acting, self.motion_of(t, s))
+        slopes = laws.slopes(law, acting.rows[s], inside, acting.entry_rate[s])[:2, 0]
+        changed = change.normal_other[0] + np.einsum("dak,dac->c", change.normal, moved_rows)
+        return float(self.force(times, s, acting)[0]), float(slopes @ self.rates(t, s, acting)), changed
 
     def fly(self, start: float, end: float, samples: Array) -> Array:
         """Over a time in which nothing acts; derivatives by the parameters at samples, (q, 2n, d)."""
@@ -162,15 +237,18 @@ class Flow:
             found = found + panels.within(panels.free(starts) + panels.at_nodes(rates), samples)
         return found
 
-    def pass_panels(self, panels: Panels, acting: Acting, samples: Array) -> tuple[Array, dict[int, Array]]:
-        """Where elements act; derivatives at samples, and the changes (P, S, m) of forces at nodes.
+    def pass_panels(
+        self, panels: Panels, acting: Acting, samples: Array
+    ) -> tuple[Array, dict[int, tuple[Array, Array]]]:
+        """Where elements act; derivatives at samples (q, 2n, d), and changes at nodes of N (P, S, columns) and of the
+        forces on the rows (P, m, S, columns).
 
-        F = A y + B with y at the start of a panel; y ← (E + K A) y + K B + drive at its end.
+        f = A y + B with y at the start of a panel; y ← (E + K A) y + K B + drive at its end.
         """
         count, size, own = len(panels), 2 * len(self.k), self.own
-        drive = self._drive(panels.times, acting)
-        by_state, other = self._forces(panels, acting, drive)
-        reach = np.concatenate([panels.reach(self.push[s]) for s in acting.elements], axis=2)
+        drive, pushes = self._drive(panels.times, acting), [push for s in acting.elements for push in self.push[s]]
+        (by_state, other), normals = self._forces(panels, acting, drive, pushes)
+        reach = np.concatenate([panels.reach(push) for push in pushes], axis=2)
         across, given = panels.across() + reach @ by_state, reach @ other
         if drive is not None:
             given[..., own] += np.moveaxis(panels.at_ends(drive), 0, 1)
@@ -179,42 +257,65 @@ class Flow:
         for i in range(count):
             starts[i + 1] = across[i] @ starts[i] + given[i]
         self.y = starts[-1]
-        both = by_state @ starts[:-1] + other
-        forces = {s: both[:, i * S : (i + 1) * S] for i, s in enumerate(acting.elements)}
-        for s, change in forces.items():
-            self.impulse[s] += np.tensordot(panels.weights, change, 2)
+        forces = (by_state @ starts[:-1] + other).reshape(count, len(pushes), S, -1)
+        changes, first = {}, 0
+        for s, normal in zip(acting.elements, normals, strict=True):
+            mine = forces[:, first : first + len(self.rows[s])]
+            first += len(self.rows[s])
+            changes[s] = mine[:, 0] if normal is None else normal[0] @ starts[:-1] + normal[1], mine
+            self.impulse[s] += np.tensordot(panels.weights, changes[s][0], 2)
         if not samples.size:
-            return np.zeros((0, size, len(self.by))), forces
-        rates = np.zeros((size, count, S, len(self.by))) if drive is None else drive
-        for s, change in forces.items():
-            rates = rates + self.push[s][:, None, None, None] * change[..., own]
+            return np.zeros((0, size, len(self.by))), changes
+        rates = np.tensordot(np.transpose(pushes), forces[..., own], (1, 1))
+        rates = rates if drive is None else rates + drive
         states = panels.free(np.moveaxis(starts[:-1, :, own], 1, 0)) + panels.at_nodes(rates)
-        return panels.within(states, samples), forces
+        return panels.within(states, samples), changes
 
-    def _forces(self, panels: Panels, acting: Acting, drive: Array | None) -> tuple[Array, Array]:
-        """Changes of all forces at the nodes: by the state at the start of a panel (P, m S, 2n), and else."""
-        elements, count, size = acting.elements, len(panels), 2 * len(self.k)
-        m, driven = len(elements), None if drive is None else panels.at_nodes(drive)
-        by_state, other = np.zeros((count, m, S, size)), np.zeros((count, m, S, self.columns))
-        left: Array = np.zeros((count, m, S, m, S))
-        for i, s in enumerate(elements):
-            slopes, change = self.force_change(panels.times.ravel(), s, acting)
-            other[:, i] = change.reshape(count, S, -1)
-            for slope, row in zip(slopes.reshape(2, count, S, 1), (self.read[s], self.read_rate[s]), strict=True):
-                by_state[:, i] += slope * panels.seen(row)
-                if driven is not None:
-                    other[:, i, :, self.own] += slope * np.tensordot(row, driven, 1)
-                for j, r in enumerate(elements):
-                    left[:, i, :, j] -= slope * panels.response(row, self.push[r])
-        left = left.reshape(count, m * S, m * S) + np.eye(m * S)
-        right = np.concatenate((by_state, other), axis=3).reshape(count, m * S, -1)
+    def _forces(self, panels: Panels, acting: Acting, drive: Array | None, pushes: list[Array]) -> Any:
+        """Changes of all R forces on rows at the nodes, by the state at the start of a panel (P, R S, 2n), and else.
+
+        Likewise those of N of each element; None where it is the force on its only row.
+        """
+        count, size, total = len(panels), 2 * len(self.k), len(pushes)
+        driven = None if drive is None else panels.at_nodes(drive)
+        by_state, other = np.zeros((count, total, S, size)), np.zeros((count, total, S, self.columns))
+        left: Array = np.zeros((count, total, S, total, S))
+        known, first = [], 0
+        for s in acting.elements:
+            change, reads = self.force_change(panels.times.ravel(), s, acting), self.read[s]
+            m = reads.shape[1]
+            rows, slopes = slice(first, first + m), change.slopes.reshape(2, m, m, count, S)
+            seen = np.array([[panels.seen(row) for row in pair] for pair in reads])  # (2, m, P, S, 2n)
+            answer = np.array([[[panels.response(row, push) for push in pushes] for row in pair] for pair in reads])
+            by_state[:, rows] = np.einsum("dabps,dbpsn->pasn", slopes, seen)
+            other[:, rows] = np.moveaxis(change.other.reshape(m, count, S, -1), 0, 1)
+            moved_rows = None if driven is None else np.tensordot(reads, driven, 1)
+            if moved_rows is not None:
+                other[:, rows, :, self.own] += np.einsum("dabps,dbpsc->pasc", slopes, moved_rows)
+            left[:, rows] -= np.einsum("dabps,dbrpsj->pasrj", slopes, answer)
+            known.append((change, seen, answer, moved_rows))
+            first += m
+        left = left.reshape(count, total * S, total * S) + np.eye(total * S)
+        right = np.concatenate((by_state, other), axis=3).reshape(count, total * S, -1)
         solved = np.asarray(np.linalg.solve(left, right), dtype=float)
-        return solved[..., :size], solved[..., size:]
+        found = solved[..., :size], solved[..., size:]
+        return found, [None if one[0].slopes.shape[1] == 1 else self._normal(count, *one, found) for one in known]
+
+    def _normal(
+        self, count: int, change: Linear, seen: Array, answer: Array, moved_rows: Array | None, forces: Any
+    ) -> tuple[Array, Array]:
+        """Changes of N at the nodes (P, S, ...), by the state at the start of a panel and else."""
+        normal = change.normal.reshape(2, -1, count, S)
+        pull = np.einsum("dbps,dbrpsj->psrj", normal, answer).reshape(count, S, -1)
+        other = change.normal_other.reshape(count, S, -1) + pull @ forces[1]
+        if moved_rows is not None:
+            other[..., self.own] += np.einsum("dbps,dbpsc->psc", normal, moved_rows)
+        return np.einsum("dbps,dbpsn->psn", normal, seen) + pull @ forces[0], other
 
     def _drive(self, t: Array, acting: Acting) -> Array | None:
         """Rates (2n, P, S, d) of the blocks by the parameters at times (P, S), state and forces held fixed."""
         by, system = self.by, self.system
-        if not (by.forced or np.any(by.directions)):
+        if not (by.forced or by.turned):
             return None
         times = t.ravel()
         push = np.zeros((len(by), system.size, times.size))
@@ -228,9 +329,8 @@ class Flow:
             for j, signals in enumerate(by.signals):
                 if (slope := signals[i]) is not None:
                     push[j] += np.outer(np.asarray(vector), slope(times))
-        for s in acting.elements:
-            if np.any(by.directions[:, s]):
-                push += by.directions[:, s, :, None] * self.force(times, s, acting)
+        for s in acting.elements if by.turned else ():
+            push += by.elements[s].rows.transpose(0, 2, 1) @ self.forces(times, s, acting)
         return np.asarray(np.moveaxis(system.push @ push, 0, -1)).reshape(-1, *t.shape, len(by))
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from solvers.problem import Array, System, dense
+from solvers.sensitivities.elements import motion_of
 
 _STENCILS = {  # offsets in steps, weights per step with errors of fourth order, and of second order
     0: ((-2, -1, 1, 2), (1 / 12, -2 / 3, 2 / 3, -1 / 12), (-1 / 4, 0.0, 0.0, 1 / 4)),
@@ -79,16 +80,72 @@ def combined(weights: tuple[float, ...], values: list[Any]) -> Any:
     return sum(weight * (value - first) for weight, value in zip(weights, values, strict=True))
 
 
+@dataclass(frozen=True, eq=False)
+class ElementChange:
+    """Derivatives of an element's data by d parameters: its rows (d, m, n) and their offsets (d, m), see `elements`;
+    |c|; μ, k_t and R Ω, (d,) each.
+    """
+
+    rows: Array
+    offsets: Array
+    clearance: Array
+    mu: Array
+    stiffness: Array
+    surface: Array
+
+    @classmethod
+    def of(cls, nearby: Sequence[Nearby], s: int, shape: tuple[int, ...]) -> ElementChange:
+        """Of element s, whose rows have the shape (m, n)."""
+
+        def of(read: Callable[[Any], Any], shape: tuple[int, ...] = ()) -> Array:
+            found = [one.derivative(lambda system: read(system.contacts[s])) for one in nearby]
+            return np.array(found).reshape(len(nearby), *shape)
+
+        numbers = (of(read) for read in (_clearance, _mu, _stiffness, _surface))
+        return cls(of(lambda one: one.rows, shape), of(lambda one: one.row_gaps, shape[:1]), *numbers)
+
+
+def indentation_change(
+    contact: Any, s: int, nearby: Nearby | None, motion: tuple[Array, Array], change: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Changes (k,) of δ and δ̇ of element s for those of q and q̇ (k, n) at fixed times."""
+    (q, q_dot), (d_q, d_q_dot) = motion, change
+    y, y_dot = -contact.rows @ q.T - contact.row_gaps[:, None], -contact.rows @ q_dot.T
+    moved, sped, clearance = -contact.rows @ d_q.T, -contact.rows @ d_q_dot.T, 0.0
+    if nearby is not None:
+        one = ElementChange.of([nearby], s, contact.rows.shape)
+        moved, sped = moved - one.rows[0] @ q.T - one.offsets[0][:, None], sped - one.rows[0] @ q_dot.T
+        clearance = float(one.clearance[0] * np.sign(contact.circle))
+    along = motion_of(contact, 0.0, y, y_dot)
+    rate = (along.press * sped + along.turning * moved).sum(axis=0)
+    return (along.press * moved).sum(axis=0) - clearance, rate
+
+
+def _clearance(contact: Any) -> float:
+    return contact.gap if contact.map == "annulus" else 0.0
+
+
+def _mu(contact: Any) -> float:
+    return contact.friction.mu if contact.friction else 0.0
+
+
+def _stiffness(contact: Any) -> float:
+    return contact.friction.stiffness if contact.friction else 0.0
+
+
+def _surface(contact: Any) -> float:
+    return contact.law.arm * contact.spin if contact.friction else 0.0
+
+
 class Change:
-    """Derivatives of the data by d parameters: matrices (d, n, n), directions (d, E, n), gaps (d, E), loads' vectors
-    (d, L, n); of each parameter the signals and laws that change.
+    """Derivatives of the data by d parameters: matrices (d, n, n), elements, loads' vectors (d, L, n); signals and laws
+    that change, of each parameter.
     """
 
     def __init__(self, system: System, nearby: Sequence[Nearby], duration: float) -> None:
         self.nearby, n = tuple(nearby), system.size
         self.M, self.B, self.K = (self._each(partial(_matrix, name), (n, n)) for name in ("M", "by_rate", "K"))
-        self.directions = self._each(_directions, (len(system.contacts), n))
-        self.gaps = self._each(lambda one: [contact.gap for contact in one.contacts], (len(system.contacts),))
+        self.elements = [ElementChange.of(self.nearby, s, one.rows.shape) for s, one in enumerate(system.contacts)]
         self.vectors = self._each(_vectors, (len(system.loads), n))
         self.signals = [[_signal(one, system, i, duration) for i in range(len(system.loads))] for one in self.nearby]
         self.laws = [[_laws(one, s) for s in range(len(system.contacts))] for one in self.nearby]
@@ -104,7 +161,12 @@ class Change:
         """Whether matrices change."""
         return any(np.any(one) for one in (self.M, self.B, self.K))
 
-    @property
+    @cached_property
+    def turned(self) -> bool:
+        """Whether rows of elements change."""
+        return any(np.any(one.rows) for one in self.elements)
+
+    @cached_property
     def forced(self) -> bool:
         """Whether the motion changes while nothing touches, besides by its state."""
         moving = any(signal is not None for signals in self.signals for signal in signals)
@@ -170,11 +232,6 @@ def _of_tones(nearby: Nearby, here: Any, tones: list[Any]) -> Callable[[Array], 
 def _matrix(name: str, system: System) -> Array:
     """M, K or what multiplies q̇."""
     return dense(getattr(system, name))
-
-
-def _directions(system: System) -> Array:
-    """(E, n)."""
-    return np.array([contact.direction for contact in system.contacts])
 
 
 def _vectors(system: System) -> Array:

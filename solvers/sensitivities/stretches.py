@@ -14,9 +14,10 @@ import numpy as np
 
 from solvers.compiled.state import law_parameters
 from solvers.integration import prepared_run
-from solvers.problem import Array, Solution, SolverError, Status, System
+from solvers.problem import Array, Solution, SolverError, Status, System, dense
 from solvers.problem import event_list as at
 from solvers.sensitivities import laws
+from solvers.sensitivities.elements import ElementMotion, Slider, motion_of
 from solvers.sensitivities.panels import Clock, Panels
 
 _RADIANS = 1.5  # of the fastest motion in one panel
@@ -69,7 +70,8 @@ def replayed(
     run = prepared_run(system, x[:n], x[n:], duration, times, method, False, memory)
     status = run.to_the_end(None)
     solution = run.solution(status, 0.0)
-    rows = run.state.log[: int(run.state.count[_LOGGED])].copy()
+    rows = run.state.log[: int(run.state.count[_LOGGED])]
+    rows = rows[rows[:, at.GUARD] != at.FRICTION]
     run.release()
     if solution.status is not Status.DONE:
         raise SolverError(f"the run has no derivative to its end: {solution.status.value}", solution)
@@ -85,11 +87,12 @@ def acting_at_start(system: System, x: Array, rows: Array, memory: Sequence[Any]
     segment, entry_rate, parameters = [], [], list(law_parameters(system))
     for s, contact in enumerate(system.contacts):
         law: Any = contact.law
-        delta, rate = (-contact.direction @ part for part in np.split(x, 2))
+        motion = motion_at(contact, *np.split(x[:, None], 2))
         begin = begun.get(s)
         known = begin[at.TO] if begin is not None else 0.0
-        segment.append(1 + sum(delta - contact.gap > knot for knot in law.knots) if contact.always else int(known))
-        entry_rate.append(max(abs(rate), law.entry_rate_floor))
+        above = sum(motion.delta[0] > knot for knot in law.knots)
+        segment.append(1 + above if contact.always else int(known))
+        entry_rate.append(max(abs(motion.rate[0]), law.entry_rate_floor))
         if memory is not None and memory[s] is not None:
             parameters[s][list(law.memory)] = memory[s]
     return Acting(tuple(segment), tuple(entry_rate), tuple(parameters))
@@ -105,6 +108,10 @@ def after(system: System, acting: Acting, row: Array) -> Acting:
         acting = acting.changed(s, entry_rate=max(abs(rate), law.entry_rate_floor))
     if guard == at.KNOT:
         return acting.changed(s, segment=acting.segment[s] + (1 if rate > 0.0 else -1))
+    slider = Slider.of(system.contacts[s], acting.rows[s])
+    if slider is not None:
+        known = (float(number) for number in row[at.DELTA : at.FORCE + 1])
+        return acting.changed(s, rows=slider.renewed(acting.rows[s], *known))
     return acting.changed(s, rows=laws.renewed(law, acting.rows[s], int(guard), row[at.DELTA], rate))
 
 
@@ -131,8 +138,9 @@ class Division:
         places = np.concatenate((-places, places)) if contact.always else places
         row = law_parameters(self.system)[s]
         found = laws.slopes(contact.law, row, (places, 0.0 * places), 1.0)
-        mobility = float(contact.direction @ np.linalg.solve(self.system.M, contact.direction))
+        mobility = float(np.linalg.norm(contact.rows @ np.linalg.solve(dense(self.system.M), contact.rows.T), 2))
         stiffness, damping = (float(np.nanmax(np.abs(one), initial=0.0)) for one in found[:2])
+        stiffness = max(stiffness, float(contact.friction.stiffness or 0.0) if contact.friction else 0.0)
         return math.sqrt(stiffness * mobility) + damping * mobility
 
     def stretches(self, acting: Acting, rows: Array, duration: float, refinement: int) -> Iterator[Stretch]:
@@ -172,6 +180,11 @@ def _power(contact: Any) -> int:
     if np.all(powers == np.round(powers)):
         return 1
     return 2 if np.all(2.0 * powers == np.round(2.0 * powers)) else 6
+
+
+def motion_at(contact: Any, q: Array, q_dot: Array, t: Any = 0.0) -> ElementMotion:
+    """Motion of an element at coordinates (n, k)."""
+    return motion_of(contact, t, -contact.rows @ q - contact.row_gaps[:, None], -contact.rows @ q_dot)
 
 
 class Motion:

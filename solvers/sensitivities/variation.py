@@ -22,6 +22,7 @@ from solvers.sensitivities.stretches import (
     Stretch,
     acting_at_start,
     grouped,
+    motion_at,
     replayed,
 )
 
@@ -93,7 +94,7 @@ def sensitivity(
     Raises
     ------
     NoDerivativeError : a contact grazes, to 1e-9 of the motion, or comes as near without being met.
-    ValueError : bad input, a law with an infinite slope at its surface, panels beyond count, friction.
+    ValueError : bad input, a law with an infinite slope at its surface, panels beyond count.
     SolverError : the run fails.
 
     Notes
@@ -136,12 +137,6 @@ def sensitivities(
     from solvers.problem.run_arguments import check_slopes
 
     check_slopes(system)
-    for i, contact in enumerate(system.contacts):
-        if contact.friction is not None:
-            raise ValueError(
-                f"sensitivities take contacts without friction, and contact {i} has some; the derivative of the end is "
-                "given by integrate(tangent=True), or tangent=Parameter(...)"
-            )
     method = Exponential() if method is None else method
     asked = _Asked(
         system,
@@ -213,11 +208,10 @@ class _Asked:
         """Sizes of the displacements; NoDerivativeError for a stop that is touched but not entered."""
         self.span, self.depth = (np.zeros(len(self.system.contacts)) for _ in range(2))
         for s, contact in enumerate(self.system.contacts):
-            delta = -solution.q @ contact.direction
+            delta = motion_at(contact, solution.q.T, solution.q_dot.T).delta
             mine = rows[rows[:, at.ELEMENT] == s]
-            self.span[s] = np.abs(delta).max() + 1e-300
+            self.span[s] = np.abs(delta + contact.gap * (-1.0 if contact.outer else 1.0)).max() + 1e-300
             deepest = np.nanmax(np.append(mine[:, at.DEEPEST], 0.0))
-            delta = delta - contact.gap
             deepest = max(deepest, float((np.abs(delta) if contact.always else delta).max()))
             self.depth[s] = max(deepest, 1e-9 * self.span[s])
         self._check_apart(solution)
@@ -247,8 +241,8 @@ class _Asked:
     def _tops(self, solution: Solution, s: int) -> list[tuple[float, float, float]]:
         """Times of the maxima of δ below zero between samples, the distance of samples there, and δ of cubics."""
         contact, t = self.system.contacts[s], solution.t
-        delta, rate = -solution.q @ contact.direction - contact.gap, -solution.q_dot @ contact.direction
-        found = []
+        motion, found = motion_at(contact, solution.q.T, solution.q_dot.T), []
+        delta, rate = motion.delta, motion.rate
         for i in np.flatnonzero((rate[:-1] > 0.0) & (rate[1:] <= 0.0) & (delta[:-1] < 0.0) & (delta[1:] < 0.0)):
             h, x = t[i + 1] - t[i], rate[i] / (rate[i] - rate[i + 1])
             rest = 1.0 - x
@@ -353,7 +347,7 @@ class _Walk:
     def _check_start(self) -> None:
         """NoDerivativeError for a stop that begins on its surface without contact, if a parameter moves it."""
         for s, span in enumerate(self.asked.span):
-            near = abs(self.flow.motion_of(0.0, s)[0]) <= GRAZING * span
+            near = abs(self.flow.motion_of(0.0, s).delta[0]) <= GRAZING * span
             if near and not self.acting.segment[s] and np.any(self.flow.change(0.0, s)[0][self.flow.own]):
                 raise NoDerivativeError(
                     f"no derivative: contact {s} is touched at the start, so that it differs on both sides; "
@@ -404,8 +398,8 @@ class _Walk:
         for panels in stretch.panels.parts(_MOST_ENTRIES // (S * S * len(flow.k))) if stretch.panels else ():
             middle = high if panels.ends[-1] >= stretch.end else low + np.searchsorted(times[low:high], panels.ends[-1])
             if stretch.acting.elements:
-                found, forces = flow.pass_panels(panels, stretch.acting, times[low:middle])
-                self._look(panels, forces, stretch.acting)
+                found, changes = flow.pass_panels(panels, self.acting, times[low:middle])
+                self._look(panels, changes, self.acting)
             else:
                 found = flow.pass_flight(panels, stretch.acting, times[low:middle])
             self._sampled(low, found)
@@ -416,12 +410,12 @@ class _Walk:
         """Keep derivatives (q, 2n, d) of the blocks at samples."""
         self.states[first : first + len(found)] = np.moveaxis(self.flow.T @ found, 1, 2)
 
-    def _look(self, panels: Panels, forces: dict[int, Array], acting: Acting) -> None:
+    def _look(self, panels: Panels, changes: dict[int, tuple[Array, Array]], acting: Acting) -> None:
         """Peaks and kinks within panels, and how rough the derivatives are there."""
-        for s, change in forces.items():
+        for s, (change, forces) in changes.items():
             self._look_for_kinks(panels, s, acting)
-            size = np.abs(change).max(axis=1)
-            tail = np.abs(np.moveaxis(coefficients(np.moveaxis(change, 1, 0))[-2:], 0, 1)).max(axis=1)
+            size = np.abs(forces).max(axis=(1, 2))
+            tail = np.abs(coefficients(np.moveaxis(forces, 2, 0))[-2:]).max(axis=(0, 2))
             size[0] = np.maximum(size[0], self.flow.largest[s])
             scale = np.maximum.accumulate(size, axis=0)
             self.flow.largest[s] = scale[-1]

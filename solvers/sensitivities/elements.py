@@ -1,0 +1,170 @@
+"""Forces of one element along a known motion of its rows, and what they change by.
+
+    y = -rows·q - offsets,    f = N a + F_t b,    a = ∂δ/∂y,  b = ∂ξ/∂y
+
+    F_t = k_t (ξ - s) in stick, ±μN in slip
+
+A stop on a line has one row, y = δ, and f = N. The rows of an oblique stop are δ and -ξ; those of a circular clearance
+-d and, where the place turns, -|R| φ:
+
+    δ = ±(|d| - c),    ξ = c θ + R (φ + Ω t)
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from solvers.problem import Array
+from solvers.problem.friction import CODE, FREE, MU, SLIDER, STICK, STIFFNESS
+from solvers.sensitivities import laws
+
+_INSIDE = 1e-200  # m, where forces like δ^{1/4} grow without bound, and those like δ^{3/2} do not grow
+_CENTRE = 1e-12  # of the clearance: nearer to the centre, where nothing acts, slopes have no direction
+
+
+@dataclass(frozen=True, eq=False)
+class ElementMotion:
+    """δ, δ̇, ξ, ξ̇ (k,) of an element at times (k,), their slopes by its rows (m, k) and curvatures (m, m, k).
+
+    ``press`` is ∂δ/∂y = ∂δ̇/∂ẏ, ``turning`` ∂δ̇/∂y, ``rub`` ∂ξ/∂y; ``angle`` θ, of a circular clearance with friction.
+    """
+
+    delta: Array
+    rate: Array
+    press: Array
+    press_bend: Array
+    turning: Array
+    way: Array
+    speed: Array
+    rub: Array
+    rub_bend: Array
+    angle: Array
+
+
+def motion_of(contact: Any, t: Any, y: Array, y_dot: Array) -> ElementMotion:
+    """From the motion (m, k) of its rows."""
+    m, k = y.shape
+    none, slopes, bends = np.zeros(k), np.zeros((m, k)), np.zeros((m, m, k))
+    if contact.map != "annulus":
+        press, rub = np.eye(m)[0][:, None] + slopes, slopes
+        if m == 1:
+            return ElementMotion(y[0], y_dot[0], press, bends, slopes, none, none, rub, bends, none)
+        rub = -np.eye(m)[1][:, None] + slopes
+        return ElementMotion(y[0], y_dot[0], press, bends, slopes, -y[1], -y_dot[1], rub, bends, none)
+    sign, c = math.copysign(1.0, contact.circle), contact.gap
+    r = np.maximum(np.hypot(y[0], y[1]), _CENTRE * c)
+    e, across = y[:2] / r, np.stack((-y[1], y[0])) / r
+    press, press_bend, rub, rub_bend = slopes.copy(), bends.copy(), slopes.copy(), bends.copy()
+    press[:2], press_bend[:2, :2] = sign * e, sign / r * (across[:, None] * across)
+    turning = np.einsum("abk,bk->ak", press_bend, y_dot)
+    known = sign * r - contact.circle, (press * y_dot).sum(axis=0), press, press_bend, turning
+    if contact.friction is None:
+        return ElementMotion(*known, none, none, rub, rub_bend, none)
+    rub[:2], rub_bend[:2, :2] = c / r * across, -c / r**2 * (e[:, None] * across + across[:, None] * e)
+    rub[2:] = -math.copysign(1.0, contact.law.arm)
+    angle, surface = np.arctan2(y[1], y[0]), contact.law.arm * contact.spin
+    way = c * angle + (rub[2:] * y[2:]).sum(axis=0) + surface * t
+    return ElementMotion(*known, way, (rub * y_dot).sum(axis=0) + surface, rub, rub_bend, angle)
+
+
+def acceleration_of(motion: ElementMotion, y_dot: Array, y_twice: Array) -> Array:
+    """δ̈ (k,)."""
+    return np.asarray((motion.press * y_twice + motion.turning * y_dot).sum(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class Slider:
+    """The numbers of an element's friction: μ, k_t, R and Ω, code of the segment and place of the slider."""
+
+    contact: Any
+    numbers: Array
+
+    @classmethod
+    def of(cls, contact: Any, row: Array) -> Slider | None:
+        """From an element's parameters with what it has latched; None without friction."""
+        return None if contact.friction is None else cls(contact, row[contact.law.place :])
+
+    @property
+    def sticks(self) -> bool:
+        """Whether its spring gives the force."""
+        return bool(self.numbers[CODE] == STICK)
+
+    def share(self, normal: Array) -> Array:
+        """∂F_t/∂N (k,): ±μ in slip."""
+        code = 0.0 if self.numbers[CODE] == FREE else self.numbers[CODE]
+        return np.where(normal > 0.0, code * self.numbers[MU], 0.0)
+
+    def drawn(self, way: Array) -> Array:
+        """ξ - s (k,), in a circle to the nearest turn."""
+        left, turn = way - self.numbers[SLIDER], 2.0 * math.pi * abs(self.contact.circle)
+        return left - turn * np.round(left / turn) if turn else left
+
+    def force(self, way: Array, normal: Array) -> Array:
+        """F_t (k,)."""
+        return self.numbers[STIFFNESS] * self.drawn(way) if self.sticks else self.share(normal) * normal
+
+    def begun(self, motion: ElementMotion, row: Array, entry_rate: float, under_way: bool) -> Array:
+        """Parameters after a contact has begun: in stick where N jumps or grows quicker than the spring is drawn."""
+        law, mu = self.contact.law, self.numbers[MU]
+        rate, speed = float(motion.rate[0]), float(motion.speed[0])
+        slips = mu == 0.0
+        if not (under_way or slips):
+            growing = rate * laws.slopes(law, row, (_INSIDE, rate), entry_rate)[0, 0]
+            slips = laws.force(law, row, (0.0, rate), entry_rate)[0] <= 0.0
+            slips = slips and self.numbers[STIFFNESS] * abs(speed) > mu * growing
+        return self._latched(row, math.copysign(1.0, speed) if slips else STICK, float(motion.way[0]))
+
+    def renewed(self, row: Array, way: float, speed: float, force: float) -> Array:
+        """Parameters after stick or slip has ended with F_t."""
+        code, rounding = self.numbers[CODE], 1e-15 * (abs(way) + 2.0 * math.pi * abs(self.contact.circle)) + 1e-20
+        if self.numbers[MU] == 0.0 and code != STICK:
+            return self._latched(row, -code, self.numbers[SLIDER])
+        if not self.sticks:
+            return self._latched(row, STICK, way - force / self.numbers[STIFFNESS])
+        undrawn = abs(float(self.drawn(np.array(way)))) <= rounding
+        return self._latched(row, math.copysign(1.0, speed if undrawn else force), self.numbers[SLIDER])
+
+    def _latched(self, row: Array, code: float, place: float) -> Array:
+        """Parameters with other latched numbers."""
+        row = row.copy()
+        row[list(self.contact.law.memory)] = code, place
+        return row
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """Changes of an element's forces at times (k,).
+
+    df = slopes[0] dy + slopes[1] dẏ + other, (2, m, m, k) and (m, k, columns); dN likewise by ``normal`` (2, m, k) and
+    ``normal_other`` (k, columns).
+    """
+
+    slopes: Array
+    other: Array
+    normal: Array
+    normal_other: Array
+
+
+def forces_of(motion: ElementMotion, slider: Slider | None, normal: Array) -> Array:
+    """Forces (m, k) on the rows for N (k,)."""
+    if slider is None:
+        return normal * motion.press
+    return normal * motion.press + slider.force(motion.way, normal) * motion.rub
+
+
+def linear(motion: ElementMotion, slider: Slider | None, normal: Array, slopes: Array, by_law: Array) -> Linear:
+    """Changes of the forces by the motion, by N_δ and N_δ̇ (2, k), and by what changes N itself (k, columns)."""
+    a, b = motion.press, motion.rub
+    by_normal = np.stack((slopes[0] * a + slopes[1] * motion.turning, slopes[1] * a))
+    along, found = a, np.stack((normal * motion.press_bend, np.zeros_like(motion.press_bend)))
+    if slider is not None:
+        along = a + slider.share(normal) * b
+        found[0] += slider.force(motion.way, normal) * motion.rub_bend
+        if slider.sticks:
+            found[0] += slider.numbers[STIFFNESS] * b[:, None] * b
+    found += along[None, :, None] * by_normal[:, None]
+    return Linear(found, along[..., None] * by_law, by_normal, by_law)
