@@ -10,7 +10,7 @@ import pytest
 REALISATION = int(os.environ.get("FEMBEAM_REALISATION", "0"))  # 0 is the test's own
 
 _NAMES = "from solvers.compiled.kernels import *; from solvers.exponential.preparation import *; "
-_NAMES += "from solvers.exponential.method import advance_of; "
+_NAMES += "from solvers.compiled.parts import CIRCLES, PLACES; from solvers.exponential.method import advance_of; "
 _STEPPING = """
 import solvers, solvers.exponential.linearised
 from contacts import Hertz
@@ -23,8 +23,8 @@ for system, methods in ((ball, constant), (disc, ())):
         solvers.integrate(system, [0.0, 0.0], [-0.5, 0.0], 1e-3, method=method)
 """
 KERNELS = [
-    f"{_NAMES} load_parts(PROBLEM, range(26)); advance_of(False)",
-    f"{_NAMES} load_parts(PLANAR_PROBLEM, range(51)); advance_of(True)",
+    f"{_NAMES} load_parts(PROBLEM, range(CIRCLES.start)); advance_of(False)",
+    f"{_NAMES} load_parts(PLANAR_PROBLEM, range(PLACES)); advance_of(True)",
     _STEPPING,
 ]  # take equally long to compile
 
@@ -40,8 +40,9 @@ def pytest_sessionstart(session):
         return
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the processors are taken
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # else each of many processes would compile all modules
-    for process in [subprocess.Popen([sys.executable, "-c", code]) for code in KERNELS]:
-        process.wait()
+    running = [subprocess.Popen([sys.executable, "-c", code]) for code in KERNELS]
+    if any([process.wait() for process in running]):
+        pytest.exit("kernels do not compile", 1)
 
 
 def pytest_collection_modifyitems(config, items):
