@@ -195,6 +195,17 @@ def test_what_is_no_formula_stays(formulas, text):
 
 
 @WITH_SPHINX
+def test_what_a_script_prints_stays(formulas):
+    from docutils import nodes, utils
+
+    document = utils.new_document("page")
+    for classes in ([], [formulas.PRINTED]):
+        document += nodes.literal_block("F = k x", "F = k x", classes=classes, language="none")
+    formulas.typeset(None, document)
+    assert [type(block).__name__ for block in document] == ["math_block", "literal_block"]
+
+
+@WITH_SPHINX
 def test_an_equation_that_cannot_be_read_is_named(formulas):
     from mathml import converted
 

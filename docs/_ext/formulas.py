@@ -20,6 +20,7 @@ NAMES = r"\int \oint \sum \ne \le \ge \propto \infty \sim \mp \Vert \approx \to 
 SIGNS = {sign: f"{name} " for sign, name in zip("∫∮Σ≠≤≥∝∞~∓‖≈→∈±×·…*", NAMES.split(), strict=True)}
 SIGNS |= {"<=": r"\le ", ">=": r"\ge ", "...": r"\ldots ", "%": r"\%", "−": "-", "–": "-", "ˣ": "^{x}"}
 SIGNS |= {sign: rf"\tfrac{{1}}{{{part}}}" for sign, part in (("½", 2), ("¼", 4))} | {"¾": r"\tfrac{3}{4}"}
+PRINTED = "sphx-glr-script-out"  # class of a script's output in the gallery
 BRACKETS = {"(": ")", "{": "}"}
 TOKEN = re.compile(
     r"""(?P<root>√)|(?P<raised>\^[({]?|_[({])|(?P<super>[⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ᵀᵗᵖⁿʳᵈᴴ]+)|(?P<sub>[₀₁₂₃₄₅₆₇₈₉₊₋ₐₑᵢⱼₖₗₘₙₚᵣₛₜₓ]+)
@@ -142,9 +143,10 @@ def readable(found: str) -> bool:
 
 
 def typeset(app: object, document: nodes.document) -> None:
-    """Put formulas in place of the indented blocks of a page that are some."""
+    """Put formulas in place of the indented blocks of a page that are some; what a script has printed is none."""
     for block in list(document.findall(nodes.literal_block)):
-        found = formula(block.astext()) if block.get("language", "none") == "none" else None
+        plain = block.get("language", "none") == "none" and PRINTED not in block["classes"]
+        found = formula(block.astext()) if plain else None
         if found and readable(found):
             block.replace_self(nodes.math_block(found, found, nowrap=True, number=None, label=None))
 
