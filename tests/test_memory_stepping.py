@@ -14,6 +14,7 @@ from solvers import (
     CentralDifference,
     Contact,
     DormandPrince,
+    Exponential,
     GeneralizedAlpha,
     HenonRK2,
     Newmark,
@@ -120,6 +121,15 @@ def test_a_margin_that_dips_below_zero_between_nodes_is_seen(phase, over):
             system = System([[1.0]], [[0.0]], [[1.0]], [element(Jenkins(4.0, limit))])
             found = integrate(system, start[:1], start[1:], 2.0, method=DormandPrince(rtol, 1e-16)).transitions
             assert len(found) == count
+
+
+def test_a_start_beyond_the_limit_slips_before_a_stop_is_landed_on():
+    """The stop is met within one landing, and by then the undrawn slider would be within its limit again."""
+    stop = Contact([-1.0], Hertz(1e6), gap=-5e-4)
+    system = System([[1.0]], [[0.0]], [[400.0]], [Contact([-1.0], Jenkins(25.0, 0.05), always=True), stop])
+    run = integrate(system, [-0.0121], [0.6], 0.03, method=Exponential(1e-6))
+    assert run.transitions.event[:2].tolist() == ["slip", "stick"]
+    assert run.transitions.t[:2].tolist() == [0.0, 0.0]
 
 
 def test_a_start_beyond_the_limit_slips_at_once():

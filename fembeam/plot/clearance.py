@@ -69,8 +69,9 @@ def orbit_in_clearance(
     touching = np.sign(radius) * (np.linalg.norm(path, axis=1) - size) > 0.0
     parts = [(BLUE, "free", ~touching), (RED, "in contact", touching)]
     if run.rubs[number, 1]:
-        stuck = _sticks(run, number, fine) & touching
-        parts[1:] = [(RED, "slips", touching & ~stuck), (GREEN, "sticks", stuck)]
+        codes = _codes(run, number, fine)
+        stuck, slips = touching & (codes == 0.0), touching & (np.abs(codes) == 1.0)
+        parts = [(BLUE, "free", ~(stuck | slips)), (RED, "slips", slips), (GREEN, "sticks", stuck)]
     figure, (axis,) = sheet(1, 1, (5.0, 5.0), axes)
     axis.plot(size * np.cos(ROUND), size * np.sin(ROUND), "--", color=GREY, label=f"clearance {length(abs(radius))}")
     for colour, label, shown in parts:
@@ -85,10 +86,10 @@ def orbit_in_clearance(
     return figure
 
 
-def _sticks(run: Run, stop: int, t: Vector) -> Any:
-    """Whether the slider of a stop sticks at times."""
+def _codes(run: Run, stop: int, t: Vector) -> Any:
+    """What the slider of a stop does at times: ±1 slips, 0 sticks, else free."""
     times, codes, _ = states(run, stop)
-    return np.append(codes, np.nan)[np.searchsorted(times, t, side="right") - 1] == 0.0
+    return np.append(codes, np.nan)[np.searchsorted(times, t, side="right") - 1]
 
 
 @styled

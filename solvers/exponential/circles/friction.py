@@ -25,7 +25,7 @@ from solvers.compiled.kernels import (
     place_of,
     radius_of,
     row_of,
-    slide_of,
+    rows_at,
     slider_of,
 )
 from solvers.compiled.parts import RUB_FORCES, RUB_GUESS, RUB_NEWTON, RUB_WITHIN, RUB_WORK, part
@@ -49,12 +49,28 @@ def count_of(problem, s):
 
 
 @inlined
+def carried(own, t, turned):
+    """The part of ξ by which the surface turns: it is known, and may be turns within a step."""
+    return math.copysign(1.0, own[ARM]) * turned + own[ARM] * own[SPIN] * t
+
+
+@inlined
 def nearest_way(way, known, radius):
-    """A way that is known up to whole turns, next to another one."""
+    """A way along a circle that is known up to whole turns, next to another one."""
     if radius == 0.0:
         return way
     turn = TURN * abs(radius)
     return way - turn * math.floor((way - known) / turn + 0.5)
+
+
+@inner
+def way_beside(problem, scratch, s, t, x, i):
+    """ξ in the state x at time t, without a jump from that at node i."""
+    own, radius, first = slider_of(problem, s), radius_of(problem, s), row_of(problem, s)
+    u, _, w, _, turned, _ = rows_at(problem, s, x)
+    there = -scratch.motion[first + 2, 0, i] if count_of(problem, s) > 2 else 0.0
+    rest, known = carried(own, t, turned), scratch.slid[s, WAYS, i] - carried(own, scratch.node_time[i], there)
+    return rest + nearest_way(way_of(radius, own, t, u, w, turned) - rest, known, radius)
 
 
 @inner
@@ -73,11 +89,14 @@ def _ways_at_nodes(problem, scratch, s):
     """ξ alone."""
     first, own, radius = row_of(problem, s), slider_of(problem, s), radius_of(problem, s)
     u, w, ways = scratch.motion[first, 0], scratch.motion[first + 1, 0], scratch.slid[s, WAYS]
-    third = count_of(problem, s) > 2
+    third, before = count_of(problem, s) > 2, 0.0
     for i in range(S):
         turned = -scratch.motion[first + 2, 0, i] if third else 0.0
-        way = way_of(radius, own, scratch.node_time[i], u[i], w[i], turned)
-        ways[i] = nearest_way(way, ways[i - 1], radius) if i > 0 else way
+        way, rest = way_of(radius, own, scratch.node_time[i], u[i], w[i], turned), 0.0
+        if radius != 0.0:
+            rest = carried(own, scratch.node_time[i], turned)
+        ways[i] = rest + nearest_way(way - rest, ways[i - 1] - before, radius) if i > 0 else way
+        before = rest
 
 
 @inlined
@@ -254,10 +273,10 @@ def _work_of_friction(problem, tables, scratch, node_set, level, s, begin, end):
 @part(RUB_WORK, REAL, *[types.int64] * 3)
 def work_with_friction(problem, tables, state, scratch, node_set, level, s):
     """Work of N, J, over the step just found; that of friction, its impulse and way go to the state."""
-    own, slid, h, radius = slider_of(problem, s), scratch.slid[s], tables.contact_step[level], radius_of(problem, s)
+    own, slid, h = slider_of(problem, s), scratch.slid[s], tables.contact_step[level]
     account, t = problem.friction[s, 1], state.now[T]
-    begin = nearest_way(slide_of(problem, s, t, state.x)[0], slid[WAYS, 0], radius)
-    end = nearest_way(slide_of(problem, s, t + h, scratch.x_new)[0], slid[WAYS, S - 1], radius)
+    begin = way_beside(problem, scratch, s, t, state.x, 0)
+    end = way_beside(problem, scratch, s, t + h, scratch.x_new, S - 1)
     work = _work_of_friction(problem, tables, scratch, node_set, level, s, begin, end)
     weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
     weights = tables.weights[node_set] if weighted else tables.plain[node_set]

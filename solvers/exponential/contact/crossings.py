@@ -32,8 +32,6 @@ from solvers.compiled.kernels import (
     merged,
     push_of,
     row_of,
-    rubs,
-    slider_of,
 )
 from solvers.compiled.parts import BOUNDS, LEAVES, SIDE, part
 from solvers.compiled.simd import largest8, least8, load8, splat8, store8
@@ -45,7 +43,6 @@ from solvers.exponential.contact.node_response import RTOL, motion_of, respond, 
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import largest_indentation
 from solvers.exponential.flight import energy_norms
-from solvers.problem.friction import PEAK
 
 RATE, FORCE = 1.0, 2.0  # kinds of bends in Tables.bend; 0 for a law that has none
 CLEAR, TOO_LONG = -1, -2  # of a landing: no other event before it, or one that requires shorter steps
@@ -298,23 +295,13 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
                 return TOO_LONG
         if not bends and tables.bend[s] == FORCE and _pulls_inside(scratch.stages, size + 3 + 2 * s, width):
             return TOO_LONG
-        if _force_turns(scratch.stages, size + 3 + 2 * s, width, state.active[s, PEAK_FORCE], 1.0):
-            return TOO_LONG
-        if rubs(problem, s) and _friction_turns(problem, scratch.stages, width, s):
+        if force_turns(scratch.stages, size + 3 + 2 * s, width, state.active[s, PEAK_FORCE], 1.0):
             return TOO_LONG
     return CLEAR
 
 
-@inner
-def _friction_turns(problem, work, width, s):
-    """The same of |F_t|."""
-    column = problem.friction[s, 1] + 1
-    sign = math.copysign(1.0, work[0, column] + work[STAGES - 2, column])
-    return _force_turns(work, column, width, slider_of(problem, s)[PEAK], sign)
-
-
 @merged
-def _force_turns(work, column, width, known, sign):
+def force_turns(work, column, width, known, sign):
     """Whether a force, the rate of the impulse over that of time, has a maximum above ``known`` inside a landing.
 
     It is the force times ``sign``.

@@ -30,6 +30,7 @@ from solvers.compiled.kernels import (
     inlined,
     inner,
     is_circle,
+    is_planar,
     merged,
     raised,
     row_of,
@@ -37,6 +38,7 @@ from solvers.compiled.kernels import (
     slider_of,
 )
 from solvers.compiled.parts import PASSED
+from solvers.compiled.sliding import slider_force
 from solvers.compiled.state import (
     CALLS,
     LANDING,
@@ -52,7 +54,7 @@ from solvers.compiled.state import (
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import land_on_circle
 from solvers.exponential.contact.borders import margins_later, margins_of, passed
-from solvers.exponential.contact.crossings import CLEAR, TOO_LONG, before_landing, side_at
+from solvers.exponential.contact.crossings import CLEAR, TOO_LONG, before_landing, force_turns, side_at
 from solvers.exponential.contact.first_step import BALANCED, NEW, NODE_SET
 from solvers.exponential.contact.landing_step import INDENTATION, ROOT, SINCE, TIME, landing_step, start_landing
 from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, REACH, RTOL, START
@@ -60,6 +62,7 @@ from solvers.exponential.contact.peaks import state_peaks
 from solvers.problem.friction import PEAK
 
 _MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
+_MOST_VERTICES = 6  # of parabolas, to a maximum inside a landing
 _MOST_HALVINGS = 40  # the same on a border, whose margin may hardly change but at the start
 _PART = 0.1  # of the embedded difference that counts as the error
 _PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
@@ -169,11 +172,56 @@ def _begin_peaks(problem, state, scratch):
 
 
 @inner
+def _drag(problem, tables, state, scratch, variable, stop, length, s):
+    """|F_t| of stop s after a part of a landing."""
+    x = scratch.stages[LANDED]
+    _step(problem, tables, state, scratch, variable, stop, length)
+    return abs(slider_force(problem, s, state.segment[s], state.entry_rate[s], x[state.x.size], x))
+
+
+@inner
+def _peak_of_drag(problem, tables, state, scratch, variable, stop, span, s):
+    """Raise the largest |F_t| of stop s by its maximum inside a landing, by vertices of parabolas."""
+    a, b, c, own = 0.0, 0.5 * span, span, slider_of(problem, s)
+    low = _drag(problem, tables, state, scratch, variable, stop, a, s)
+    best = _drag(problem, tables, state, scratch, variable, stop, b, s)
+    high = _drag(problem, tables, state, scratch, variable, stop, c, s)
+    for _ in range(_MOST_VERTICES):
+        rise, fall = (b - a) * (best - high), (c - b) * (best - low)
+        if not rise + fall > 0.0:
+            break
+        vertex = b - 0.5 * ((b - a) * rise - (c - b) * fall) / (rise + fall)
+        if not a < vertex < c or abs(vertex - b) <= 1e-6 * span:
+            break
+        value = _drag(problem, tables, state, scratch, variable, stop, vertex, s)
+        if value >= best:
+            a, low, c, high = (a, low, b, best) if vertex < b else (b, best, c, high)
+            b, best = vertex, value
+        elif vertex < b:
+            a, low = vertex, value
+        else:
+            c, high = vertex, value
+    own[PEAK] = max(own[PEAK], best)
+
+
+@inlined
+def _turns(problem, scratch, width, s):
+    """Whether |F_t| has a maximum above its peak inside the landing whose stages are there."""
+    work, column = scratch.stages, problem.friction[s, 1] + 1
+    sign = math.copysign(1.0, work[0, column] + work[STAGES - 2, column])
+    return force_turns(work, column, width, slider_of(problem, s)[PEAK], sign)
+
+
+@inner
 def _accept(problem, tables, state, scratch, variable, stop, level, span):
     """Move the state to the landing in ``scratch.stages[LANDED]``, or to the end of the run; write samples between."""
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
     landed, t, t_end = x[size], state.now[T], state.now[T_END]
     _begin_peaks(problem, state, scratch)
+    if is_planar(problem):
+        for s in range(problem.friction.shape[0]):
+            turns = rubs(problem, s) and state.segment[s] > 0 and _turns(problem, scratch, size, s)
+            scratch.unresolved[s] = 1.0 if turns else 0.0
     copy(x, state.x, size)
     while True:
         due = state.due[state.count[SAMPLED]]
@@ -191,6 +239,10 @@ def _accept(problem, tables, state, scratch, variable, stop, level, span):
             copy(x, state.x, size)
             landed, span = t_end, length
             break
+    if is_planar(problem):
+        for s in range(problem.friction.shape[0]):
+            if scratch.unresolved[s] > 0.0:
+                _peak_of_drag(problem, tables, state, scratch, variable, stop, span, s)
     if state.event_record.shape[0]:
         write_event(state, LANDING, t, landed, span, variable, stop, w)
     state.now[T] = landed
@@ -332,7 +384,9 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near):
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
     furthest, span = furthest**root, near**root
     before, apart = 0.0, _apart(problem, tables, state, scratch, stop, border, w)
-    if (apart if border >= 0 else abs(apart)) <= 1e-6 * largest:  # it begins there: the secant needs another point
+    begins_there = (apart if border >= 0 else abs(apart)) <= 1e-6 * largest
+    least = 0.0 if border >= 0 and not begins_there else 0.1 * span
+    if begins_there:  # the secant needs another point
         before = 0.9 * span
         _step(problem, tables, state, scratch, variable, stop, before)
         apart = _apart(problem, tables, state, scratch, stop, border, x)
@@ -349,7 +403,7 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near):
             above, below = (span, below) if value > 0.0 else (above, span)
             if below < furthest and not above < following < below:
                 following = _between(above, below)
-        if not (0.1 * near if border < 0 else 0.0) < following <= furthest or following == span:
+        if not least < following <= furthest or following == span:
             return False
         before, apart, span = span, value, following
     time = x[size] - w[size] if variable == SINCE else span

@@ -35,7 +35,7 @@ from solvers.compiled.sliding import (
 )
 from solvers.compiled.state import T, rate_tolerance, surface_tolerance
 from solvers.compiled.sums import above, combine
-from solvers.exponential.circles.friction import SPARE, SPEEDS, TANGENTIAL, WAYS, nearest_way, slide_at_nodes
+from solvers.exponential.circles.friction import SPARE, SPEEDS, TANGENTIAL, WAYS, slide_at_nodes, way_beside
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL_SLOPES, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
@@ -218,11 +218,14 @@ def _ripples(problem, tables, state, s, alias):
 def _slide_around(problem, tables, state, scratch, node_set, h, s, place):
     """ξ and ξ̇ around a node, behind δ and δ̇ there, into row `FORCES` of ``scratch.local_motion``."""
     known, slid, out = scratch.local_motion[KNOWN], scratch.slid[s], scratch.local_motion[FORCES]
-    way, speed = slide_of(problem, s, state.now[T], state.x)
+    way, speed = (
+        way_beside(problem, scratch, s, state.now[T], state.x, 0),
+        slide_of(problem, s, state.now[T], state.x)[1],
+    )
     copy(slid[WAYS], known, S)
     for i in range(S):
         known[S + i] = h * slid[SPEEDS, i]
-    known[2 * S] = nearest_way(way, slid[WAYS, 0], radius_of(problem, s))
+    known[2 * S] = way
     known[2 * S + 1] = h * speed
     combine(tables.local_interpolation[node_set, place], known, 2 * S + 2, None, out)
     for i in range(S):
