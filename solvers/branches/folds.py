@@ -152,13 +152,20 @@ def fold_curve(
     --------
     Duffing's oscillator q̈ + 2ζ q̇ + q + q³ = f cos ωt.
 
-    >>> from types import SimpleNamespace
+    >>> from dataclasses import dataclass
     >>> from contacts import Polynomial
     >>> from solvers import Contact, branch
+    >>> @dataclass
+    ... class Tone:
+    ...     omega: float
+    ...     size: float
+    ...     def __call__(self, t):
+    ...         return self.size * np.cos(self.omega * t)
+    ...     def tones(self):
+    ...         return np.array([self.omega]), np.array([self.size + 0j])
     >>> spring = Contact([1.0], Polynomial([0.0, 0.0, 1.0]), always=True)
     >>> def make(omega, f):
-    ...     tone = SimpleNamespace(tones=lambda: (np.array([omega]), np.array([f + 0j])))
-    ...     return System.modal([1.0], [0.05], [spring], [([1.0], tone)]), 2.0 * np.pi / omega
+    ...     return System.modal([1.0], [0.05], [spring], [([1.0], Tone(omega, f))]), 2.0 * np.pi / omega
     >>> folds = branch(lambda omega: make(omega, 0.2), (1.1, 1.6), [0.0, 0.0]).run().special
     >>> curve = fold_curve(make, folds[0], 0.2, (0.15, 0.2), 0.5)
     >>> {one.mark for one in curve.orbits}

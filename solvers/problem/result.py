@@ -62,6 +62,9 @@ class SolverError(RuntimeError):
         self.solution = solution
 
 
+_CLIPPED = 9  # place among the columns of a log of contacts
+
+
 @dataclass(frozen=True, eq=False)
 class ContactLog(Columns):
     """Contacts in order of their end, one array entry each; a contact still open at the end has t_out = NaN.
@@ -70,10 +73,10 @@ class ContactLog(Columns):
     ----------
     stop : index of the stop. name : what it is called. t_in, t_out : s. speed_in, speed_out : m/s, both positive.
     peak_indentation : m. peak_force : N. impulse : N s. energy_loss : J taken out of the beam.
-    angle_in, angle_out : rad, of the place in its circular clearance, that of a contact still open as at the end; NaN
-        of other stops; tables leave them out where no contact has one.
     entry_rate_clipped : whether the entry speed was below the law's floor (also for a contact that began at t = 0);
         every law has one, 1e-3 m/s where none was given, whether or not its force depends on that speed.
+    angle_in, angle_out : rad, of the place in its circular clearance, that of a contact still open as at the end; NaN
+        of other stops; tables leave them out where no contact has one.
     """
 
     stop: Any
@@ -85,10 +88,15 @@ class ContactLog(Columns):
     peak_force: Array
     impulse: Array
     energy_loss: Array
-    angle_in: Array
-    angle_out: Array
     entry_rate_clipped: Any
+    angle_in: Any = None
+    angle_out: Any = None
     names: tuple[str, ...] = field(default=(), kw_only=True)
+
+    def __post_init__(self) -> None:
+        for name in ("angle_in", "angle_out"):
+            if getattr(self, name) is None:
+                object.__setattr__(self, name, np.full(len(self.stop), np.nan))
 
     def __len__(self) -> int:
         return len(self.stop)
@@ -118,9 +126,9 @@ class ContactLog(Columns):
             peak_force=ends[:, at.LARGEST].copy(),
             impulse=ends[:, at.IMPULSE] - first[:, at.IMPULSE],
             energy_loss=ends[:, at.WORK] - first[:, at.WORK],
+            entry_rate_clipped=first[:, at.CLIPPED].astype(bool),
             angle_in=first[:, at.FORCE].copy(),
             angle_out=ends[:, at.FORCE].copy(),
-            entry_rate_clipped=first[:, at.CLIPPED].astype(bool),
             names=tuple(names),
         )
 
@@ -128,7 +136,7 @@ class ContactLog(Columns):
     def of_rows(cls, rows: Array, names: Sequence[str] = ()) -> ContactLog:
         """From a table with one contact a row, with names of all stops."""
         columns: list[Any] = [*rows.T.copy()]
-        columns[0], columns[-1] = columns[0].astype(int), columns[-1].astype(bool)
+        columns[0], columns[_CLIPPED] = columns[0].astype(int), columns[_CLIPPED].astype(bool)
         return cls(*columns, names=tuple(names))
 
     @classmethod

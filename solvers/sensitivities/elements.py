@@ -19,9 +19,11 @@ from typing import Any
 import numpy as np
 
 from solvers.problem import Array
-from solvers.problem.friction import CODE, FREE, MU, SLIDER, STICK, STIFFNESS
+from solvers.problem import event_list as at
+from solvers.problem.friction import CODE, CUT, FREE, MU, PRESSES, SLIDER, STICK, STIFFNESS
 from solvers.sensitivities import laws
 
+STUCK = 0.0  # code of the event with which stick begins
 _INSIDE = 1e-200  # m, where forces like δ^{1/4} grow without bound, and those like δ^{3/2} do not grow
 _CENTRE = 1e-12  # of the clearance: nearer to the centre, where nothing acts, slopes have no direction
 
@@ -93,9 +95,21 @@ class Slider:
         """Whether its spring gives the force."""
         return bool(self.numbers[CODE] == STICK)
 
+    @property
+    def free(self) -> bool:
+        """Whether it follows without force."""
+        return bool(self.numbers[CODE] == FREE)
+
+    def uncut(self, row: Array) -> Array:
+        """Parameters of the law without a cut at N = 0, beyond which a slider is free."""
+        place, row = int(self.numbers[CUT]), row.copy()
+        if place >= 0:
+            row[place] = 0.0
+        return row
+
     def share(self, normal: Array) -> Array:
         """∂F_t/∂N (k,): ±μ in slip."""
-        code = 0.0 if self.numbers[CODE] == FREE else self.numbers[CODE]
+        code = 0.0 if self.free else self.numbers[CODE]
         return np.where(normal > 0.0, code * self.numbers[MU], 0.0)
 
     def drawn(self, way: Array) -> Array:
@@ -108,18 +122,32 @@ class Slider:
         return self.numbers[STIFFNESS] * self.drawn(way) if self.sticks else self.share(normal) * normal
 
     def begun(self, motion: ElementMotion, row: Array, entry_rate: float, under_way: bool) -> Array:
-        """Parameters after a contact has begun: in stick where N jumps or grows quicker than the spring is drawn."""
+        """Parameters after a contact has begun: in stick where N jumps or grows quicker than the spring is drawn.
+
+        One that is under way is free where the law pulls.
+        """
         law, mu = self.contact.law, self.numbers[MU]
         rate, speed = float(motion.rate[0]), float(motion.speed[0])
         slips = mu == 0.0
+        if (
+            under_way
+            and law.borders > PRESSES
+            and laws.force(law, row, (motion.delta, motion.rate), entry_rate)[0] <= 0.0
+        ):
+            return self._latched(row, FREE, 0.0)
         if not (under_way or slips):
             growing = rate * laws.slopes(law, row, (_INSIDE, rate), entry_rate)[0, 0]
             slips = laws.force(law, row, (0.0, rate), entry_rate)[0] <= 0.0
             slips = slips and self.numbers[STIFFNESS] * abs(speed) > mu * growing
         return self._latched(row, math.copysign(1.0, speed) if slips else STICK, float(motion.way[0]))
 
-    def renewed(self, row: Array, way: float, speed: float, force: float) -> Array:
-        """Parameters after stick or slip has ended with F_t."""
+    def renewed(self, row: Array, event: Array) -> Array:
+        """Parameters after an event: stick or slip ends, or slip for want of N; or the slider is free no longer."""
+        way, speed, force = (float(number) for number in event[at.DELTA : at.FORCE + 1])
+        if event[at.GUARD] == PRESSES:
+            return self._latched(row, FREE, 0.0)
+        if self.free:
+            return self._latched(row, STICK if event[at.CODE] == STUCK else math.copysign(1.0, speed), way)
         code, rounding = self.numbers[CODE], 1e-15 * (abs(way) + 2.0 * math.pi * abs(self.contact.circle)) + 1e-20
         if self.numbers[MU] == 0.0 and code != STICK:
             return self._latched(row, -code, self.numbers[SLIDER])

@@ -84,14 +84,20 @@ def _begin_slider(flow: Flow, t: float, s: int, acting: Acting, shift: Array, un
 
 
 def _renew_slider(flow: Flow, t: float, s: int, acting: Acting, following: Acting) -> None:
-    """What a slider latches where slip ends, s = ξ - F_t/k_t: its rate is zero then, so that dt* does not matter."""
+    """What a slider latches where stick begins, s = ξ - F_t/k_t.
+
+    Where slip ends the rate of s is zero, so that dt* does not matter; where N begins to grow from zero dt* = -dN/Ṅ.
+    """
     flow.latched[s][:] = 0.0
-    slider = flow.slider(s, following)
-    if slider is None or not slider.sticks:
+    slider, before = flow.slider(s, following), flow.slider(s, acting)
+    if slider is None or before is None or not slider.sticks:
+        return
+    if before.free:
+        _, growing, pressed = flow.at_instant(t, s, acting.changed(s, rows=before.uncut(acting.rows[s])))
+        flow.latched[s][1] = flow.way_change(t, s) - float(flow.motion_of(t, s).speed[0]) * pressed / growing
         return
     numbers = slider.numbers
     _, _, pressed = flow.at_instant(t, s, acting)
-    before: Any = flow.slider(s, acting)
     normal = flow.force(t, s, acting)
     force, share = before.force(np.zeros(1), normal)[0], before.share(normal)[0]
     flow.latched[s][1] = flow.way_change(t, s) - share / numbers[STIFFNESS] * pressed

@@ -92,12 +92,9 @@ class Flow:
 
     def bend(self, t: Array, s: int, acting: Acting) -> Array | None:
         """What changes its sign at kinks of a law within its segment, at times; None without any."""
-        motion, slider = self.motion_of(t, s), self.slider(s, acting)
-        found = laws.bend(self.system.contacts[s].law, self._inside(s, acting, motion), acting.entry_rate[s])
-        if found is None and slider is not None and not slider.sticks:
-            normal = self.force(t, s, acting, motion)
-            return normal if self.system.contacts[s].law.jump or normal.min() < 0.0 else None  # μN is cut at zero
-        return found
+        return laws.bend(
+            self.system.contacts[s].law, self._inside(s, acting, self.motion_of(t, s)), acting.entry_rate[s]
+        )
 
     def _inside(self, s: int, acting: Acting, motion: ElementMotion) -> tuple[Array, Array]:
         """δ kept within the segment of the law, and δ̇."""

@@ -110,8 +110,7 @@ def after(system: System, acting: Acting, row: Array) -> Acting:
         return acting.changed(s, segment=acting.segment[s] + (1 if rate > 0.0 else -1))
     slider = Slider.of(system.contacts[s], acting.rows[s])
     if slider is not None:
-        known = (float(number) for number in row[at.DELTA : at.FORCE + 1])
-        return acting.changed(s, rows=slider.renewed(acting.rows[s], *known))
+        return acting.changed(s, rows=slider.renewed(acting.rows[s], row))
     return acting.changed(s, rows=laws.renewed(law, acting.rows[s], int(guard), row[at.DELTA], rate))
 
 
