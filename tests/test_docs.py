@@ -251,8 +251,7 @@ def test_site(tmp_path):
     loaded = r'<(?:script|img|iframe)[^>]+src="(?:https?:)?//|<link[^>]+rel="stylesheet"[^>]+href="(?:https?:)?//'
     assert [path for path, page in pages.items() if re.search(loaded, page)] == []
     typeset = (tmp_path / "site" / "explanation" / "equations.html").read_text(encoding="utf-8")
-    assert (
-        typeset.count('class="equation"')
-        == len(re.findall(r"^\$\$$", text_of("docs/explanation/equations.md"), re.M)) / 2
-    )
+    source = text_of("docs/explanation/equations.md")
+    indented = len(re.findall(r"\n\n {4}\S", source))
+    assert typeset.count('class="equation"') == len(re.findall(r"^\$\$$", source, re.M)) / 2 + indented
     assert "$$" not in typeset

@@ -419,7 +419,7 @@ def test_archive_of_something_else_is_refused(tmp_path):
         fb.load(tmp_path / "other.npz")
 
 
-@pytest.mark.parametrize("about", ['{"format": 4}', "{}", "[1]"])
+@pytest.mark.parametrize("about", ['{"format": 5}', "{}", "[1]"])
 def test_archive_without_its_arrays_is_refused(tmp_path, about):
     np.savez(tmp_path / "hollow.npz", about=about)
     with pytest.raises(ValueError, match=r"hollow.npz is not a saved run"):
@@ -429,7 +429,7 @@ def test_archive_without_its_arrays_is_refused(tmp_path, about):
 @pytest.mark.parametrize("number", [2, 99])
 def test_other_format_is_refused(tmp_path, number):
     np.savez(tmp_path / "other.npz", about=f'{{"format": {number}}}')
-    with pytest.raises(ValueError, match=rf"other\.npz has format {number}, this version reads 4; simulate again$"):
+    with pytest.raises(ValueError, match=rf"other\.npz has format {number}, this version reads 5; simulate again$"):
         fb.load(tmp_path / "other.npz")
 
 
