@@ -280,8 +280,8 @@ def test_central_differences_on_the_unreduced_beam(mass):
     system, tip = beam_matrices(mass, 12)
     start = np.zeros(system.size), np.zeros(system.size)
     dt = 0.9 * min(CentralDifference(1.0).stable_dt(system)[:2])
-    explicit = integrate(system, *start, 0.02, method=CentralDifference(dt))
-    fine = integrate(system, *start, 0.02, method=GeneralizedAlpha(2e-6, 1.0))
+    explicit = integrate(system, *start, 0.01, method=CentralDifference(dt))
+    fine = integrate(system, *start, 0.01, method=GeneralizedAlpha(4e-6, 1.0))
     assert tip @ explicit.q[-1] == pytest.approx(tip @ fine.q[-1], rel=2e-3)
 
 

@@ -408,7 +408,8 @@ def test_parameters_in_words(run, path, words):
 
 
 def test_ends_of_branches_are_marked_and_explained(run):
-    scene = dataclasses.replace(run.model.scene, base=None, forces=[fb.PointForce(0.2, fb.Harmonic(1.0, 60.0))])
+    load, (_, *stops) = fb.PointForce(0.2, fb.Harmonic(1.0, 60.0)), run.model.scene.stops
+    scene = dataclasses.replace(run.model.scene, base=None, forces=[load], stops=stops)
     whole = scene.reduce(1).branch("forces[0].signal.omega", (59.0, 60.0)).run()
     assert [why.split(":")[0] for _, why in whole.ends] == ["reached the end of the span"]
     assert whole.ends[0][0].parameter in (59.0, 60.0)

@@ -104,7 +104,7 @@ def test_tables_let_go_by_other_threads_are_made_again(monkeypatch):
         return end(system(omega, loads=[]), 0.01)
 
     monkeypatch.setattr(block_tables, "_CACHE", Memo(1))
-    asked = [(100.0 + i % 5,) for i in range(80)]
+    asked = [(100.0 + i % 5,) for i in range(30)]
     wanted = {key: work(*key) for key in set(asked)}
     assert at_once(work, asked) == [wanted[key] for key in asked]
 
