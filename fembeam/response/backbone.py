@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from fembeam.model import Model
 
 Vector = NDArray[np.float64]
-NODES = 48  # of Gauss and Legendre on each piece between the places where stops are met
+GAUSS = np.polynomial.legendre.leggauss(48)  # on each piece between the places where stops are met
+_HALVINGS = 55  # to a turning point known to rounding
 
 
 def backbone(model: Model, z: float, amplitudes: Vector) -> Vector:
@@ -36,29 +37,35 @@ def backbone(model: Model, z: float, amplitudes: Vector) -> Vector:
     loaded = any(row.force(-row.gap) != 0.0 for row in model.contact_rows)
     if model.scene.gravity != 0.0 or loaded or not apart or model.omega[0] == 0.0 or shape == 0.0:
         return np.full(len(amplitudes), np.nan)
-    return np.array([_frequency(model, amplitude / abs(shape)) for amplitude in amplitudes])
+    furthest = np.asarray(amplitudes, dtype=float) / abs(shape)
+    far, energy, near = _turning_points(model, furthest)
+    return np.array([_frequency(model, *sorted(ends), E) for *ends, E in zip(far, near, energy, strict=True)])
 
 
-def _frequency(model: Model, furthest: float) -> float:
-    """Ω of the vibration whose larger turning point is so far from 0."""
-    from scipy.optimize import brentq
+def _turning_points(model: Model, furthest: Vector) -> tuple[Vector, Vector, Vector]:
+    """The turning points so far (k,) from 0, V there, and those on the other side, where stops are met earlier."""
+    energies = np.array([_potential(model, -furthest), _potential(model, furthest)])
+    energy = energies.min(axis=0)
+    far = np.where(energies[0] <= energies[1], -furthest, furthest)
+    inside, near = np.zeros_like(far), -far
+    even = np.abs(energies[0] - energies[1]) <= 1e-13 * energy
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (inside + near)
+        beyond = _potential(model, middle) > energy
+        inside, near = np.where(beyond, inside, middle), np.where(beyond, middle, near)
+    return far, energy, np.where(even, -far, near)
 
-    ends = np.array([-furthest, furthest])
-    energies = _potential(model, ends)
-    far = int(np.argmin(energies))  # the other side is stopped earlier
-    near = float(ends[1 - far])
-    if energies[1 - far] - energies[far] > 1e-13 * energies[far]:  # else the well is even, and this the turning point
-        near = brentq(lambda q: float(_potential(model, np.array([q]))[0] - energies[far]), 0.0, near,
-                      xtol=1e-15 * furthest, rtol=1e-15, maxiter=1000)  # fmt: skip  # met at any rounding, in time
-    low, high = sorted((float(ends[far]), near))
+
+def _frequency(model: Model, low: float, high: float, energy: float) -> float:
+    """Ω of the vibration between two turning points, with V there."""
     rows = zip(model.directions[:, 0], model.contact_rows, strict=True)
     met = [-row.gap / w for w, row in rows if w != 0.0]
     knots = np.unique([low, *(q for q in met if low < q < high), high])
-    angle, weight = np.polynomial.legendre.leggauss(NODES)
+    angle, weight = GAUSS
     angle, weight = 0.5 * np.pi * (1.0 + angle), 0.5 * np.pi * weight
     half = 0.5 * np.diff(knots)[:, None]
     q = knots[:-1, None] + half * (1.0 - np.cos(angle))  # takes the roots at turning points away
-    left = energies[far] - _potential(model, q.ravel()).reshape(q.shape)
+    left = energy - _potential(model, q.ravel()).reshape(q.shape)
     if not np.all(left > 0.0):
         return np.nan
     return float(np.pi / np.sum(weight * half * np.sin(angle) / np.sqrt(2.0 * left)))
@@ -66,7 +73,7 @@ def _frequency(model: Model, furthest: float) -> float:
 
 def _potential(model: Model, q: Vector) -> Vector:
     """V (k,) of the lowest mode."""
-    at, weight = np.polynomial.legendre.leggauss(NODES)
+    at, weight = GAUSS
     at, weight = 0.5 * (1.0 + at), 0.5 * weight
     energy = 0.5 * model.omega[0] ** 2 * q**2
     for w, row in zip(model.directions[:, 0], model.contact_rows, strict=True):

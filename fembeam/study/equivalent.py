@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 WHERE = "study.equivalent"
-NODES = 24  # of Gauss and Legendre on each piece of a cycle
+GAUSS = np.polynomial.legendre.leggauss(24)  # on each piece of a cycle
 SAME = 1e-9  # of the force's size: two cycles that differ by less are one
 CYCLES = (4, 32, 256)  # tried one after the other until the last two are the same
 
@@ -194,9 +194,9 @@ def _over(law: Law, piece: Any, X: float, mean: float) -> Vector:
     """(∫ F cos θ dθ, ∫ F dδ, largest |F|) over a piece without a border."""
     falls = piece.rate < 0.0
     a, b = np.arccos(np.clip((np.array([piece.start, piece.end]) - mean) / X, -1.0, 1.0)) * (1.0 if falls else -1.0)
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = GAUSS
     theta = 0.5 * (a + b) + 0.5 * (b - a) * nodes
     delta = np.clip(mean + X * np.cos(theta), *sorted((piece.start, piece.end)))
-    force = law.batch(1.0, piece.parameters)(delta, np.full(NODES, piece.rate))
+    force = law.batch(1.0, piece.parameters)(delta, np.full_like(nodes, piece.rate))
     part = 0.5 * (b - a) * weights
     return np.array([part @ (force * np.cos(theta)), part @ (force * -X * np.sin(theta)), np.abs(force).max()])
