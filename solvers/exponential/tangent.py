@@ -60,7 +60,7 @@ class Tangent:
         self.y, self.entry, self.shift, self.end_rate, self.latched = (layout.array(self.block, 0, i) for i in _CARRIED)
         begin_state(State._make(layout.arrays(self.block, 1)), state.x[:size])
         self.places = places_among_tones(n, size // 2 - n)
-        self.tones = np.setdiff1d(np.arange(width), self.places)  # and accounts: they do not change
+        self.tones = np.delete(np.arange(width), self.places)  # and accounts: they do not change
         self.y[: 2 * n, self.places] = system.blocks.inverse.T
         if self.exact:
             self.y[-1, self.places] = -self.change.steady(0.0)
