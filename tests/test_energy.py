@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
-from solvers import Contact, Exponential, SolverError, System, integrate
+from solvers import Contact, Exponential, SolverError, System, integrate, integrate_many
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES, contact_table
 from solvers.exponential.preparation import prepare_run
@@ -363,6 +363,20 @@ def test_a_slider_with_its_static_shape_balances():
     assert unaccounted(run) < 1e-11
     for losses in (run.losses, model.simulate(0.4, solver=Exponential(1e-12)).losses):
         assert losses.loss[0] == pytest.approx(limit * losses.slip[0], rel=1e-10)
+
+
+@pytest.mark.parametrize("omega", [800.0, 2000.0])
+@pytest.mark.parametrize("damping", [100.0, 300.0])
+def test_a_stop_that_pulls_under_a_tone_is_not_refused(omega, damping):
+    """Without samples a bound takes the place of the balance, but ∫|F| dt is none of |∫F dt|: half of these fell."""
+    mass, stop = np.array([[0.08]]), Contact([-1.0], KelvinVoigt(1e3, damping))
+    system = System(mass, 0.0 * mass, 0.0 * mass, [stop], [([1.0], fb.Harmonic(60.0, omega))])
+    run = integrate(system, [-1e-3], [0.8], 0.03)
+    sampled = integrate(system, [-1e-3], [0.8], 0.03, 1e-3)
+    assert len(run.contacts) >= 1
+    np.testing.assert_allclose([run.q[-1], run.q_dot[-1]], [sampled.q[-1], sampled.q_dot[-1]], rtol=1e-9)
+    many = integrate_many(system, [[-1e-3]], [[0.8]], 0.03)
+    np.testing.assert_allclose(many.q[0], run.q[-1], rtol=1e-9)
 
 
 @pytest.mark.parametrize("broken", ["end_response", "contact_propagator"])

@@ -97,6 +97,30 @@ def test_a_law_that_pulls_as_it_opens():
     np.testing.assert_allclose(found.states[-1], state, rtol=0.0, atol=1e-6 * abs(state).max())
 
 
+PULLS = {
+    **{name: CHANGES[name] for name in ("mu", "stiffness")},
+    "damping": lambda contact, d: replace(contact, law=KelvinVoigt(1e4, 100.0 * (1.0 + d))),
+}
+
+
+@pytest.mark.parametrize("change", PULLS.values(), ids=list(PULLS))
+def test_a_contact_that_pulls_and_presses_again(change):
+    """The slider is freed where N falls to zero, and begins anew, within one contact."""
+    loads = [(EYE[0, :2], fb.Harmonic(60.0, 2000.0)), (EYE[1, :2], fb.Harmonic(18.0, 1400.0))]
+    bare, start = wall(KelvinVoigt(1e4, 100.0)), ([-1e-3, 0.0], [0.8, 1.0])
+    system = System(bare.M, bare.C, bare.K, bare.contacts, loads)
+
+    def make(d):
+        return System(bare.M, bare.C, bare.K, [change(bare.contacts[0], d)], loads)
+
+    found = sensitivity(system, *start, 0.0032, [0.0032], Nearby.of(make, 0.0, 1e-3), method=FINE)
+    run = integrate(system, *start, 0.0032, method=FINE)
+    assert run.transitions.event.tolist() == ["slip", "free", "slip"]
+    assert len(run.contacts) == 1
+    state, _ = differences(make, start, 0.0032, 1e-4, SHARP)
+    np.testing.assert_allclose(found.states[-1], state, rtol=0.0, atol=1e-6 * abs(state).max())
+
+
 def test_a_place_that_touches_its_circle_has_no_derivative():
     """A circle round the origin that a circular orbit touches from inside, to rounding."""
     hole = Contact(EYE[:2, :2], Hertz(1e5), 1.0 + 1e-11, map="annulus", friction=Friction(0.2, 1e4))

@@ -244,9 +244,12 @@ def test_a_run_that_does_not_balance_is_refused(monkeypatch):
 
 
 def test_a_run_without_samples_that_gains_energy_is_refused(monkeypatch):
-    """By the bound on what it can have been given."""
+    """By the bound on what it can have been given, if it does not balance when it is made again with samples."""
     assert run([STIFF], 0.5, Exponential(1e-6)).status is Status.DONE
     monkeypatch.setattr(balance, "FACTOR", 1e-3)
+    assert run([STIFF], 0.5, Exponential(1e-6)).status is Status.DONE
+    monkeypatch.setattr(balance, "MULTIPLE", 1e-9)
+    monkeypatch.setattr(balance, "ROUNDING", 1e-15)
     with pytest.raises(SolverError, match="energy does not balance"):
         run([STIFF], 0.5, Exponential(1e-6))
 

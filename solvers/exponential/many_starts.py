@@ -32,7 +32,7 @@ from solvers.compiled.state import (
     acting_segment,
     begins_and_ends,
 )
-from solvers.exponential.energy.check import ALLOWED, FACTOR, LAST, has_gained
+from solvers.exponential.energy.check import ALLOWED, FACTOR, LAST, has_gained, is_bounded
 from solvers.exponential.energy.flight_tables import NO_ENERGY_TABLES
 from solvers.exponential.method import ADVANCE, Engine
 from solvers.exponential.preparation import SCRATCH
@@ -182,8 +182,10 @@ class Worker:
 
 
 def final_statuses(engine: Engine, outcomes: Outcomes) -> Any:
-    """(k,) `Status` of every start: that of its run, or `UNBALANCED` if it ends with more energy than it was given."""
+    """(k,) `Status` of every start: that of its run, or `UNBALANCED` if it ends with more energy than it can have."""
     status = np.array(STATUSES, dtype=object)[outcomes.count[:, CODE]]
+    if not is_bounded(engine.system):
+        return status
     energy = outcomes.number[:, ENERGY:]
     much = (outcomes.count[:, CODE] == DONE) & (energy[:, LAST] > FACTOR * energy[:, ALLOWED])
     for i in np.flatnonzero(much):

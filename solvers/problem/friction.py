@@ -95,8 +95,7 @@ class Rubbing:
     @property
     def borders(self) -> int:
         """One of a law that is known to push while δ > 0, else two."""
-        *_, factor, damping = getattr(self.law, "inlined", None) or (1.0, 1.0)
-        return 2 if factor or damping else 1
+        return 2 if may_pull(self.law) else 1
 
     @property
     def place(self) -> int:
@@ -128,6 +127,12 @@ class Rubbing:
     def stored(self, delta: float, parameters: Array) -> float:
         """Energy of the law alone, J; that of the slider's spring is F_t²/2k_t."""
         return float(self.law.stored(delta, np.asarray(self.law.parameters, dtype=float)))
+
+
+def may_pull(law: Any) -> bool:
+    """Whether a force, before it is cut at zero, may be negative while δ > 0: not known to push for all δ̇."""
+    *_, factor, damping = getattr(law, "inlined", None) or (1.0, 1.0)
+    return bool(factor or damping)
 
 
 def row_of(name: str, given: ArrayLike, size: int) -> Array:

@@ -10,7 +10,9 @@ at the start plus the work of the contacts,
     E <= E₀ + Σ_s (2 max|δ̇_s of the steady response| |∫F_s dt| - ∫F_s δ̇_s dt) =: E_c,
 
 and sampled loads v_l s_l(t) raise √(2E) by at most Σ_l |v_l|_{M⁻¹} ∫|s_l| dt. A run is refused if E is more than
-`FACTOR` times this bound plus the tolerated energy. A run that only loses too much energy passes.
+`FACTOR` times this bound plus the tolerated energy. A run that only loses too much energy passes. Under tones E_c is
+no bound where a force pulls, as ∫|F_s| dt then exceeds |∫F_s dt|: a run beyond it is made again with a balance, and one
+of many passes.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ import numpy as np
 from solvers.compiled.kernels import inner, merged, row_of, rubs, slider_of
 from solvers.compiled.state import PEAK_FORCE, T
 from solvers.problem import Array, Energy, System, dense
-from solvers.problem.friction import ARM, MU, SPIN
+from solvers.problem.friction import ARM, MU, SPIN, may_pull
 
 MULTIPLE, ROUNDING = 20.0, 1e-9
 FACTOR = 4.0
@@ -72,6 +74,18 @@ def tolerated_energy(handled: float, exchanged: Array, rtol: float) -> float:
     ``exchanged`` (k,) : peak force times peak indentation of every contact.
     """
     return (MULTIPLE * rtol + ROUNDING) * float(handled + np.abs(exchanged).sum())
+
+
+def is_bounded(system: System) -> bool:
+    """Whether E_c is a bound: no stop's force pulls, or no tone drives the structure."""
+    tones = any(hasattr(signal, "tones") for _, signal in system.loads)
+    return not (tones and system.about_laws.get("pulls", lambda: any(_pulls(contact) for contact in system.contacts)))
+
+
+def _pulls(contact: Any) -> bool:
+    """Whether the force of a stop may be negative."""
+    law = contact.law.law if contact.friction is not None else contact.law
+    return not contact.always and getattr(law, "bend", None) != "force" and may_pull(law)
 
 
 def has_gained(
