@@ -256,6 +256,7 @@ def check_named(body: Any, places: Sequence[Any] | None, quantities: Sequence[st
         site = one.site(place, "places") if hasattr(one, "site") else None
         require(isinstance(site, tuple), "section forces must be asked for on a member of a frame", at, "places",
                 'write ["A-B", 0.4], a member and a distance in m')  # fmt: skip
+        assert site is not None
         known = "stress" not in sections or one.members[site[0]].section.fibre is not None
         require(
             known, "stress needs the outer fibre of sections", at, "places", "give fibre in m, or a shape that knows it"
