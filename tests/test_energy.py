@@ -13,6 +13,7 @@ import fembeam as fb
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
 from solvers import Contact, Exponential, SolverError, System, integrate, integrate_many
 from solvers.exponential.contact.nodes import S
+from solvers.exponential.energy import flight_tables
 from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES, contact_table
 from solvers.exponential.preparation import prepare_run
 from solvers.integration import prepared_run
@@ -256,6 +257,25 @@ class RoughNodes(Nodes):
         """Rows [s, s', s'']."""
         rows = np.random.default_rng(5).normal(size=(int(duration / 0.02) + 3, 3))
         return 0.02, 20.0 * rows / np.array([1.0, 0.02, 0.02**2])
+
+
+@pytest.mark.parametrize("stops", [[], [Contact([1.0, 0.5, -0.3], Hertz(1e6), gap=2e-5)]], ids=["flight", "impacts"])
+def test_cells_balance_without_tables(monkeypatch, stops):
+    """Of many coordinates with coupled damping there are no forms of whole cells: series give the same balance."""
+    phi, omega = np.array([1.0, -2.0, 0.7]), np.array([30.0, 400.0, 6000.0])
+    load = np.array([1.0, 0.3, -0.5]), fb.BandNoise(1.0, (50.0, 300.0), seed=3)
+
+    def balance(most):
+        monkeypatch.setattr(flight_tables, "_MOST_NUMBERS", most)
+        C = np.diag(0.04 * omega) + 5.0 * np.outer(phi, phi)
+        system = System(np.eye(3), C, np.diag(omega**2) * (1.0 + 1e-15 * most), stops, [load])
+        return integrate(system, np.zeros(3), np.zeros(3), 0.05, dt=1e-3).energy
+
+    tabled, by_series = balance(10_000_000), balance(0)
+    assert np.abs(by_series.residual).max() < 1e-9 * np.abs(by_series.input).max()
+    for name in ("input", "damping"):
+        known = getattr(tabled, name)
+        np.testing.assert_allclose(getattr(by_series, name), known, atol=1e-6 * np.abs(known).max())
 
 
 @pytest.mark.parametrize("dashpot", [0.0, 4.0])

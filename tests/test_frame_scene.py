@@ -141,6 +141,44 @@ def test_effective_masses():
         assert moved @ moved == pytest.approx(free @ np.linalg.solve(M.toarray(), free), rel=1e-9)
 
 
+def skew(e):
+    """e × as a matrix."""
+    return np.cross(np.eye(3), e)
+
+
+def test_inertia_tensor():
+    """The mass matrix of a rigid body on an arm, J and m about the node; frequencies do not depend on the axes."""
+    J = np.array([[0.02, 0.006, -0.004], [0.006, 0.015, 0.003], [-0.004, 0.003, 0.03]])
+    m, arm = 0.3, np.array([0.01, 0.02, 0.03])
+
+    def scene(Q, tensor):
+        return fb.Scene(space_l(Q), [fb.Clamped("A")], masses=[fb.LumpedMass("C", m, tensor, Q @ arm)])
+
+    made = scene(np.eye(3), J.tolist()).matrices(8)
+    bare = fb.Scene(space_l(), [fb.Clamped("A")]).matrices(8)
+    at = made.rows_at("C").toarray()
+    lever = -m * skew(arm)
+    expected = np.block([[m * np.eye(3), lever], [lever.T, J - m * skew(arm) @ skew(arm)]])
+    assert np.allclose(at @ (made.M - bare.M) @ at.T, expected, atol=1e-14)
+    omega = scene(np.eye(3), J).reduce(5, elements=8).omega
+    turn = turned(4)
+    assert np.allclose(scene(turn, turn @ J @ turn.T).reduce(5, elements=8).omega, omega, rtol=1e-9)
+    assert not np.allclose(scene(np.eye(3), np.diag(J)).reduce(5, elements=8).omega, omega, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("tensor", "says"), [
+    ([[1.0, 0.1, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], "must be symmetric"),
+    ([[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]], "must not be negative about any axis, got -1.0"),
+    ([[1.0, 0.1], [0.1, 1.0]], "must be three rows of three finite numbers"),
+    ([1.0, [0.0, 1.0, 0.0], 1.0], "must be three rows of three finite numbers"),
+    ([[1.0, 0.0, 0.0], [0.0, np.nan, 0.0], [0.0, 0.0, 1.0]], "must be three rows of three finite numbers"),
+])  # fmt: skip
+def test_inertia_tensors_that_are_none(tensor, says):
+    """What is no tensor is refused in words."""
+    with pytest.raises(ValueError, match=f"{says}.* in LumpedMass at 'C'"):
+        fb.LumpedMass("C", 1.0, inertia=tensor)
+
+
 def test_mesh_of_a_scene():
     """As few elements as its frequencies with supports ask: right to 1e-6, and fewer than whatever may hold it."""
     model = portal_scene().reduce(modes=4)

@@ -1,13 +1,16 @@
 """Frames in scene files: the scene made in Python, meshes, and what is refused with the table it stands in."""
 
+import csv
 from pathlib import Path
 
+import numpy as np
 import pytest
 from test_frame_files import written
 
 import fembeam as fb
 from contacts import KelvinVoigt
 from fembeam import scene_file
+from fembeam.cli import main
 
 STEEL = '{ shape = "rectangle", E = 2.1e11, rho = 7850.0, width = 0.05, height = 0.1 }'
 PORTAL = f"""
@@ -102,3 +105,54 @@ def test_refused(tmp_path, old, new, says):
     """What is wrong, in which table."""
     with pytest.raises(ValueError, match=says):
         read(tmp_path, PORTAL.replace(old, new, 1))
+
+
+OUTPUTS = """
+[reduce]
+modes = 3
+[simulate]
+duration = 0.2
+dt = 1e-3
+places = [["B-C", 1.5], ["C", "x"]]
+quantities = ["displacement", "moment"]
+"""
+
+
+def heads(folder):
+    """Names of the columns of its histories."""
+    return next(csv.reader((folder / "histories.csv").open(encoding="utf-8")))
+
+
+def test_section_forces_of_a_file(tmp_path):
+    """Section forces on members, motion along directions, or of a place alone along all; `export` takes places too."""
+    path, out = tmp_path / "portal.toml", tmp_path / "out"
+    path.write_text(PORTAL + OUTPUTS.replace('["C", "x"]', '["B-C", 4.0]'), encoding="utf-8")
+    assert main(["run", str(path), "--out", str(out), "--quiet"]) == 0
+    moved = [f"displacement at B-C + 1.5 m, {c} [{unit}]" for c, unit in (("x", "m"), ("y", "m"), ("rz", "rad"))]
+    assert [name for name in heads(out) if "1.5 m" in name and "at" in name] == ["moment at B-C + 1.5 m [N m]", *moved]
+    run = fb.load(out / "run.npz")
+    table = np.loadtxt(out / "histories.csv", delimiter=",", skiprows=1)
+    column = heads(out).index("moment at B-C + 1.5 m [N m]")
+    assert np.allclose(table[:, column], run.moment(("B-C", 1.5)), rtol=1e-11, atol=1e-9)
+    asked = ["--places", '["B-C", 1.5]', "--quantities", "section forces"]
+    assert main(["export", str(out / "run.npz"), "--out", str(tmp_path), *asked]) == 0
+    assert heads(tmp_path) == ["t [s]", *(f"{name} at B-C + 1.5 m [{unit}]" for name, unit in
+                                          (("N", "N"), ("Q", "N"), ("M", "N m")))]  # fmt: skip
+    asked = ["--places", "C", '["B", "-x"]', "--quantities", "velocity"]
+    assert main(["export", str(out / "run.npz"), "--out", str(tmp_path), *asked]) == 0
+    assert [name.split(" [")[0] for name in heads(tmp_path)[1:]] == [
+        *(f"velocity at C, {c}" for c in ("x", "y", "rz")),
+        "velocity at B, -x",
+    ]
+
+
+@pytest.mark.parametrize(("old", "new", "says"), [
+    ('["C", "x"]', '["C", "x"], "E"', "places; use one of the names"),
+    ('["C", "x"]', '["C", "x"], "B"', r"must be asked for on a member of a frame, got 'C' in places"),
+    ('places = [["B-C", 1.5], ["C", "x"]]', "", r"section forces need places, got \['moment'\] in simulate"),
+    ('"moment"', '"slope"', "slope is of a Beam"),
+])  # fmt: skip
+def test_outputs_that_are_not_there(tmp_path, old, new, says):
+    """Before anything is computed."""
+    with pytest.raises(ValueError, match=says):
+        read(tmp_path, PORTAL + OUTPUTS.replace(old, new))

@@ -143,6 +143,21 @@ def test_used_twice_and_turned():
         assert np.allclose(scene.beam.position((1, "B")), nodes["C"])
 
 
+def test_superelements_that_may_turn():
+    """Two of a stiff arm, one on a ball hinge: three turns without resistance, the rest as with the arms as frames."""
+    tube = fb.Section.tube(2e11, 7900.0, 0.0603, 0.0525)
+    pipe = fb.Frame.polyline({"A": (0, 0, 0), "B": (2, 0, 0), "C": (2, 0, 1.5), "D": (2, 1, 1.5)}, tube)
+    arm = fb.Frame.polyline({"f": (0, 0, 0), "l": (0, 0.3, 0)}, tube)
+    joints = [fb.Joint("B", to=(1, "f")), fb.Joint("C", to=(2, "f"), dofs="xyz")]
+    found = []
+    for one in (arm, arm.reduced(["f", "l"], modes=2)):
+        bodies = [fb.Scene(one), fb.Scene(one.turned((0, 0, np.pi)))]
+        joined = fb.Scene(pipe, [fb.Clamped("A"), fb.Clamped("D")], bodies=bodies, joints=joints)
+        found.append(joined.reduce(6).omega)
+    assert np.allclose(found[1], found[0], rtol=3e-6)
+    assert np.array_equal(found[1][:3], np.zeros(3))
+
+
 def test_turned_as_frame_or_structure():
     """A superelement of a turned frame is the turned superelement."""
     from scipy.spatial.transform import Rotation

@@ -121,7 +121,7 @@ def test_the_schema_knows_the_quantities():
 
 def test_every_quantity_and_extremes_from_python(folder):
     run = fb.load(folder / "run.npz")
-    found = histories(run, 1, [0.1], list(UNITS))
+    found = histories(run, 1, [0.1], [name for name in UNITS if name != "section forces"])
     assert len(found) == 1 + 10 + 3 + 2
     np.testing.assert_array_equal(found["slope at 0.1 m [rad]"], run.slope(0.1))
     np.testing.assert_array_equal(found["force 0 [N]"], run.force())
@@ -132,3 +132,6 @@ def test_every_quantity_and_extremes_from_python(folder):
     assert extremes_table({"t [s]": t, "x": t}, discard=2.0) == {}
     with pytest.raises(ValueError, match="z must lie on the beam"):
         run.to_csv(folder, places=[0.5])
+    for options, says in (({"places": ["B"]}, "must be numbers"), ({"quantities": ["section forces"]}, "of a frame")):
+        with pytest.raises(ValueError, match=says):
+            run.to_csv(folder, **options)

@@ -145,7 +145,7 @@ def test_the_command_line_runs_and_checks_it(folder, capsys):
         ("[structure]", '[structure]\nscale = ["mm", "stone", "s"]', "mass must be one of kg"),
         ("[structure]", "[beam]\nlength = 1.0\n[structure]", r"needs one of the tables \[beam\] and \[structure\]"),
         ('["tip", "y"], [2, "rx"]', '["tp", "y"]', "'tip' is the nearest there is"),
-        ("dt = 2e-4", 'dt = 2e-4\nquantities = ["moment"]', "quantities of sections are of a Beam"),
+        ("dt = 2e-4", 'dt = 2e-4\nquantities = ["moment"]', "section forces must be asked for on a member"),
         ('kind = "fixed"\nat = "root"', 'kind = "fixed"\nat = "root"\ndofs = ["x"]', "must hold dofs that exist"),
     ],
 )

@@ -138,10 +138,23 @@ def _results_commands(commands: Any) -> None:
     export.add_argument("run", metavar="RUN", type=Path, help="run.npz, or a run saved as HDF5")
     export.add_argument("--out", metavar="DIR", type=Path, required=True)
     export.add_argument("--stride", metavar="N", type=int, default=1, help="keep every N-th sample")
-    export.add_argument("--places", metavar="Z", type=float, nargs="+",
-                        help="z in m; default: those in the scene file's [simulate], else usual ones")  # fmt: skip
+    export.add_argument("--places", metavar="Z", type=_place, nargs="+",
+                        help="z in m, or as a scene file has it, '[\"C\", \"x\"]'; default: those in the scene file's "
+                        "[simulate], else usual ones")  # fmt: skip
     export.add_argument("--quantities", metavar="NAME", nargs="+", help="such as displacement, stress, reactions, "
                         "'absolute acceleration'; an unknown one lists all; default: as for places")  # fmt: skip
+
+
+def _place(text: str) -> Any:
+    """A place as a scene file writes it; a name needs no quotes."""
+    import tomllib
+
+    from fembeam.scene_file.structures import place
+
+    try:
+        return place(tomllib.loads(f"x = {text}")["x"])
+    except tomllib.TOMLDecodeError:
+        return text
 
 
 def _new(arguments: argparse.Namespace) -> int:

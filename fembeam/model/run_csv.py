@@ -11,8 +11,8 @@ import numpy as np
 
 from fembeam.model.watched_places import places as usual_places
 from fembeam.response import BodyReaction, PlacedShapes
-from fembeam.scene import said, unit_of
-from fembeam.support import require
+from fembeam.scene import is_directed, place_words, said, unit_of
+from fembeam.support import is_finite, require
 from solvers.problem import dataframe, optional
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ Output = Literal[
     "moment",
     "shear",
     "stress",
+    "section forces",
     "indentation",
     "force",
     "friction",
@@ -55,6 +56,7 @@ UNITS = {  # of what `histories` can be asked for
     **{"friction": "N", "friction loss": "J"},
 }
 USUAL = ("displacement", "velocity", "indentation", "force")
+SECTIONS = ("moment", "shear", "stress", "section forces")
 OF_STOPS = ("indentation", "force", "friction", "work", "friction loss")
 ELSEWHERE = (*OF_STOPS, "reactions")  # not at places: of stops and of supports
 
@@ -91,13 +93,18 @@ def histories(
     unknown = [name for name in asked if name not in UNITS]
     require(not unknown, f"quantities must be among {', '.join(UNITS)}", unknown, "Run", "choose from these")
     where: dict[str, Any] = usual_places(run.shapes)
-    if places is not None and named:
-        where = {f"at {said(at)}": at for at in map(_pair, places)}
-    elif places is not None:
+    if places is not None and not named:
+        astray = [z for z in places if not is_finite(z)]
+        require(not astray, "places of a beam must be numbers", astray, "Run", "give z in m")
         where = {f"at {z:.12g} m": z for z in places}
-    columns = {"t [s]": run.t}
-    for name, z in where.items():
-        columns |= {f"{what} {name} [{_unit(what, z)}]": _at(run, what, z) for what in asked if what not in ELSEWHERE}
+    require(named or "section forces" not in asked, "section forces are of a frame", list(asked), "Run",
+            "ask for moment and shear")  # fmt: skip
+    columns, there = {"t [s]": run.t}, [what for what in asked if what not in ELSEWHERE]
+    if named:
+        columns |= _at_places(run, there, None if places is None else [_pair(at) for at in places])
+    else:
+        for name, z in where.items():
+            columns |= {f"{what} {name} [{_unit(what, z)}]": _at(run, what, z) for what in there}
     for stop in range(len(run.stops)):
         of_stops = (what for what in asked if what in ("indentation", "force"))
         key = run.key(stop, alone=True)
@@ -113,6 +120,31 @@ def histories(
             continue
         columns |= {f"reaction force {about} [N]": one.force, f"reaction moment {about} [N m]": one.moment}
     return {name: column[::stride] for name, column in columns.items()}
+
+
+def _at_places(run: Run, asked: Sequence[str], places: Sequence[Any] | None) -> dict[str, Vector]:
+    """Quantities of a body whose places have names; a place without a direction moves along all components."""
+    found: dict[str, Vector] = {}
+    sections = [what for what in asked if what in SECTIONS]
+    require(places is not None or not sections, "places must be given for section forces", sections, "Run",
+            "write places=[('A-B', 0.4)], a member and a distance in m")  # fmt: skip
+    ways = usual_places(run.shapes) if places is None else {}
+    for at in places or ():
+        own = at[0] if is_directed(at) else at
+        for what in sections:
+            forces = run.section_forces(own) if what == "section forces" else {what: _at(run, what, own)}
+            units = {what: UNITS[what]} if what in forces else {name: _unit_of_force(name) for name in forces}
+            found |= {f"{name} at {place_words(own)} [{units[name]}]": x for name, x in forces.items()}
+        along = [at] if is_directed(at) else [(at, way) for way in run.shapes.components]
+        ways |= {f"at {said(one)}": one for one in along}
+    for name, one in ways.items():
+        found |= {f"{what} {name} [{_unit(what, one)}]": _at(run, what, one) for what in asked if what not in SECTIONS}
+    return found
+
+
+def _unit_of_force(name: str) -> str:
+    """Unit of N, Q, M, Q2, M2, T."""
+    return "N" if name[0] in "NQ" else "N m"
 
 
 def _of_stop(run: Run, what: str, stop: int, key: str) -> dict[str, Vector]:

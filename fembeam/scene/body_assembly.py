@@ -262,15 +262,23 @@ def _arms(assembled: Assembled, scene: Scene, mass: Any) -> sparse.csr_matrix:
     u, theta = ([at[components.index(c)] if c in components else none for c in group]
                 for group in (COMPONENTS[:3], COMPONENTS[3:]))  # fmt: skip
     ex, ey, ez = mass.offset if isinstance(mass.offset, tuple) else (0.0, 0.0, float(mass.offset))
-    J = mass.inertia if isinstance(mass.inertia, tuple) else 3 * (mass.inertia,)
+    J = np.array(mass.inertia if isinstance(mass.inertia, tuple) else 3 * (mass.inertia,))
     about = turned(mass, scene.beam, assembled) if isinstance(mass, Disk) else theta
     arm = [
         u[0] + ez * theta[1] - ey * theta[2],
         u[1] + ex * theta[2] - ez * theta[0],
         u[2] + ey * theta[0] - ex * theta[1],
     ]
-    spun = [np.sqrt(j) * t for j, t in zip(J, about, strict=True)]
-    return sparse.vstack([*(np.sqrt(mass.mass) * row for row in arm), *spun], format="csr")
+    spun = sparse.csr_matrix(_root_of(J)) @ sparse.vstack(about)
+    return sparse.vstack([*(np.sqrt(mass.mass) * row for row in arm), spun], format="csr")
+
+
+def _root_of(J: Vector) -> Vector:
+    """R (3, 3) with RᵀR = J, of three principal moments or of a tensor."""
+    if J.ndim == 1:
+        return np.diag(np.sqrt(J))
+    moments, axes = np.linalg.eigh(J)
+    return np.asarray(np.sqrt(np.maximum(moments, 0.0))[:, None] * axes.T)
 
 
 def _held(scene: Scene, assembled: Assembled) -> Any:

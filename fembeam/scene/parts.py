@@ -10,13 +10,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+import numpy as np
+
 from fembeam.scene.impactor import check_law
 from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
 from fembeam.scene.part import ScenePart
 from fembeam.scene.places import Place, Second, sign_of
 from fembeam.scene.rubbing import Friction, check_oblique
 from fembeam.structures import COMPONENTS, Direction, Six, direction_of, turns
-from fembeam.support import require, require_finite, require_non_negative
+from fembeam.support import is_finite, require, require_finite, require_non_negative
+
+ROUNDED = 1e-9  # of the largest entry of a tensor
 
 
 @dataclass(frozen=True, repr=False)
@@ -145,8 +149,9 @@ class LumpedMass(ScenePart):
 
     `mass` m in kg, `inertia` J about its own centre in kg m², both ≥ 0; `offset` e in m: the centre sits
     ahead of z by e on a rigid arm, which may reach beyond the beam's end. On other bodies than a `Beam` the inertia is
-    that about every axis, or three numbers, about x, y and z, and the offset a vector (one number is its z). ValueError
-    for a negative mass or inertia.
+    that about every axis, three numbers, about x, y and z, or the rows of the tensor along these axes,
+    [[Jxx, Jxy, Jxz], …] with Jxy = -∫ x y dm; the offset is a vector (one number is its z). ValueError for a negative
+    mass or inertia, a tensor that is not symmetric, or negative about some axis.
 
     Examples
     --------
@@ -156,7 +161,7 @@ class LumpedMass(ScenePart):
     """
 
     mass: float
-    inertia: float | tuple[float, float, float] = 0.0
+    inertia: float | tuple[float, float, float] | tuple[tuple[float, ...], ...] = 0.0
     offset: float | tuple[float, float, float] = 0.0
     word = "mass"
 
@@ -164,14 +169,35 @@ class LumpedMass(ScenePart):
         super().__post_init__()
         where = self.where
         require_non_negative("mass", self.mass, where, "give kg")
-        for name, check in (("inertia", require_non_negative), ("offset", require_finite)):
+        tensor = _tensor(self.inertia, where)
+        if tensor is not None:
+            object.__setattr__(self, "inertia", tensor)
+        checked = (("inertia", require_non_negative), ("offset", require_finite))
+        for name, check in checked if tensor is None else checked[1:]:
             value = getattr(self, name)
+            value = value.tolist() if isinstance(value, np.ndarray) else value
             if isinstance(value, (list, tuple)):
                 value = (*value, 0.0) if name == "offset" and len(value) == 2 else value
                 require(len(value) == 3, f"{name} must be one number, or three", value, where, "along x, y and z")
                 object.__setattr__(self, name, tuple(value))
             for one in value if isinstance(value, (list, tuple)) else (value,):
                 check(name, one, where, "give kg m²" if name == "inertia" else "give m")
+
+
+def _tensor(inertia: Any, where: str) -> tuple[tuple[float, ...], ...] | None:
+    """The checked rows of an inertia tensor; None of what is none."""
+    rows = tuple(inertia) if isinstance(inertia, (list, tuple, np.ndarray)) else ()
+    if not any(isinstance(row, (list, tuple, np.ndarray)) for row in rows):
+        return None
+    right = all(np.shape(row) == (3,) and all(is_finite(one) for one in row) for row in rows) and len(rows) == 3
+    require(right, "an inertia tensor must be three rows of three finite numbers", inertia, where, "give kg m²")
+    J = np.array(rows, dtype=float)
+    symmetric = bool(np.all(np.abs(J - J.T) <= ROUNDED * np.abs(J).max()))
+    require(symmetric, "an inertia tensor must be symmetric", inertia, where, "products of inertia stand twice")
+    least = float(np.linalg.eigvalsh(J)[0])
+    require(least >= -ROUNDED * np.abs(J).max(), "an inertia tensor must not be negative about any axis", least, where,
+            "check the products of inertia, in kg m²")  # fmt: skip
+    return tuple(tuple(row) for row in ((J + J.T) / 2).tolist())
 
 
 @dataclass(frozen=True, repr=False)

@@ -87,6 +87,22 @@ def place_words(place: Any) -> str:
     return f"{place:.6g} m" if is_finite(place) else str(place)
 
 
+def is_directed(at: Any) -> bool:
+    """Whether a place stands with a direction.
+
+    Examples
+    --------
+    >>> [is_directed(at) for at in ("lever", ("lever", "-x"), ("A-B", 0.4), (1, "lever"), ("lever", (0, 1, 0)))]
+    [False, True, False, False, True]
+    """
+    if not (isinstance(at, (tuple, list)) and len(at) == 2):
+        return False
+    way = at[1]
+    if isinstance(way, str):
+        return way.lstrip("+-") in COMPONENTS
+    return isinstance(way, (tuple, list)) and all(is_finite(number) for number in way)
+
+
 def split(at: Any, components: Sequence[str] = COMPONENTS) -> tuple[Any, Six]:
     """Place and direction of a pair; ValueError for a place alone, unless it has but one way to move.
 

@@ -17,8 +17,8 @@ import solvers
 from fembeam import plot
 from fembeam.beams import on_beam
 from fembeam.model import Branch, Orbit
-from fembeam.model.run_csv import Output
-from fembeam.scene import Place, path_of, split
+from fembeam.model.run_csv import SECTIONS, Output
+from fembeam.scene import Place, is_directed, path_of
 from fembeam.scene_file.keys import Constructors, parameters
 from fembeam.study import (
     Backbone,
@@ -197,7 +197,8 @@ class Simulate:
     dt : output sampling in s, > 0.
     solver : a method of `solvers`; None is the library's best. In a file { kind = "…", … }.
     discard : s at the beginning that statistics leave out, 0 to below the duration.
-    places : z in m of the outputs; None: tip and mid-beam.
+    places : z in m of the outputs; None: tip and mid-beam. Of frames and structures places with a direction, or
+        without: for section forces, and for motion along all components.
     quantities : outputs at the places, of stops and of supports; None: displacement, velocity, indentation, force.
         With either, means and extremes are tabled and histories written as CSV.
     """
@@ -223,11 +224,10 @@ class Simulate:
         """Places lie on the beam, sections know their fibre where stress is asked for."""
         beam = scene.beam
         if scene.named:
-            for at in self.places or ():
-                beam.check_place(split(at)[0], "places")
-            sections = [name for name in self.quantities or () if name in ("slope", "moment", "shear", "stress")]
-            require(not sections, "quantities of sections are of a Beam", sections, "simulate", "leave them out")
+            check_named(beam, self.places, self.quantities or ())
             return
+        require("section forces" not in (self.quantities or ()), "section forces are of a Frame", self.quantities,
+                "simulate", "ask for moment and shear")  # fmt: skip
         places = (0.0, beam.length / 2, beam.length) if self.places is None else self.places
         z = on_beam(np.array(places, dtype=float), beam, "places")
         if "stress" in (self.quantities or ()) and not np.isfinite(beam.profile(z).fibre).all():
@@ -238,6 +238,29 @@ class Simulate:
         """What is asked for, as `Run.to_csv` takes it; empty where nothing is."""
         chosen = {"places": self.places, "quantities": self.quantities}
         return {name: value for name, value in chosen.items() if value is not None}
+
+
+def check_named(body: Any, places: Sequence[Any] | None, quantities: Sequence[str]) -> None:
+    """Raise ValueError for outputs of a frame or structure that it does not have."""
+    own = [at[0] if is_directed(at) else at for at in places or ()]
+    for at in own:
+        body.check_place(at, "places")
+    require("slope" not in quantities, "slope is of a Beam", quantities, "simulate",
+            "ask for displacement at a place with direction rx, ry or rz")  # fmt: skip
+    sections = [name for name in quantities if name in SECTIONS]
+    require(not sections or bool(own), "section forces need places", sections, "simulate",
+            'write places = [["A-B", 0.4]], a member and a distance in m')  # fmt: skip
+    for at in own if sections else ():
+        number, place = body.located(at, "places") if hasattr(body, "located") else (0, at)
+        one = body.bodies[number] if hasattr(body, "bodies") else body
+        site = one.site(place, "places") if hasattr(one, "site") else None
+        require(isinstance(site, tuple), "section forces must be asked for on a member of a frame", at, "places",
+                'write ["A-B", 0.4], a member and a distance in m')  # fmt: skip
+        assert site is not None
+        known = "stress" not in sections or one.members[site[0]].section.fibre is not None
+        require(
+            known, "stress needs the outer fibre of sections", at, "places", "give fibre in m, or a shape that knows it"
+        )
 
 
 @dataclass(frozen=True)

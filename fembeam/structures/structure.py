@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Hashable, Iterable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import sha256
@@ -68,6 +69,7 @@ class Structure(NamedBody):
     nodes: dict[Hashable, Vector]
     points: dict[str, Hashable]
     edges: tuple[tuple[Hashable, Hashable], ...]
+    root: sparse.csr_matrix | None  # R with RᵀR = K, of a superelement of a frame
 
     def __init__(
         self,
@@ -95,10 +97,16 @@ class Structure(NamedBody):
         values = {
             **{"K": given["K"], "M": given["M"], "C": given.get("C"), "labels": names},
             **{"nodes": {node: length * place for node, place in at.items()}, "points": named},
-            "edges": checked_edges(lines, at, WHERE),
+            **{"edges": checked_edges(lines, at, WHERE), "root": None},
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
+
+    def rooted(self, root: sparse.csr_matrix) -> Structure:
+        """The same with R (k, N), RᵀR = K: low frequencies of stiff bodies to full accuracy."""
+        found = copy(self)
+        object.__setattr__(found, "root", root)
+        return found
 
     @cached_property
     def digest(self) -> str:
@@ -267,6 +275,7 @@ class Structure(NamedBody):
         moved = np.array([[float(component == c) for c in along] for _, component in self.labels])
         return Assembled(
             *(self.M, self.K, self.labels, self.rows, moved.reshape(len(self.labels), len(along))),
+            root=self.root,
             C=self.C,
             accuracy=f"{len(self.labels)} dofs as they were given",
         )

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
 import reduction
@@ -44,13 +45,14 @@ def reduced(body: Any, made: Assembled, nodes: Sequence[Any], modes: int, where:
             "ask for fewer")  # fmt: skip
     T = _shapes(made, kept, rest, int(modes), where)
     labels = [*interface, *((f"mode {i + 1}", "mode") for i in range(int(modes)))]
-    K, M = _stiffness(made, T, len(kept)), T.T @ (made.M @ T)
+    (K, root), M = _stiffness(made, T, len(kept)), T.T @ (made.M @ T)
     C = None if made.C is None else T.T @ (made.C @ T)
     at = {node: body.position(node) for node in listed}
     known = {node: place for node, place in at.items() if place is not None}
     points = {name: node for name, node in getattr(body, "points", {}).items() if hasattr(body, "node") and node in at}
     lines = [pair for pair in _lines(body) if set(pair) <= set(known)]
-    return Structure(K, (M + M.T) / 2, C, labels, known, points, lines)
+    found = Structure(K, (M + M.T) / 2, C, labels, known, points, lines)
+    return found if root is None else found.rooted(root)
 
 
 def _dofs(body: Any, made: Assembled, node: Any, where: str) -> dict[str, int]:
@@ -86,16 +88,17 @@ def _shapes(made: Assembled, kept: NDArray[np.int64], rest: NDArray[np.int64], m
     return T
 
 
-def _stiffness(made: Assembled, T: Vector, count: int) -> Vector:
-    """TᵀKT, by its root where that is known; interface and modes are not coupled."""
-    if made.root is not None:
-        strain = made.root @ T
-        K = np.asarray(strain.T @ strain)
-    else:
+def _stiffness(made: Assembled, T: Vector, count: int) -> tuple[Vector, sparse.csr_matrix | None]:
+    """TᵀKT, and R with RᵀR = TᵀKT where one of K is known; interface and modes are not coupled."""
+    if made.root is None:
         K = np.asarray(T.T @ (made.K @ T))
-    K[:count, count:], K[count:, :count] = 0.0, 0.0
-    K[count:, count:] = np.diag(np.diag(K)[count:])
-    return (K + K.T) / 2
+        K[:count, count:], K[count:, :count] = 0.0, 0.0
+        K[count:, count:] = np.diag(np.diag(K)[count:])
+        return (K + K.T) / 2, None
+    strain = np.asarray(made.root @ T)
+    interface = np.linalg.qr(strain[:, :count], mode="r")
+    root = sparse.block_diag([interface, np.diag(np.linalg.norm(strain[:, count:], axis=0))], format="csr")
+    return (root.T @ root).toarray(), root
 
 
 def _lines(body: Any) -> list[tuple[Any, Any]]:

@@ -61,7 +61,8 @@ def turned_structure(body: Structure, rotation: Any) -> Structure:
     K, M = B @ body.K @ B.T, B @ body.M @ B.T
     C = None if body.C is None else B @ body.C @ B.T
     nodes = {node: R @ at for node, at in body.nodes.items()}
-    return Structure(K, M, C, body.labels, nodes, body.points, body.edges)
+    found = Structure(K, M, C, body.labels, nodes, body.points, body.edges)
+    return found if body.root is None else found.rooted(body.root @ B.T)
 
 
 def _of_dofs(body: Structure, R: Vector) -> sparse.csr_matrix:

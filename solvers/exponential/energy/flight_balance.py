@@ -126,7 +126,9 @@ def account_step(problem, tables, energy_tables, scratch, level, t, place):
     if energy_tables.closed == 0.0:
         span = energy_tables.spacing if whole else tables.flight_step[level]
         copy_split(x, scratch.split_state[_WITHIN])
-        return _account_panels(problem, tables, energy_tables, scratch, scratch.split_state[_WITHIN], t, span)
+        exchanged = _account_panels(problem, tables, energy_tables, scratch, scratch.split_state[_WITHIN], t, span)
+        derive_signals(problem, t, scratch.signal_terms)  # of which the panels have made those of the last one
+        return exchanged
     if whole:
         _nodes_of_cell(problem, scratch, t)
     count = 0

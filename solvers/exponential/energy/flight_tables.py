@@ -91,10 +91,11 @@ def energy_tables_for(problem: Problem, tables: Tables, spacing: float) -> Packe
     driver = np.flatnonzero(_drives(problem, tables))
     power = np.zeros((len(problem.load), padded(len(problem.k))))
     power[:, : len(problem.k)] = tables.power_rows[:, len(problem.k) :]
-    energy_tables = energy_tables._replace(power=power)
+    step = problem.table_dt[0] if len(problem.table_dt) else spacing  # a cell, which is passed whole without forms too
+    energy_tables = energy_tables._replace(power=power, spacing=step)
     size, signals = 2 * len(problem.k), len(problem.table_dt)
     if (len(tables.flight_step) + 1) * (len(driver) + 6 * signals) * 2 * padded(size) <= _MOST_NUMBERS:
-        energy_tables = _flight_part(energy_tables, problem, tables, driver, spacing)
+        energy_tables = _flight_part(energy_tables, problem, tables, driver)
     return Packed.of(aligned(energy_tables), ENERGY_TABLES)
 
 
@@ -112,9 +113,7 @@ def _drives(problem: Problem, tables: Tables) -> Any:
 # --- flight
 
 
-def _flight_part(
-    energy_tables: EnergyTables, problem: Problem, tables: Tables, driver: Any, spacing: float
-) -> EnergyTables:
+def _flight_part(energy_tables: EnergyTables, problem: Problem, tables: Tables, driver: Any) -> EnergyTables:
     """The forms of all flight steps, and of the cell or, without sampled signals, of the time between two outputs.
 
     Of a cell they are those of the signals' values and derivatives at its two ends, else at the start of the step.
@@ -123,7 +122,7 @@ def _flight_part(
     levels = -(-len(tables.flight_step) // _OCTAVE) * _OCTAVE
     h = tables.flight_step[0] * 2.0 ** (-np.arange(levels) / _OCTAVE)
     signal = tables.signal[..., :n].reshape(*tables.signal.shape[:3], size)
-    spacing = problem.table_dt[0] if len(problem.table_dt) else spacing
+    spacing = energy_tables.spacing
     last, ends = _last(_doubled(problem, powers, *_halved(problem, spacing))), np.eye(powers.shape[-1])
     for first in range(size, len(ends), 6):
         ends[first : first + 6, first : first + 6] = derivatives_of_ends(spacing)
@@ -143,7 +142,7 @@ def _flight_part(
     steps = [np.concatenate(parts)[: len(tables.flight_step)] for parts in zip(*groups, strict=True)]
     rows, plain, pairs = (np.concatenate(both) for both in zip(steps, read(carried(last, ends[None])), strict=True))
     return energy_tables._replace(
-        **{"closed": 1.0, "spacing": spacing, "driver": driver.astype(np.int64), "plain": plain},
+        **{"closed": 1.0, "driver": driver.astype(np.int64), "plain": plain},
         **{"rows": _beside(rows.reshape(*rows.shape[:-1], 2, n)), "pairs": _beside(pairs[:, :, :, None])},
     )
 
