@@ -320,9 +320,9 @@ class _Run:
     def _balances_sampled(self) -> bool:
         """Whether a run that exceeds the bound of its energy balances when it is made again with samples."""
         method, duration = replace(self.engine.method, ledger=True), self.engine.duration
-        start = np.split(self.engine.back @ self.initial, 2)
+        q, q_dot = np.split(self.engine.back @ self.initial, 2)
         memory = self.latched if self.system.latches else None
-        again = integrate(self.system, *start, duration, duration / _SAMPLES, method, check=False, memory=memory)
+        again = integrate(self.system, q, q_dot, duration, duration / _SAMPLES, method, check=False, memory=memory)
         return again.status is Status.DONE
 
     def _of_stops(self, rows: Array) -> Array:

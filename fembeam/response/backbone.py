@@ -39,7 +39,8 @@ def backbone(model: Model, z: float, amplitudes: Vector) -> Vector:
         return np.full(len(amplitudes), np.nan)
     furthest = np.asarray(amplitudes, dtype=float) / abs(shape)
     far, energy, near = _turning_points(model, furthest)
-    return np.array([_frequency(model, *sorted(ends), E) for *ends, E in zip(far, near, energy, strict=True)])
+    ends = zip(np.minimum(far, near), np.maximum(far, near), energy, strict=True)
+    return np.array([_frequency(model, *points) for points in ends])
 
 
 def _turning_points(model: Model, furthest: Vector) -> tuple[Vector, Vector, Vector]:
