@@ -152,8 +152,9 @@ def backbone(
 
     References
     ----------
-    M. Peeters, G. Kerschen, J.C. Golinval, J. Sound Vib. 330 (2011) 486: phase resonance of nonlinear modes. S. Peter,
-    R.I. Leine, Mech. Syst. Signal Process. 96 (2017) 139: damping by the power of the exciter.
+    M. Peeters, G. Kerschen, J.C. Golinval, J. Sound Vib. 330 (2011) 486, doi 10.1016/j.jsv.2010.08.028: phase resonance
+    of nonlinear modes. S. Peter, R.I. Leine, Mech. Syst. Signal Process. 96 (2017), doi 10.1016/j.ymssp.2017.04.011:
+    phase resonance held by a loop, judged by the power of the exciter.
 
     Examples
     --------
