@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 from fembeam import plot
 from fembeam.model import Model, Orbit, observed
 from fembeam.model.branch import Family
-from fembeam.scene import Scene, path_of
+from fembeam.scene import Scene, called, path_of
 from fembeam.study.peak import check_peak
 from fembeam.study.response_curve import ResponseCurve, Seen
 from fembeam.study.result import Result
@@ -174,7 +174,7 @@ def backbone(
     search = _Search(family, path_of(model.scene, parameter), (float(span[0]), float(span[1])), place)
     with counting(progress, given, unit=" levels") as bar:
         found = [search.at(float(value)) for value in bar]
-    return Backbone(family.name, tuple(found), place)
+    return Backbone(called(model.scene, level), tuple(found), place)
 
 
 def check_backbone(scene: Scene, levels: ArrayLike, span: Any, level: str, parameter: str) -> Vector:
