@@ -4,7 +4,7 @@
 
 The last term is what an infinite beam gives way under a point force; it holds until waves come back from the supports.
 A ball of 1 cm radius hits the middle of a beam of 1 cm × 1 cm at 1 cm/s, as in S.P. Timoshenko, Zeitschrift für
-Mathematik und Physik 62 (1913) 198; the beam here is 60 cm long.
+Mathematik und Physik 62 (1913); the beam here is 60 cm long.
 
     python examples/ball_on_beam.py        prints peak force and contact time, of the scene and of the theory
 """

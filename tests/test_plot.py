@@ -464,7 +464,9 @@ def test_the_linear_response_of_a_slider_is_that_of_a_stuck_one_for_every_level(
         base = fb.Harmonic(amplitude, 125.0)
         model = dataclasses.replace(run.model.scene, stops=(), elements=[slider], base=base).reduce(1)
         found.append(model.branch("omega", (120.0, 126.0), step=0.3).run())
-    axis = plot.branch(found, labels=["low", "high"]).axes[0]
+    axis = plot.branch(found).axes[0]
+    labels = [line.get_label() for line in axis.lines]
+    assert labels.count("base amplitude 1e-06 m") == labels.count("base amplitude 3e-06 m") == 1
     drawn = [line for line in axis.lines if line.get_linestyle() == ":"]
     assert [line.get_color() for line in drawn] == ["C0", "C1", GREY]
     assert drawn[-1].get_label() == "linear, elements stuck"

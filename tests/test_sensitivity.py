@@ -304,10 +304,11 @@ def test_a_run_of_a_scene(run, path, share):
 
 def test_what_it_prints_and_offers(run):
     found = run.sensitivity("stops[valve].gap")
-    assert found.parameter == "stops[0].gap"
+    assert found.parameter == "stops[valve].gap"
+    assert run.sensitivity("omega").parameter == "base.omega"
     assert found.value == 1e-4
     text = str(found)
-    assert "derivatives by stops[0].gap = 0.0001" in text
+    assert "derivatives by stops[valve].gap = 0.0001" in text
     assert "valve" in text
     rows = found.table()
     assert [row["entry"] for row in rows] == found.entries.tolist()
@@ -382,6 +383,12 @@ def test_chaos_is_told():
 def test_refusals_of_runs(run, tmp_path):
     with pytest.raises(ValueError, match=r"did you mean stops\[0\]\.gap"):
         run.sensitivity("stops[0].gab")
+    with pytest.raises(ValueError, match=r"got 'stops\[valv\]\.gap' in parameter; did you mean stops\[valve\]\.gap"):
+        run.sensitivity("stops[valv].gap")
+    with pytest.raises(ValueError, match=r"no derivative by supports\[0\]\.z: values near 0 are refused"):
+        run.sensitivity("supports[0].z")
+    with pytest.raises(ValueError, match="must not bring a load that is not there yet"):
+        run.sensitivity("gravity")
     with pytest.raises(ValueError, match="give a parameter or a direction"):
         run.sensitivity()
     with pytest.raises(ValueError, match="give a parameter or a direction"):

@@ -188,6 +188,18 @@ def test_a_run_of_a_scene(run, path, share):
         np.testing.assert_allclose(getattr(found, derived), expected, rtol=0, atol=1e-4 * size, err_msg=logged)
 
 
+def test_a_search_by_gradients():
+    """The coefficient of friction of least rms, through stick and slip in a hole: nothing beside it is lower."""
+    rub, mu = tube(KelvinVoigt(2e5, 20.0), friction=fb.Friction(0.2, 1.5e5)), "stops[0].friction.mu"
+    asked = {"quantity": "rms", "duration": 0.05, "dt": 5e-4, "modes": 2}
+    found = fb.study.minimise(rub, {mu: (0.04, 0.2)}, tolerance=1e-3, gradients=True, **asked)
+    assert found.converged
+    assert found.gradients < 10
+    assert not found.active
+    near = fb.study.vary(rub, {mu: found.at[mu] * np.array([0.95, 0.99, 1.01, 1.05])}, **asked)["rms"]
+    assert np.all(near.ravel() > found.value)
+
+
 @pytest.mark.parametrize("path", ["stops[0].clearance", "stops[0].friction.mu"])
 def test_an_orbit(path):
     """A rub that never opens, with stick and slip by turns."""

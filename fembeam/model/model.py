@@ -302,8 +302,8 @@ class Model(Printed, ModalEquations):
 
         References
         ----------
-        J. Jiang, H. Ulbrich, Stability analysis of sliding whirl in a nonlinear Jeffcott rotor with cross-coupling
-        stiffness coefficients, Nonlinear Dynamics 24 (2001) 269-283.
+        A. Muszynska, Rotordynamics (2005). K. Prabith, I.R.P. Krishna, The numerical modeling of rotor-stator rubbing
+        in rotating machinery: a comprehensive review, Nonlinear Dynamics (2020), doi 10.1007/s11071-020-05832-y.
 
         Examples
         --------

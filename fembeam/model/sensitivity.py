@@ -10,7 +10,8 @@ formulas of the parameter; the motion is not: its derivative solves the variatio
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.model.equations import load_period
 from fembeam.response import directed
-from fembeam.scene import changes_structure, path_of, replaced, value_of
+from fembeam.scene import called, changes_structure, path_of, replaced, value_of
 from fembeam.scene.signals import is_of_signal
 from fembeam.support import Part, Printed, require
 from solvers.orbits import codes, counts, delayed
@@ -230,7 +231,17 @@ class _Varied:
     """A model with one number of its scene varied."""
 
     model: Model
-    path: str
+    name: str
+
+    @cached_property
+    def path(self) -> str:
+        """Its full path, with numbers of parts."""
+        return path_of(self.model.scene, self.name)
+
+    @cached_property
+    def called(self) -> str:
+        """Its full path, with the names of parts by which it was asked for."""
+        return called(self.model.scene, self.name)
 
     @cached_property
     def value(self) -> float:
@@ -242,12 +253,13 @@ class _Varied:
         """Models near the present one, where modes change."""
         if not changes_structure(self.path):
             return None
-        step = STRUCTURE * abs(self.value) or self._felt()
+        with self._told():
+            step = STRUCTURE * abs(self.value) or self._felt()
         found = self._near(lambda value: self.model.again(self._scene(value)), step)
         sizes = {len(one.omega) for one in found.systems}
-        require(sizes == {len(self.model.omega)}, "the number of coordinates must not change", sizes, self.path,
+        require(sizes == {len(self.model.omega)}, "the number of coordinates must not change", sizes, self.called,
                 "name the modes by number, modes=3")  # fmt: skip
-        _check_smooth(found, self.path)
+        _check_smooth(found, self.called)
         return found
 
     @cached_property
@@ -274,6 +286,8 @@ class _Varied:
         step, here = FELT, self.model
         while step < 1.0 / FELT:
             there = here.again(self._scene(step))
+            require(len(there.system.loads) == len(here.system.loads), "it must not bring a load that is not there yet",
+                    step, self.called, "begin from a small value, such as gravity=1e-6")  # fmt: skip
             pairs = ((here.omega**2, there.omega**2), (here.directions, there.directions), (here.zeta, there.zeta))
             if any(np.abs(b - a).max(initial=0.0) > FELT * np.abs(a).max(initial=0.0) for a, b in pairs):
                 break
@@ -282,11 +296,17 @@ class _Varied:
 
     def _near(self, make: Any, step: float) -> Nearby:
         """What is made at five-point formulas' values."""
-        try:
+        with self._told():
             return Nearby.of(make, self.value, step)
+
+    @contextmanager
+    def _told(self) -> Iterator[None]:
+        """Says of values that a scene refuses that there is no derivative."""
+        try:
+            yield
         except ValueError as error:
             raise ValueError(
-                f"no derivative by {self.path}: values near {self.value:.6g} are refused: {error}"
+                f"no derivative by {self.called}: values near {self.value:.6g} are refused: {error}"
             ) from None
 
     def start(self, x: Vector) -> Vector | None:
@@ -318,11 +338,11 @@ def of_run(run: Run, parameter: str | None, start: ArrayLike | None) -> Sensitiv
 def by_each(run: Run, parameters: Sequence[str]) -> list[Sensitivity]:
     """Derivatives of a run by each of several numbers of its scene, for little more than those by one."""
     model, known, options = _made(run)
-    varied = [_Varied(model, path_of(model.scene, parameter)) for parameter in parameters]
+    varied = [_Varied(model, one) for one in parameters]
     x = np.concatenate(known[:2])
     found = sensitivities(model.system, *known, [(one.systems, one.start(x)) for one in varied], **options)
     return [
-        Sensitivity(one.path, one.value, run, its, 0.0, one.models, one.systems)
+        Sensitivity(one.called, one.value, run, its, 0.0, one.models, one.systems)
         for one, its in zip(varied, found, strict=True)
     ]
 
@@ -383,7 +403,7 @@ def of_orbit_by_each(orbit: Orbit, parameters: Sequence[str], times: Vector | No
     the whole period.
     """
     model, found = orbit.model, orbit.found
-    varied, n = [_Varied(model, path_of(model.scene, one)) for one in parameters], len(model.omega)
+    varied, n = [_Varied(model, one) for one in parameters], len(model.omega)
     later = [one.systems.map(lambda system: delayed(system, found.phase)) for one in varied]
     system = delayed(found.system, found.phase)
     known = found.state[:n], found.state[n:], found.period
@@ -397,7 +417,7 @@ def of_orbit_by_each(orbit: Orbit, parameters: Sequence[str], times: Vector | No
     whole = orbit.run.t if times is None else times
     period = sensitivities(system, *known, list(zip(later, starts, strict=True)), whole, **options)
     return [
-        Sensitivity(one.path, one.value, orbit.run, its, longer, one.models, one.systems)
+        Sensitivity(one.called, one.value, orbit.run, its, longer, one.models, one.systems)
         for one, its, longer in zip(varied, period, lengthening, strict=True)
     ]
 

@@ -13,6 +13,7 @@ from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.linear import frequencies
 from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, displacement_name, plain_decades, styled
 from fembeam.scene import signals_of
+from fembeam.scene.parameters import scalars
 from fembeam.support import require
 from solvers.problem import counted
 
@@ -55,7 +56,8 @@ def branch(
     z : m; None is the first stop.
     cloud : (parameter, |u|) of runs to draw beneath, the check by brute force.
     axes : to draw into, whose limits are those of the branches; None makes a figure.
-    labels : of the branches; None tells their period.
+    labels : of the branches; None tells their period, and where these are the same the one number of their scenes that
+        is not, such as the level.
     """
     several = [branches] if not isinstance(branches, Sequence) else list(branches)
     require(bool(several), "nothing to draw", branches, "plot.branch", "give one branch or more")
@@ -67,9 +69,9 @@ def branch(
     periods = [one.family.period for one in several]
     same = labels is None and len(set(periods)) == len(periods)  # colours: a period has the same on every figure
     colours = [f"C{periods[i] - 1 if same else i}" for i in range(len(several))]
-    for i, one in enumerate(several):
-        label = f"period {periods[i]}" if labels is None else labels[i]
-        _draw_branch(axis, one, place, colours[i], label)
+    names = _labels(several) if labels is None else labels
+    for one, colour, label in zip(several, colours, names, strict=True):
+        _draw_branch(axis, one, place, colour, label)
     _draw_ends(axis, several, place)
     linear = _draw_linear(axis, several, place, colours)
     _draw_backbones(axis, several, place)
@@ -101,6 +103,20 @@ def peak(orbit: Orbit, z: Any) -> float:
 def _draw_cloud(axis: Axes, cloud: tuple[Vector, Vector]) -> None:
     """(parameter, |u|) of runs."""
     axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
+
+
+def _labels(several: list[Branch]) -> list[str]:
+    """Periods of branches; where two are the same, with the one number in which their scenes differ."""
+    periods = [f"period {one.family.period}" for one in several]
+    scenes = [one.family.model.scene for one in several]
+    known = [scalars(one) for one in scenes]
+    shared = [path for path in known[0] if path != several[0].family.name and all(path in one for one in known)]
+    apart = [path for path in shared if len({one[path] for one in known}) > 1]
+    if len(set(periods)) == len(periods) or len(apart) != 1:
+        return periods
+    name, _, unit = axis_name(apart[0], scenes[0]).partition(" / ")
+    values = [f"{name} {one[apart[0]]:.4g} {unit}".rstrip() for one in known]
+    return values if len(set(periods)) == 1 else [f"{a}, {b}" for a, b in zip(periods, values, strict=True)]
 
 
 def _draw_branch(axis: Axes, one: Branch, z: Any, color: str, label: str) -> None:

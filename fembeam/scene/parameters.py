@@ -9,6 +9,7 @@ and ``amplitude`` mean the base motion's first, and every name the scene's own p
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from copy import copy
 from dataclasses import fields, is_dataclass, replace
 from difflib import get_close_matches
@@ -73,14 +74,14 @@ def path_of(scene: Scene, name: str) -> str:
 
     A part may be called by its name: ``stops[valve].gap``.
     """
-    known, name = scalars(scene), numbered(scene, name)
-    if name in known:
-        return name
-    ends = [path for path in known if path.endswith(f".{name}")]
+    known, path = scalars(scene), numbered(scene, name)
+    if path in known:
+        return path
+    ends = [one for one in known if one.endswith(f".{path}")]
     own = [path for path in ends if not path.startswith("bodies")]
     first = [path for path in ends if path.startswith("base.")] or own or ends
     first = [SHARED] if SHARED in first else first
-    near = get_close_matches(name, known, n=1, cutoff=0.5)
+    near = get_close_matches(name, [*known, *_by_name(scene, known)], n=1, cutoff=0.5)
     advice = f"did you mean {near[0]}?" if near else "use one of these"
     require(bool(ends), f"no such parameter; the scene has {', '.join(known)}", name, "parameter", advice)
     require(len(first) == 1, f"ambiguous parameter: {', '.join(ends)}", name, "parameter", "give the whole path")
@@ -94,6 +95,23 @@ def numbered(scene: Scene, path: str) -> str:
         if path.startswith(called):
             return f"{numbers}.{path.removeprefix(called)}"
     return path
+
+
+def called(scene: Scene, name: str) -> str:
+    """The full path that a name means, by the names of parts where it has them: "stops[valve].gap", "base.omega"."""
+    path = path_of(scene, name)
+    return name if numbered(scene, name) == path else path
+
+
+def _by_name(scene: Scene, known: Iterable[str]) -> list[str]:
+    """Paths with the names of parts in place of their numbers, of the parts that have one."""
+    parts = scene.named_parts.items()
+    return [
+        f"{numbers.rpartition('[')[0]}[{part.name}]{path.removeprefix(numbers)}"
+        for path in known
+        for numbers, part in parts
+        if path.startswith(f"{numbers}.")
+    ]
 
 
 def value_of(scene: Scene, name: str) -> float:

@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 from fembeam import plot
 from fembeam.model import Model, Orbit, observed
 from fembeam.model.branch import Family
-from fembeam.scene import Scene, path_of
+from fembeam.scene import Scene, called, path_of
 from fembeam.study.peak import check_peak
 from fembeam.study.response_curve import ResponseCurve, Seen
 from fembeam.study.result import Result
@@ -152,8 +152,9 @@ def backbone(
 
     References
     ----------
-    M. Peeters, G. Kerschen, J.C. Golinval, J. Sound Vib. 330 (2011) 486: phase resonance of nonlinear modes. S. Peter,
-    R.I. Leine, Mech. Syst. Signal Process. 96 (2017) 139: damping by the power of the exciter.
+    M. Peeters, G. Kerschen, J.C. Golinval, J. Sound Vib. 330 (2011) 486, doi 10.1016/j.jsv.2010.08.028: phase resonance
+    of nonlinear modes. S. Peter, R.I. Leine, Mech. Syst. Signal Process. 96 (2017), doi 10.1016/j.ymssp.2017.04.011:
+    phase resonance held by a loop, judged by the power of the exciter.
 
     Examples
     --------
@@ -173,7 +174,7 @@ def backbone(
     search = _Search(family, path_of(model.scene, parameter), (float(span[0]), float(span[1])), place)
     with counting(progress, given, unit=" levels") as bar:
         found = [search.at(float(value)) for value in bar]
-    return Backbone(family.name, tuple(found), place)
+    return Backbone(called(model.scene, level), tuple(found), place)
 
 
 def check_backbone(scene: Scene, levels: ArrayLike, span: Any, level: str, parameter: str) -> Vector:

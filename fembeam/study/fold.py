@@ -18,7 +18,7 @@ from fembeam import plot
 from fembeam.model import Branch, Orbit, observed
 from fembeam.model.branch import Family
 from fembeam.plot.axis_names import axis_name
-from fembeam.scene import path_of, value_of
+from fembeam.scene import called, path_of, value_of
 from fembeam.study.result import Result
 from fembeam.support import Part, is_finite, is_whole, require
 from solvers.branches import fold_curve
@@ -127,8 +127,8 @@ def fold(branch: Branch, over: str, span: tuple[float, float], number: int = 0, 
     require(path != name, "over must be another number than the parameter of the branch", over, WHERE, "name both")
     known = [one for one in branch.special if one.mark == "fold"]
     right = is_whole(number) and 0 <= number < len(known)
-    require(right, f"number must be one of the {len(known)} folds of the branch", number, WHERE,
-            "compute the branch, branch.run(), over a span with a fold")  # fmt: skip
+    require(bool(known), "the branch must have a fold", branch, WHERE, "branch.run() over a span with one")
+    require(right, f"number must be one of the {len(known)} folds of the branch", number, WHERE, "count from 0")
     present = value_of(model.scene, path)
     within = np.shape(span) == (2,) and all(map(is_finite, span)) and span[0] <= present <= span[1]
     require(bool(within and span[0] < span[1]), f"span must hold the present value {present:.6g}", span, WHERE,
@@ -145,7 +145,8 @@ def fold(branch: Branch, over: str, span: tuple[float, float], number: int = 0, 
     ends = np.array([one.extremes(z) for one in orbits])
     at = np.array([one.parameter for one in orbits])
     titles = axis_name(path, model.scene), axis_name(name, model.scene)
-    return Fold(name, path, found.values, at, 0.5 * (ends[:, 1] - ends[:, 0]), orbits, found.endings, z, titles)
+    amplitude = 0.5 * (ends[:, 1] - ends[:, 0])
+    return Fold(name, called(model.scene, over), found.values, at, amplitude, orbits, found.endings, z, titles)
 
 
 @dataclass

@@ -24,7 +24,7 @@ from fembeam.model import Model, Orbit, observed
 from fembeam.model.branch import Family
 from fembeam.model.sensitivity import of_amplitude
 from fembeam.plot.axis_names import axis_name
-from fembeam.scene import Scene, numbered, path_of
+from fembeam.scene import Scene, called, path_of
 from fembeam.study.response_curve import ResponseCurve, Seen
 from fembeam.study.result import Result
 from fembeam.support import Part, counting, is_finite, require
@@ -178,9 +178,8 @@ def peak(
     with counting(progress, p, unit=" values") as bar:
         tops = [search.top(float(value)) for value in bar]
     titles = axis_name(search.over, model.scene), axis_name(search.parameter, model.scene)
-    called = parameter if numbered(model.scene, parameter) != parameter else search.parameter
-    called_over = over if numbered(model.scene, over) != over else search.over
-    return Peak(called, called_over, tuple(tops), _least(search, tops), search.z, titles)
+    names = called(model.scene, parameter), called(model.scene, over)
+    return Peak(*names, tuple(tops), _least(search, tops), search.z, titles)
 
 
 def check_peak(

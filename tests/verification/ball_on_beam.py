@@ -13,7 +13,7 @@ import sketch
 from sheets import Row, example
 
 SOURCE = (
-    "S.P. Timoshenko, *Zur Frage nach der Wirkung eines Stoßes auf einen Balken*, Z. Math. Phys. 62 (1913) 198; W. "
+    "S.P. Timoshenko, *Zur Frage nach der Wirkung eines Stoßes auf einen Balken*, Z. Math. Phys. 62 (1913); W. "
     "Goldsmith, *Impact*, Arnold 1960, chapter on transverse impact on beams"
 )
 

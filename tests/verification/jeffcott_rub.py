@@ -30,8 +30,9 @@ from fembeam import Harmonic
 from solvers import Contact, System, orbit
 
 SOURCE = (
-    "A. Muszynska, *Rotordynamics*, CRC Press 2005, chapter 5 (rub of rotor and stator); J. Jiang, H. Ulbrich, "
-    "*Nonlinear Dynamics* 24 (2001) 269 (stability of full annular rub)"
+    "A. Muszynska, *Rotordynamics*, CRC Press 2005 (rub of rotor and stator); models of rub are reviewed in K. "
+    "Prabith, I.R.P. Krishna, *Nonlinear Dynamics* 2020, doi 10.1007/s11071-020-05832-y; no number is printed for this "
+    "rotor"
 )
 MASS, DAMPING, SHAFT, WALL, CLEARANCE, ECCENTRICITY = 2.0, 60.0, 8e4, 3e5, 2e-4, 1e-4
 PLANE, QUARTER = np.eye(2), np.array([[0.0, -1.0], [1.0, 0.0]])

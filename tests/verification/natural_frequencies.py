@@ -26,8 +26,8 @@ from sheets import Row
 import fembeam as fb
 
 SOURCE = (
-    "R.D. Blevins, *Formulas for Natural Frequency and Mode Shape*, Van Nostrand Reinhold 1979, chapter 8, table of "
-    "single-span beams"
+    "R.D. Blevins, *Formulas for Natural Frequency and Mode Shape*, Van Nostrand Reinhold 1979, table 8-1 "
+    "(single-span beams)"
 )
 LENGTH, MODES = 1.2, 4
 STEEL = fb.Section.rectangle(2.1e11, 7850.0, 0.03, 0.01)
