@@ -303,6 +303,35 @@ def test_a_slip_at_entry_far_shorter_than_any_step(method):
 
 
 @every_method
+@pytest.mark.parametrize(
+    ("v_t", "mu", "k_t"),
+    [(0.0379835, 0.583893, 1347551.0), (-1.139127, 0.90991, 1612806.0), (0.346073, 1.81766, 1229449.0)],
+)
+def test_stick_and_slip_just_before_a_contact_opens(method, v_t, mu, k_t):
+    """At a time τ before it N = K (v τ)^{3/2}: slip against ξ̇ ends at τ_1, the next one begins at τ_1/4, some 1e-10 s.
+
+    With k_t |ξ̇| = 3/2 μ K v^{3/2} √τ_1, and from there on μN = |F_t| where 1 - 3 y² - 2 y³ = 0, y = √(τ/τ_1) = 1/2.
+    """
+    run = bounce(wall(Hertz(4e8), mu, k_t), v_t, method)
+    assert run.transitions.event.tolist()[-2:] == ["stick", "slip"]
+    first = (k_t * run.friction.speed_out[0] / (1.5 * mu * 4e8 * 0.8**1.5)) ** 2
+    assert first < 4e-9
+    left = run.contacts.t_out[0] - run.transitions.t[-2:]
+    np.testing.assert_allclose(left / first, [1.0, 0.25], rtol=0.0, atol=1e-5)
+
+
+@every_method
+@pytest.mark.parametrize("after", [2e-10, 6e-10])
+def test_a_slip_just_after_an_entry(method, after):
+    """It begins where k_t ξ̇ t = μ (C δ^{1/4} v + K δ^{3/2}), δ = v t, within the shortest step of `Exponential`."""
+    delta = 0.8 * after
+    damping = (3e5 * 1.5 * after / 0.2 - 4e8 * delta**1.5) / (delta**0.25 * 0.8)
+    run = bounce(wall(Viscoelastic(4e8, damping), 0.2, 3e5), 1.5, method)
+    assert run.transitions.event[0] == "slip"
+    assert run.transitions.t[0] - run.contacts.t_in[0] == pytest.approx(after, rel=1e-5)
+
+
+@every_method
 @pytest.mark.parametrize("clamp", [False, True])
 @pytest.mark.parametrize("v_t", [0.1, 1.5])
 def test_a_slider_is_free_where_its_law_pulls(method, clamp, v_t):

@@ -303,7 +303,7 @@ def report(found: Iterable[list[tuple[str, Verdict]]], every: int, what: str) ->
     events = 0
     for i, verdicts in enumerate(found):
         for words, verdict in verdicts:
-            passed = verdict.kind in ("fine", "ill-conditioned", "the reference failed")
+            passed = verdict.kind in ("fine", "ill-conditioned", "the reference failed", "refused by both")
             kinds[verdict.kind if passed else "failures"] += 1
             events += verdict.contacts if verdict.kind == "fine" else 0
             if not passed:

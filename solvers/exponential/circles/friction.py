@@ -317,6 +317,8 @@ def work_within_rubbing(problem, tables, scratch, s, first):
             tangential = (g * u - f * w) / abs(radius)
             speed = abs(radius) * (u * w_dot - w * u_dot) / square + math.copysign(1.0, own[ARM]) * turning
             speed += own[ARM] * own[SPIN]
+        if slip_of(own) != 0.0:  # of components that are interpolated it would have the error of N
+            tangential = share_of(own) * max(normal, 0.0)
         pressed += weights[i] * normal * rate
         push += weights[i] * normal
         rubbed += weights[i] * tangential * speed

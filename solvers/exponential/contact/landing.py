@@ -7,6 +7,8 @@ It is a step of DOP853 with t among the unknowns, in a variable in which the mot
     TIME          dt                lands on a bend by the secant rule; the force is continuous there
     SINCE         dt = κ u^{κ-1} du, u = (t - t_in)^{1/κ}: the same from an entry on, where δ^{3/2} is singular
 
+A border of friction just before δ = 0 is landed on in the variable of `ROOT` too.
+
 The unknowns are [p, v, energy balance, t, u]. The fastest block moves by less than `landing_reach` radians, within
 which the step of every block is exact to the tolerance. The error by the forces is estimated by a tenth of the embedded
 fifth-order difference, for every stop in units of its own tolerance: in these variables this is a few times the true
@@ -67,6 +69,7 @@ _MOST_HALVINGS = 40  # the same on a border, whose margin may hardly change but 
 _PART = 0.1  # of the embedded difference that counts as the error
 _PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
 _OF_SLOPES, _MOST_SLOPE = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
+_OF_LARGEST = 1e-11  # of a margin, in units of its largest, that is rounding
 _LAST = 0.09  # indentation, in units of the deepest, from which the last step is tried
 _LAST_ROOT, _MOST_ROOT = 0.2, 0.25  # the same of u = δ^{1/2}, / reach², and at most: its error grows like u⁹
 
@@ -214,7 +217,10 @@ def _turns(problem, scratch, width, s):
 
 @inner
 def _accept(problem, tables, state, scratch, variable, stop, level, span):
-    """Move the state to the landing in ``scratch.stages[LANDED]``, or to the end of the run; write samples between."""
+    """Move the state to the landing in ``scratch.stages[LANDED]``, or to the end of the run; write samples between.
+
+    The level is the indentation landed on, inf if it is a bend or border.
+    """
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
     landed, t, t_end = x[size], state.now[T], state.now[T_END]
     _begin_peaks(problem, state, scratch)
@@ -246,7 +252,7 @@ def _accept(problem, tables, state, scratch, variable, stop, level, span):
     if state.event_record.shape[0]:
         write_event(state, LANDING, t, landed, span, variable, stop, w)
     state.now[T] = landed
-    if is_circle(problem, stop) and variable < TIME and landed < t_end:
+    if is_circle(problem, stop) and level < np.inf and landed < t_end:
         land_on_circle(problem, state, scratch, stop, level)
     if variable != ROOT or landed == t_end:  # at a knot the force may fall
         state_peaks(problem, state, scratch, state.x)
@@ -299,12 +305,26 @@ def may_land(problem, tables, state, scratch, stop, direction, near):
 
 
 @merged
+def _part_of_error(problem, tables, state, scratch, variable, stop):
+    """Part of the embedded difference that counts as the error of the landing just tried."""
+    part = _PART_OF_FOURTH if variable == ROOT and tables.time_exponent[1 + stop] == 4.0 else _PART
+    if scratch.viscous[stop] > 0.0:  # too strong a dashpot for an explicit step
+        part = 1.0
+    if state.event_record.shape[0]:
+        w, x = scratch.stages[START], scratch.stages[LANDED]
+        part = max(part, _OF_SLOPES * _slopes_by_forces(problem, tables, state, stop, w, x))
+    return part
+
+
+@merged
 def land(problem, tables, state, scratch, stop, direction, near):
     """Try to land on a border of ``stop``, about ``near`` s ahead.
 
-    Returns ``stop`` if it succeeded, another stop whose border is crossed before, or -1.
+    Returns ``stop`` if it succeeded, another stop whose border is crossed before, or -1. A border of a law with memory
+    that is passed before is noted in ``scratch.landed``.
     """
     size, t, rate = state.x.size, state.now[T], scratch.start_motion[stop, 1]
+    scratch.landed[0] = -1
     if not may_land(problem, tables, state, scratch, stop, direction, near):
         return -1
     furthest, kappa = _furthest(problem, tables, scratch), tables.time_exponent[1 + stop]
@@ -314,11 +334,7 @@ def land(problem, tables, state, scratch, stop, direction, near):
     variable = ROOT if leaving and kappa > 1.0 else INDENTATION
     span = -w[size + 1] if variable == ROOT else _level(problem, state, stop, direction) - scratch.start_motion[stop, 0]
     _step(problem, tables, state, scratch, variable, stop, span)
-    landed, part = x[size], _PART_OF_FOURTH if variable == ROOT and kappa == 4.0 else _PART
-    if scratch.viscous[stop] > 0.0:  # too strong a dashpot for an explicit step
-        part = 1.0
-    if state.event_record.shape[0]:
-        part = max(part, _OF_SLOPES * _slopes_by_forces(problem, tables, state, stop, w, x))
+    landed, part = x[size], _part_of_error(problem, tables, state, scratch, variable, stop)
     width = surface_tolerance(problem, stop, state.x) / abs(rate)  # a distance may be that much rounding
     if not t <= landed <= t + min(4.0 * near, furthest) + width:
         return -1
@@ -329,8 +345,10 @@ def land(problem, tables, state, scratch, stop, direction, near):
     ):
         return -1
     other = before_landing(problem, tables, state, scratch, stop, np.bool_(0), w, x)
-    if other == CLEAR and problem.parts[PASSED] and passed(problem, state, scratch, -1, -1, w, x)[0] != -1:
-        other = TOO_LONG
+    if other == CLEAR and problem.parts[PASSED]:
+        scratch.landed[0], scratch.landed[1] = passed(problem, state, scratch, -1, -1, w, x)
+        if scratch.landed[0] != -1:
+            other = TOO_LONG
     if other != CLEAR:
         return max(other, -1)
     level = _level(problem, state, stop, direction)
@@ -359,6 +377,36 @@ def _rises(problem, state, scratch, s, border, time):
 
 
 @inlined
+def _opens(problem, tables, state, scratch, stop):
+    """Whether one step may end where a stop with friction opens: up to there the motion is smooth in u only."""
+    delta, rate = scratch.start_motion[stop, 0], scratch.start_motion[stop, 1]
+    if not (rubs(problem, stop) and state.segment[stop] == 1 and tables.time_exponent[1 + stop] > 1.0 and rate < 0.0):
+        return False
+    return may_land(problem, tables, state, scratch, stop, np.int64(-1), delta / -rate)
+
+
+@merged
+def _begin_at_opening(problem, tables, state, scratch, stop, border, near):
+    """Way in u, as if δ̇ stayed, of a landing on a border before a stop opens; the scale of its margin up to there."""
+    u, delta = scratch.stages[START, state.x.size + 1], scratch.start_motion[stop, 0]
+    largest = abs(_apart(problem, tables, state, scratch, stop, border, scratch.stages[START]))
+    _step(problem, tables, state, scratch, np.int64(ROOT), stop, -u)
+    largest = max(largest, abs(_apart(problem, tables, state, scratch, stop, border, scratch.stages[LANDED])))
+    scratch.largest[stop, border], scratch.noise[stop, border] = largest, _OF_LARGEST * largest
+    left = max(1.0 + near * scratch.start_motion[stop, 1] / delta, 0.0) if delta > 0.0 else 0.0
+    return u * (1.0 - left ** (1.0 / tables.time_exponent[1 + stop]))
+
+
+@merged
+def _is_exact(problem, tables, state, scratch, variable, stop, time):
+    """Whether the landing just tried, so long, is within the tolerance."""
+    if variable != ROOT:
+        return _error_in_time(problem, scratch, time) <= 1.0
+    part = _part_of_error(problem, tables, state, scratch, variable, stop)
+    return _goes_ahead(scratch, state.x.size) and _error(problem, scratch, part) <= 1.0
+
+
+@inlined
 def _between(above, below):
     """A time between two, of which the first may be zero, or smaller by powers of ten."""
     return math.sqrt(above * below) if above > 0.0 else 1e-3 * below
@@ -377,22 +425,26 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near):
     scratch.landed[0] = -1
     if not 0.0 < near <= furthest:
         return False
-    variable, root = np.int64(TIME), 1.0  # a literal would be compiled for itself
+    variable, root, way = np.int64(TIME), 1.0, 1.0  # a literal would be compiled for itself
     if border >= 0 and scratch.control[NEW] and scratch.control[NODE_SET] == stop + 1:
         variable, root = np.int64(SINCE), 1.0 / tables.time_exponent[stop + 1]
     start_landing(problem, tables, state, scratch, stop, variable)
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
     furthest, span = furthest**root, near**root
+    if border >= 0 and variable == TIME and _opens(problem, tables, state, scratch, stop):
+        variable, way, furthest = np.int64(ROOT), -1.0, w[size + 1]
+        span = _begin_at_opening(problem, tables, state, scratch, stop, border, near)
+        largest, enough = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
     before, apart = 0.0, _apart(problem, tables, state, scratch, stop, border, w)
     begins_there = (apart if border >= 0 else abs(apart)) <= 1e-6 * largest
     least = 0.0 if border >= 0 and not begins_there else 0.1 * span
     if begins_there:  # the secant needs another point
         before = 0.9 * span
-        _step(problem, tables, state, scratch, variable, stop, before)
+        _step(problem, tables, state, scratch, variable, stop, way * before)
         apart = _apart(problem, tables, state, scratch, stop, border, x)
     above, below = before if apart > 0.0 else 0.0, furthest
     for _ in range(_MOST_TRIES if border < 0 else _MOST_HALVINGS):
-        _step(problem, tables, state, scratch, variable, stop, span)
+        _step(problem, tables, state, scratch, variable, stop, way * span)
         value = _apart(problem, tables, state, scratch, stop, border, x)
         if abs(value) <= enough:
             break
@@ -401,13 +453,15 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near):
             break
         if border >= 0:
             above, below = (span, below) if value > 0.0 else (above, span)
-            if below < furthest and not above < following < below:
+            if (below < furthest or way < 0.0) and not above < following < below:
                 following = _between(above, below)
+                if rubs(problem, stop):  # not back to where it begins
+                    following = max(following, 2.0 * least)
         if not least < following <= furthest or following == span:
             return False
         before, apart, span = span, value, following
-    time = x[size] - w[size] if variable == SINCE else span
-    if not (abs(value) <= 1e-6 * largest and _error_in_time(problem, scratch, time) <= 1.0):
+    time = span if variable == TIME else x[size] - w[size]
+    if not (abs(value) <= 1e-6 * largest and _is_exact(problem, tables, state, scratch, variable, stop, time)):
         return False
     if border >= 0 and _rises(problem, state, scratch, stop, border, 1e-3 * time):  # it has been below zero before
         return False
@@ -419,4 +473,4 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near):
     lower, upper = problem.knots[stop, state.segment[stop] - 1], problem.knots[stop, state.segment[stop]]
     if not lower < indentation(problem, stop, x) < upper:
         return False
-    return _accept(problem, tables, state, scratch, variable, stop, 0.0, span)
+    return _accept(problem, tables, state, scratch, variable, stop, np.inf, way * span)

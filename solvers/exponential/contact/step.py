@@ -20,6 +20,7 @@ from solvers.compiled.kernels import (
     indentation_rate,
     inlined,
     is_circle,
+    is_planar,
     merged,
     rhs,
     row_of,
@@ -171,10 +172,37 @@ def _attempt(problem, tables, state, scratch, node_set, level):
 
 
 @merged
+def _try_border(problem, tables, state, scratch, near):
+    """Land on a border of friction that is passed just before a contact opens; whether it was done."""
+    stop, level = scratch.landed[0], scratch.control[NEXT_LEVEL]
+    if stop < 0 or not rubs(problem, stop):
+        return False
+    scratch.border[0] = scratch.landed[1]
+    stop, landed = land_in_time(problem, tables, state, scratch, stop, near)
+    if landed:
+        _go_on(problem, tables, state, scratch, stop, level, False)
+    return landed
+
+
+@merged
+def _go_on(problem, tables, state, scratch, stop, level, alone):
+    """Begin what follows a landing in time."""
+    control = scratch.control
+    state.count[STEPS] += 1
+    if state.now[T] < state.now[T_END]:
+        go_beyond(problem, state, scratch, stop, alone)
+    control[NEW], control[NODE_SET], control[NEXT_LEVEL] = SEGMENT, 0, level
+    if rubs(problem, stop):  # it may have stuck where its contact began
+        control[NODE_SET] = entry_nodes(problem, tables, state, stop, control[NEXT_LEVEL])
+
+
+@merged
 def _try_landing(problem, tables, state, scratch, stop, direction, near):
     """Land on the border met first and switch its stop, if it is near enough; whether it was done."""
     stop, direction = land_first(problem, tables, state, scratch, stop, direction, near)
     if stop < 0:
+        if is_planar(problem):
+            return _try_border(problem, tables, state, scratch, near)
         return False
     state.count[STEPS] += 1
     if state.now[T] < state.now[T_END]:
@@ -237,19 +265,16 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
     copy(scratch.side, scratch.side_at_begin, scratch.side.size)
     while True:
         error, first, bent = _attempt(problem, tables, state, scratch, node_set, level)
-        if error <= 1.0:
+        if error <= 1.0 and (bent < 0 or not rubs(problem, bent)):
             break
-        landed = first == 0.0 and scratch.border[0] >= 0  # it begins on the border and goes across
+        landed, met = first == 0.0 and scratch.border[0] >= 0, bent  # it begins on the border and goes across
         if bent >= 0 and not landed:
-            bent, landed = land_in_time(problem, tables, state, scratch, bent, first)
+            met, landed = land_in_time(problem, tables, state, scratch, bent, first)
         if landed:
-            state.count[STEPS] += 1
-            if state.now[T] < state.now[T_END]:
-                go_beyond(problem, state, scratch, bent, first == 0.0)
-            control[NEW], control[NODE_SET], control[NEXT_LEVEL] = SEGMENT, 0, max(level, wanted)
-            if rubs(problem, bent):  # it may have stuck where its contact began
-                control[NODE_SET] = entry_nodes(problem, tables, state, bent, control[NEXT_LEVEL])
+            _go_on(problem, tables, state, scratch, met, max(level, wanted), first == 0.0)
             return RUNNING
+        if error <= 1.0:  # within the shortest step it cannot be landed on
+            break
         if level == bottom:
             return LAW_NOT_FINITE if _law_fails(problem, state, scratch) else STEP_TOO_SMALL
         copy(scratch.side_at_begin, scratch.side, scratch.side.size)
