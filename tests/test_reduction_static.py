@@ -11,6 +11,7 @@ from fembeam.beams import Beam, ModalDamping, Rayleigh, Section
 from fembeam.excitation import Harmonic
 from fembeam.model import reduce as reducing
 from fembeam.scene import Clamped, LumpedMass, PointForce, Scene, Stop
+from fembeam.structures import Frame
 from reduction import interface
 
 UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)
@@ -248,6 +249,22 @@ def test_strike_foretells_contact_time():
         scene.reduce(1).strike(0.0)
     with pytest.raises(ValueError, match="stop must be below 1"):
         scene.reduce(1).strike(1.0, stop=1)
+
+
+def test_a_strike_swings_in_a_mode_that_moves_the_stop():
+    """The first mode of a bar moves its weak direction only: a stop in the other one was struck for ever."""
+    times = []
+    for weak, strong, direction in (("width", "height", "x"), ("height", "width", "y")):
+        bar = Section.rectangle(2.1e11, 7850.0, **{weak: 0.01, strong: 0.02}, nu=0.3)
+        frame = Frame.straight(0.5, bar, bending_only=True)
+        for way in ("x", "y"):
+            stop = Stop(0.5, Hertz(1e8), gap=1e-4, direction=way)
+            log = Scene(frame, [Clamped("A")], stops=[stop]).reduce(modes=4).strike(0.1)
+            times.append((way == direction, log.t_out[0] - log.t_in[0]))
+    stiff, weak = ([t for own, t in times if own is which] for which in (False, True))
+    assert np.ptp(stiff) < 1e-9 * stiff[0]
+    assert np.ptp(weak) < 1e-9 * weak[0]
+    assert 0.0 < stiff[0] < 0.01
 
 
 @pytest.mark.parametrize(

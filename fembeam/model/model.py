@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from fembeam.scene import Matrices, Scene
 
 Field = Callable[[Vector], Any] | None  # of displacement in m or velocity in m/s, over z (k,)
+_MOVES = 0.1  # of the mode that moves a stop most: one that moves it so far does
 UNDRIVEN = (
     "zeta",
     "participation",
@@ -90,10 +91,10 @@ class Model(Printed, ModalEquations):
         return replace(self, scene=scene, matrices=spun) if spun else scene.reduce(**self.reduction_options)
 
     def strike(self, speed: float, stop: int = 0) -> solvers.ContactLog:
-        """Contacts with one stop when the model swings into it in its first mode, nothing else acting, no friction.
+        """Contacts with one stop when the model swings into it in the first mode that moves it, nothing else acting.
 
         Tells what to expect before a study: contact time ``t_out - t_in`` of the first contact and peak force, and so
-        how many periods of the highest mode a contact lasts.
+        how many periods of the highest mode a contact lasts. Friction is left out.
 
         Parameters
         ----------
@@ -104,13 +105,15 @@ class Model(Printed, ModalEquations):
         require(0 <= stop < len(self.scene.stops), f"stop must be below {len(self.scene.stops)}", stop, "Model.strike",
                 "count from 0")  # fmt: skip
         contact = initial_states.smooth(self.system.contacts[stop])
-        start = np.zeros((2, len(self.omega)))
+        start, mode = np.zeros((2, len(self.omega))), 0
         if contact.map == "annulus":
             start[:, 0] = initial_states.onto_circle(contact, speed)
         else:
-            start[:, 0] = np.array([-contact.gap, -speed]) / contact.direction[0]
+            reach = np.abs(contact.direction)
+            mode = int(np.argmax(reach >= _MOVES * reach.max()))
+            start[:, mode] = np.array([-contact.gap, -speed]) / contact.direction[mode]
         system = solvers.System(self.system.M, self.system.C, self.system.K, [contact], gyroscopic=self.turning)
-        slowest = max(float(self.omega[0]), 1.0)
+        slowest = max(float(self.omega[mode]), 1.0)
         return solvers.integrate(system, *start, np.pi / slowest).contacts
 
     def under(self, scene: Scene) -> Model:
