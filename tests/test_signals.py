@@ -33,6 +33,7 @@ PLAIN = {  # annotations of what is no signal
     *("float", "str", "str | None", "float | tuple[float, float, float]", "tuple[str, ...]"),
     *("Of", "Place", "Second | None", "Direction | None", "float | Sequence[float]", "bool", "float | None"),
     *("tuple[float, float]", "tuple[Direction, Direction] | None"),
+    "float | tuple[float, float, float] | tuple[tuple[float, ...], ...]",
 }
 STRUCTURE = {
     "z",

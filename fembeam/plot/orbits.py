@@ -108,11 +108,13 @@ def _draw_cloud(axis: Axes, cloud: tuple[Vector, Vector]) -> None:
 def _labels(several: list[Branch]) -> list[str]:
     """Periods of branches; where two are the same, with the one number in which their scenes differ."""
     periods = [f"period {one.family.period}" for one in several]
+    if len(set(periods)) == len(periods):
+        return periods
     scenes = [one.family.model.scene for one in several]
     known = [scalars(one) for one in scenes]
     shared = [path for path in known[0] if path != several[0].family.name and all(path in one for one in known)]
     apart = [path for path in shared if len({one[path] for one in known}) > 1]
-    if len(set(periods)) == len(periods) or len(apart) != 1:
+    if len(apart) != 1:
         return periods
     name, _, unit = axis_name(apart[0], scenes[0]).partition(" / ")
     values = [f"{name} {one[apart[0]]:.4g} {unit}".rstrip() for one in known]
