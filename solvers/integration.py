@@ -327,8 +327,9 @@ class _Run:
 
     def _of_stops(self, rows: Array) -> Array:
         """The events of elements whose contacts begin and end."""
-        always = self.system.about_laws.get("always", partial(_always, self.system))
-        return rows[~np.isin(rows[:, at.ELEMENT], always)] if always else rows
+        for s in self.system.about_laws.get("always", partial(_always, self.system)):
+            rows = rows[rows[:, at.ELEMENT] != s]
+        return rows
 
     def release(self) -> None:
         """Return working arrays for use by other runs."""

@@ -161,6 +161,20 @@ def test_copies_of_a_template_have_own_arrays_and_share_the_rest():
     assert one.vector[0] != -1.0
 
 
+@pytest.mark.parametrize("made", [Packed.of, lambda one, kind: PackedTemplate(one, kind, ["vector"]).copy(number=8.0)])
+def test_other_arrays_take_the_place_of_some_and_the_rest_is_shared(made):
+    one = things()
+    packed = made(one, KIND)
+    other = packed.replaced(KIND, cube=np.ones((2, 5, 4)), count=np.array([1, 2]))
+    assert other.value.vector is packed.value.vector
+    assert other.value.number == packed.value.number
+    for each in (other, packed):
+        wanted = expected(each.value)
+        np.testing.assert_allclose(seen(each.address), wanted, rtol=1e-14)
+    with pytest.raises(TypeError, match="cube must be a contiguous"):
+        packed.replaced(KIND, cube=np.ones(3))
+
+
 class Pair(NamedTuple):
     """Arrays that live in one block."""
 

@@ -121,15 +121,28 @@ def _aligned(array: Any) -> Any:
 
 def _described(value: Any, kind: types.NamedTuple) -> list[list[int]]:
     """For every field its 8-byte words: an array's descriptor, or the number itself."""
-    found = []
-    for name, item, (expected, ndim, dtype) in zip(value._fields, value, _expected(kind), strict=True):
-        if dtype is None:
-            found.append([struct.unpack("q", struct.pack("d", item))[0]])
-            continue
-        if item.ndim != ndim or item.dtype != dtype or not item.flags.c_contiguous:
-            raise TypeError(f"{name} must be a contiguous {expected}, got {item.dtype} with shape {item.shape}")
-        found.append([*_META, item.size, 8, address_of(item), *item.shape, *item.strides])
-    return found
+    return [_words(*field) for field in zip(value._fields, value, _expected(kind), strict=True)]
+
+
+def _words(name: str, item: Any, kind: tuple[Any, int, Any]) -> list[int]:
+    """Those of one field."""
+    expected, ndim, dtype = kind
+    if dtype is None:
+        return [struct.unpack("q", struct.pack("d", item))[0]]
+    if item.ndim != ndim or item.dtype != dtype or not item.flags.c_contiguous:
+        raise TypeError(f"{name} must be a contiguous {expected}, got {item.dtype} with shape {item.shape}")
+    return [*_META, item.size, 8, address_of(item), *item.shape, *item.strides]
+
+
+_PLACES: dict[type, dict[str, int]] = {}
+
+
+def _places(kind: types.NamedTuple) -> dict[str, int]:
+    """Where the words of every field begin."""
+    if kind.instance_class not in _PLACES:
+        sizes = [1 if dtype is None else 5 + 2 * ndim for _, ndim, dtype in _expected(kind)]
+        _PLACES[kind.instance_class] = dict(zip(kind.fields, np.cumsum([0, *sizes]).tolist(), strict=False))
+    return _PLACES[kind.instance_class]
 
 
 class Packed(NamedTuple):
@@ -145,6 +158,15 @@ class Packed(NamedTuple):
         block = np.array([*chain(*_described(value, kind))], dtype=np.int64)
         return cls(value, block, address_of(block))
 
+    def replaced(self, kind: types.NamedTuple, **arrays: Any) -> Packed:
+        """The same with other arrays in the place of some: a tenth of the time of packing all of them."""
+        first = (self.address - address_of(self.block)) // 8
+        block, places = self.block.view(np.int64)[first:].copy(), _places(kind)
+        for name, array in arrays.items():
+            words = _words(name, array, _expected(kind)[kind.fields.index(name)])
+            block[places[name] : places[name] + len(words)] = words
+        return Packed(self.value._replace(**arrays), block, address_of(block))
+
     @property
     def nbytes(self) -> int:
         """Of the memory that no other one shares."""
@@ -155,9 +177,7 @@ class PackedTemplate:
     """A named tuple to be packed many times: every copy has its own ``own`` arrays, all copies share the others."""
 
     def __init__(self, value: Any, kind: types.NamedTuple, own: Sequence[str]) -> None:
-        self.value, described = value, _described(value, kind)
-        places = np.cumsum([0] + [len(words) for words in described])
-        self.places = dict(zip(value._fields, places.tolist(), strict=False))
+        self.value, described, self.places = value, _described(value, kind), _places(kind)
         arrays = [getattr(value, name) for name in own]
         ends = np.cumsum([array.size for array in arrays])
         self.slices = [

@@ -15,7 +15,7 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.kernels import INTEGERS, MATRIX, PLANAR_PROBLEM, REAL, VECTOR, copy, entry, inner, is_circle
-from solvers.compiled.packed import Packed, unpacker
+from solvers.compiled.packed import unpacker
 from solvers.compiled.state import (
     DIVERGED,
     DONE,
@@ -160,10 +160,8 @@ class Worker:
     def __init__(self, engine: Engine, starts: Array, gaps: Array, outcomes: Outcomes, budget: int) -> None:
         self.engine, self.cursor, problem_at = engine, np.zeros(3, dtype=np.int64), engine.addresses[0]
         if gaps.size:  # those of the problem are shared with other runs
-            self.own = Packed.of(
-                engine.problem._replace(gap=engine.problem.gap.copy(), radius=engine.problem.radius.copy()),
-                PLANAR_PROBLEM,
-            )
+            own = {name: getattr(engine.problem, name).copy() for name in ("gap", "radius")}
+            self.own = engine.packed.replaced(PLANAR_PROBLEM, **own)
             problem_at = self.own.address
         workspace, parameters = engine.workspace, engine.prepared.problem.value.parameters
         self.arguments = (

@@ -35,7 +35,7 @@ from solvers.compiled.kernels import (
     merged,
     type_of,
 )
-from solvers.compiled.packed import Packed, unpacker
+from solvers.compiled.packed import unpacker
 from solvers.compiled.renewals import most_rows
 from solvers.compiled.state import (
     AT_ONCE,
@@ -191,7 +191,7 @@ class Engine:
         if system.latches:  # laws latch numbers among their parameters
             own["parameters"] = prepared.problem.value.parameters.copy()
         if own:
-            packed = Packed.of(packed.value._replace(**own), type_of(packed.value))
+            packed = packed.replaced(type_of(packed.value), **own)
         self.packed, self.problem, self.prepared = packed, packed.value, prepared
         self.advance = advance_of(isinstance(packed.value, PlanarProblem))
         self.workspace = prepared.workspace()

@@ -44,14 +44,15 @@ class Tangent:
         self.engine, self.blocks = engine, system.blocks
         problem, state = engine.problem, engine.state
         stops, rows, size = len(problem.law), len(problem.gap), 2 * len(problem.k)
+        parameters = problem.parameters
         if problem.border_count.any():  # the record is followed with what was latched then
-            problem = problem._replace(parameters=problem.parameters.copy())
+            parameters = parameters.copy()
         width, n = state.x.size, system.size
         change = _Change.of(system, parameter, engine) if parameter else None
         self.exact = change is not None
         self.places_latched = np.flatnonzero(problem.latched.ravel() >= 0)  # among those of all contacts
         own = len(self.places_latched) if latched else 0
-        self.change, columns = change or _Change.none(problem, n), 2 * n + own + self.exact
+        self.change, columns = change or _Change.none(problem, n, parameters), 2 * n + own + self.exact
         layout = _layout(
             **{"columns": columns, "X": width, "E": stops, "R": rows, "L": len(problem.load)},
             **{"l": problem.latched.shape[1], "P": problem.parameters.shape[1], "B": most_borders(problem)},
@@ -66,20 +67,11 @@ class Tangent:
             self.y[-1, self.places] = -self.change.steady(0.0)
         self.latched[2 * n : 2 * n + own, self.places_latched[:own]] = np.eye(own)
         engine.record(event_record=np.empty((_ROWS, HEAD + width + rows * S)))
-        self.packed = [
-            *(
-                engine.packed if same is engine.problem else Packed.of(same, PLANAR_PROBLEM)
-                for same in self.change.problems
-            ),
-            Packed.of(self.change.variation, VARIATION),
-        ]
-        if problem is not engine.problem:
-            self.packed.append(Packed.of(problem, PLANAR_PROBLEM))
+        self.packed = [_packed(engine, one) for one in (parameters, *self.change.parameters)]
+        self.packed.append(Packed.of(self.change.variation, VARIATION))
+        here, ahead, behind, variation = (packed.address for packed in self.packed)
         derivatives, past = (words + start for start in layout.starts)
-        ahead, behind, variation = (packed.address for packed in self.packed[:3])
-        problem_at, *others = engine.addresses
-        problem_at = problem_at if problem is engine.problem else self.packed[-1].address
-        self.addresses = problem_at, ahead, behind, *others, past, derivatives, variation, system.size
+        self.addresses = here, ahead, behind, *engine.addresses[1:], past, derivatives, variation, system.size
         self.log_scale = 0.0  # the derivatives are exp(log_scale) times what is kept
         self.history: list[tuple[float, float]] = []  # (time, ln of their size)
 
@@ -116,6 +108,13 @@ class Tangent:
         return matrix
 
 
+def _packed(engine: Any, parameters: Array) -> Packed:
+    """The problem of an engine with other parameters of its laws."""
+    packed: Packed = engine.packed
+    same = parameters is engine.problem.parameters
+    return packed if same else packed.replaced(PLANAR_PROBLEM, parameters=parameters)
+
+
 @lru_cache(maxsize=64)
 def _layout(**known: int) -> Layout:
     """Shapes and places of the arrays of `Derivatives` and of the past `State`."""
@@ -133,10 +132,10 @@ def _size(y: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Change:
-    """Changes by a parameter: explicit ones, problems with the laws ahead and behind, steady response per tone."""
+    """Changes by a parameter: explicit ones, parameters of the laws ahead and behind, steady response per tone."""
 
     variation: Variation
-    problems: list[Problem]
+    parameters: list[Array]
     a: Any  # (K, 2n) complex: the steady response changes by Re (a + t b) e^{iωt}
     b: Any
 
@@ -146,14 +145,14 @@ class _Change:
         return waves.sum(axis=0).real
 
     @classmethod
-    def none(cls, problem: Problem, n: int) -> _Change:
+    def none(cls, problem: Problem, n: int, parameters: Array) -> _Change:
         """No parameter."""
         rows = len(problem.gap)
         variation = Variation(
             0.0, 0.0, np.zeros(0), np.zeros((0, rows, 2, 4)), np.zeros(rows), np.zeros(problem.radius.size)
         )
         none = np.zeros((0, 2 * n), dtype=complex)
-        return cls(variation, [problem] * 2, none, none)
+        return cls(variation, [parameters] * 2, none, none)
 
     @classmethod
     def of(cls, system: System, parameter: Parameter, engine: Any) -> _Change | None:
@@ -182,9 +181,8 @@ class _Change:
             (radii[1] - radii[0]) / width,
         )
         if all(one.law is other.law for one, other in zip(*(side.contacts for side in sides), strict=True)):
-            return cls(variation._replace(law_step=0.0), [engine.problem] * 2, a, b)
-        problems = [engine.problem._replace(parameters=_parameters(side, engine.problem)) for side in reversed(sides)]
-        return cls(variation, problems, a, b)
+            return cls(variation._replace(law_step=0.0), [engine.problem.parameters] * 2, a, b)
+        return cls(variation, [_parameters(side, engine.problem) for side in reversed(sides)], a, b)
 
 
 def _parameters(side: System, problem: Problem) -> Array:

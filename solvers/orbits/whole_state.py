@@ -15,7 +15,7 @@ import numpy as np
 from solvers.integration import integrate
 from solvers.problem import Array, Parameter, Solution, System, Transitions, columns_of, renew
 
-_REALS = ctypes.POINTER(ctypes.c_double)
+_REALS = ctypes.c_void_p
 _AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS  # border, δ, δ̇, entry rate, parameters
 _OF_SLIDER = np.array([False, True])  # the code of friction and the place of its slider
 _SLOPES = ctypes.CFUNCTYPE(None, *_AT, _REALS)
@@ -23,7 +23,12 @@ _SLOPES = ctypes.CFUNCTYPE(None, *_AT, _REALS)
 
 def counts(system: System) -> list[int]:
     """How many numbers each contact latches."""
-    return [len(getattr(contact.law, "memory", ())) for contact in system.contacts]
+
+    def found() -> list[int]:
+        return [len(getattr(contact.law, "memory", ())) for contact in system.contacts]
+
+    known: list[int] = system.about_laws.get("counts", found)
+    return known
 
 
 def codes(system: System) -> Any:
@@ -118,7 +123,7 @@ def _slopes(law: Any, row: Array, border: int = -1, delta: float = 0.0, rate: fl
     """Derivatives (l, 2 + l) of a renewal by δ, δ̇ and what is latched; border -1: of none, zero for codes."""
     count = len(law.memory)
     out = np.zeros((count, 2 + count))
-    _SLOPES(law.renew_gradient_address)(border, delta, rate, 1.0, *(a.ctypes.data_as(_REALS) for a in (row, out)))
+    _SLOPES(law.renew_gradient_address)(border, delta, rate, 1.0, row.ctypes.data, out.ctypes.data)
     return out
 
 

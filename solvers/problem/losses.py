@@ -15,8 +15,7 @@ from solvers.problem.matrices import Array
 from solvers.problem.result import Transitions, counted
 from solvers.problem.system import Contact
 
-_REALS = ctypes.POINTER(ctypes.c_double)
-_RENEW = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, *[ctypes.c_double] * 3, _REALS)
+_RENEW = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, *[ctypes.c_double] * 3, ctypes.c_void_p)
 
 Held = tuple[Array, Sequence[Array]]  # a method's state, at the end with its energy balance; what laws have latched
 
@@ -186,5 +185,5 @@ def _sliders(law: Any) -> list[tuple[list[int], int, int]]:
 
 def renew(law: Any, row: Array, border: int, delta: float, rate: float) -> str:
     """Renew what a law has latched in a row of its parameters, as when a border is met; returns the event."""
-    event: str = law.events[_RENEW(law.renew_address)(border, delta, rate, 1.0, row.ctypes.data_as(_REALS))]
+    event: str = law.events[_RENEW(law.renew_address)(border, delta, rate, 1.0, row.ctypes.data)]
     return event

@@ -29,7 +29,7 @@ class Memo:
     True
     """
 
-    def __init__(self, most: int = 1 << 25) -> None:
+    def __init__(self, most: int = 1 << 28) -> None:
         self.most, self.size = most, 0
         self._entries: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
         self._lock = Lock()

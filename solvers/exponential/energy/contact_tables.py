@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from solvers.compiled.kernels import inner, kernel
+from solvers.compiled.simd import load8, splat8, store8
 from solvers.exponential.contact.nodes import S, gauss, lagrange, so_far
 from solvers.exponential.responses import propagate
 
@@ -38,30 +39,21 @@ def contact_table(
     weights = np.array([apart, apart * nodes ** (-weight_exponent)])
     points = gauss(_POINTS)
     out = np.zeros((len(h), len(k), _ROWS, _WIDE))
-    scratch = np.zeros((_POINTS, _ROWS)), np.zeros((_POINTS, S)), np.zeros((_POINTS, _ROWS, 2)), np.zeros((_ROWS, 2))
-    _fill(
-        k.copy(),
-        c.copy(),
-        h.copy(),
-        time_exponent,
-        weight_exponent,
-        nodes.copy(),
-        weights,
-        points,
-        so_far(points[0]),
-        *scratch,
-        out,
-    )
+    shapes = (_POINTS, _ROWS), (2, _POINTS, S), (_POINTS, 2, _BEGIN), (2, _ROWS)
+    scratch = [np.zeros(shape) for shape in shapes]
+    structure = k.copy(), c.copy(), h.copy()
+    kind = time_exponent, weight_exponent, nodes.copy(), weights
+    _fill(*structure, *kind, points, np.vstack((so_far(points[0]), points[1])), *scratch, out)
     return _once(out[..., :S], out[..., S:])
 
 
 def _once(moments: Any, squares: Any) -> Any:
-    """The table from ∫ L_i v dt and ∫ v v_row dt of all rows."""
+    """The table from ∫ L_i v dt and ∫ v v_row dt of all rows, of which those up to the row's own block are known."""
     f, g, x, (p, v) = slice(S), slice(S, _BEGIN), slice(_BEGIN, _ROWS), (_BEGIN, _BEGIN + 1)
     out = np.zeros((*moments.shape[:2], SQUARES + S + 2, 2 * S))
     for rows, of, times in (slice(S), f, 1.0), (slice(S, BEGAN), x, 2.0), (slice(ENTERING, SQUARES), g, 2.0):
         out[..., rows, :S], out[..., rows, S:] = moments[..., of, :], times * squares[..., of, f]
-    for i, (row, column, times) in enumerate(((p, p, 1.0), (p, v, 2.0), (v, v, 1.0))):
+    for i, (row, column, times) in enumerate(((p, p, 1.0), (v, p, 2.0), (v, v, 1.0))):
         out[..., BEGAN, i] = times * squares[..., row, column]
     out[..., SQUARES : SQUARES + S, :S], out[..., SQUARES + S :, :S] = squares[..., g, g], 2.0 * squares[..., x, g]
     return out
@@ -71,46 +63,55 @@ def _once(moments: Any, squares: Any) -> Any:
 def _fill(k, c, h, time_exponent, weight_exponent, nodes, weights, points, so_far, velocity, basis, pushed, state, out):
     """All tables of a kind; the arguments between ``so_far`` and the result are scratch."""
     for level in range(h.size):
+        known = 0  # panels of which ``basis`` is that of the only one
         for b in range(k.size):
             panels = 1 + int(time_exponent * (math.sqrt(k[b]) + c[b]) * h[level] / _PANEL)
-            for e in range(_ROWS):
-                state[e, 0] = 1.0 if e == _BEGIN else 0.0
-                state[e, 1] = 1.0 if e == _BEGIN + 1 else 0.0
+            state[:] = 0.0
+            state[0, _BEGIN], state[1, _BEGIN + 1] = 1.0, 1.0
             for panel in range(panels):
                 begin, width = panel / panels, 1.0 / panels
-                _push(
-                    k[b],
-                    c[b],
-                    h[level],
-                    time_exponent,
-                    weight_exponent,
-                    nodes,
-                    weights,
-                    points,
-                    begin,
-                    width,
-                    basis,
-                    pushed,
-                )
+                if panels > 1 or known != 1:
+                    _fill_basis(nodes, weights, weight_exponent, points, begin, width, basis)
+                    known = panels
+                _push(k[b], c[b], h[level], time_exponent, points, begin, width, basis, pushed)
                 _move(k[b], c[b], h[level], time_exponent, points, so_far, begin, width, pushed, state, velocity)
                 for q in range(points.shape[1]):
                     sigma = begin + width * points[0, q]
                     measure = points[1, q] * width * h[level] * time_exponent * sigma ** (time_exponent - 1.0)
-                    _add_products(measure, basis[q], velocity[q], out[level, b])
+                    _add_products(measure, basis[0, q], velocity[q], out[level, b])
+
+
+@inner
+def _fill_basis(nodes, weights, weight_exponent, points, begin, width, basis):
+    """Polynomials of plain forces at the points of a panel, and those of the stop that enters times its weight."""
+    for q in range(points.shape[1]):
+        sigma = begin + width * points[0, q]
+        weight = sigma**weight_exponent if weight_exponent > 0.0 else 0.0
+        for kind in range(2):
+            lagrange(nodes, weights[kind], sigma, basis[kind, q])
+        for j in range(S):
+            basis[1, q, j] *= weight
 
 
 @inner
 def _moved(k, c, x, p, v):
     """State of a block after the time x, or before if x < 0: det exp(A x) = e^{-cx} gives the inverse of α I + β A."""
-    alpha, beta = propagate(k, c, abs(x))
-    if x < 0.0:
-        grown = math.exp(-c * x)
-        alpha, beta = grown * (alpha - c * beta), -grown * beta
+    alpha, beta = _turned(k, c, x)
     return alpha * p + beta * v, alpha * v - beta * (k * p + c * v)
 
 
 @inner
-def _push(k, c, h, time_exponent, weight_exponent, nodes, weights, points, begin, width, basis, pushed):
+def _turned(k, c, x):
+    """α, β of that."""
+    alpha, beta = propagate(k, c, abs(x))
+    if x < 0.0:
+        grown = math.exp(-c * x)
+        return grown * (alpha - c * beta), -grown * beta
+    return alpha, beta
+
+
+@inner
+def _push(k, c, h, time_exponent, points, begin, width, basis, pushed):
     """Unit forces at the points of a panel, per σ, as (p, v) moved back to the panel's start."""
     start = h * begin**time_exponent
     for q in range(points.shape[1]):
@@ -118,14 +119,10 @@ def _push(k, c, h, time_exponent, weight_exponent, nodes, weights, points, begin
         p, v = _moved(
             k, c, start - h * sigma**time_exponent, 0.0, width * h * time_exponent * sigma ** (time_exponent - 1.0)
         )
-        lagrange(nodes, weights[1], sigma, basis[q])
-        weight = sigma**weight_exponent if weight_exponent > 0.0 else 0.0
-        for j in range(S):
-            force = basis[q, j] * weight
-            pushed[q, S + j, 0], pushed[q, S + j, 1] = force * p, force * v
-        lagrange(nodes, weights[0], sigma, basis[q])
-        for j in range(S):
-            pushed[q, j, 0], pushed[q, j, 1] = basis[q, j] * p, basis[q, j] * v
+        for kind in range(2):
+            for j in range(S):
+                pushed[q, 0, S * kind + j] = basis[kind, q, j] * p
+                pushed[q, 1, S * kind + j] = basis[kind, q, j] * v
 
 
 @inner
@@ -134,26 +131,35 @@ def _move(k, c, h, time_exponent, points, so_far, begin, width, pushed, state, v
     count, start = points.shape[1], h * begin**time_exponent
     for q in range(count + 1):
         end = begin + width * points[0, q] if q < count else begin + width
-        span = h * end**time_exponent - start
-        for e in range(_ROWS):
-            p, v = state[e, 0], state[e, 1]
-            for r in range(count if e < _BEGIN else 0):
-                share = so_far[q, r] if q < count else points[1, r]
-                p += share * pushed[r, e, 0]
-                v += share * pushed[r, e, 1]
-            p, v = _moved(k, c, span, p, v)
+        alpha, beta = _turned(k, c, h * end**time_exponent - start)
+        for first in range(0, _BEGIN, S):
+            p, v = load8(state[0], first), load8(state[1], first)
+            for r in range(count):
+                share = splat8(so_far[q, r])
+                p += share * load8(pushed[r, 0], first)
+                v += share * load8(pushed[r, 1], first)
+            moved = splat8(alpha - beta * c) * v - splat8(beta * k) * p
             if q < count:
-                velocity[q, e] = v
+                store8(velocity[q], first, moved)
             else:
-                state[e, 0], state[e, 1] = p, v
+                store8(state[0], first, splat8(alpha) * p + splat8(beta) * v)
+                store8(state[1], first, moved)
+        for e in range(_BEGIN, _ROWS):
+            p, v = state[0, e], state[1, e]
+            if q < count:
+                velocity[q, e] = alpha * v - beta * (k * p + c * v)
+            else:
+                state[0, e], state[1, e] = alpha * p + beta * v, alpha * v - beta * (k * p + c * v)
 
 
 @inner
 def _add_products(measure, basis, velocity, out):
-    """One point's part of all integrals."""
+    """One point's part of all integrals, ∫ v_e v_f dt for f up to the last row like e: the others are the same."""
     for e in range(_ROWS):
-        value = measure * velocity[e]
-        for i in range(S):
-            out[e, i] += value * basis[i]
-        for f in range(_ROWS):
-            out[e, S + f] += value * velocity[f]
+        value = splat8(measure * velocity[e])
+        store8(out[e], 0, load8(out[e], 0) + value * load8(basis, 0))
+        for first in range(0, min(S * (e // S + 1), _BEGIN), S):
+            store8(out[e], S + first, load8(out[e], S + first) + value * load8(velocity, first))
+    for e in range(_BEGIN, _ROWS):
+        for f in range(_BEGIN, e + 1):
+            out[e, S + f] += measure * velocity[e] * velocity[f]

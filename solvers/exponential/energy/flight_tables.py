@@ -26,10 +26,10 @@ from solvers.compiled.sums import padded
 from solvers.exponential.contact.nodes import S, gauss
 from solvers.exponential.energy.contact_sums import Steps, Sums, free_loss, tones_at_nodes
 from solvers.exponential.energy.contact_tables import contact_table
-from solvers.exponential.energy.quadratic_forms import Forms, carried, entries_of, forms_of, rows_of, taylor
+from solvers.exponential.energy.quadratic_forms import Forms, carried, entries_of, flow_of, forms_of, rows_of, taylor
 from solvers.exponential.flight import SERIES_TERMS
 from solvers.exponential.phi_functions import derivatives_of_ends, signal_responses
-from solvers.exponential.responses import propagate
+from solvers.exponential.responses import fill_propagators
 from solvers.exponential.tables import Tables
 
 _OCTAVE = 4  # flight steps of which each is twice as long as the last
@@ -123,24 +123,23 @@ def _flight_part(energy_tables: EnergyTables, problem: Problem, tables: Tables, 
     h = tables.flight_step[0] * 2.0 ** (-np.arange(levels) / _OCTAVE)
     signal = tables.signal[..., :n].reshape(*tables.signal.shape[:3], size)
     spacing = energy_tables.spacing
-    last, ends = _last(_doubled(problem, powers, *_halved(problem, spacing))), np.eye(powers.shape[-1])
-    for first in range(size, len(ends), 6):
-        ends[first : first + 6, first : first + 6] = derivatives_of_ends(spacing)
-    kept = np.append(np.arange(size, len(ends)), driver)
+    last, Y = _last(_doubled(problem, powers, *_halved(problem, spacing))), powers.shape[-1]
+    kept = np.append(np.arange(size, Y), driver)
     b = np.arange(0 if _coupled(tables) else int(tables.own_blocks))
 
     def read(forms: Forms) -> tuple[Any, Any, Any]:
         """What is kept of the forms of some steps: rows, those of the blocks' own damping, pairs of signals."""
-        rows = rows_of(forms, len(ends), kept)
-        pairs, rows = rows[:, :, : len(ends) - size, size:].copy(), 2.0 * rows[..., :size]
-        rows[:, :, len(ends) - size :][..., driver] *= 0.5
+        rows = rows_of(forms, Y, kept)
+        pairs, rows = rows[:, :, : Y - size, size:].copy(), 2.0 * rows[..., :size]
+        rows[:, :, Y - size :][..., driver] *= 0.5
         plain = np.zeros((len(rows), 3, padded(n)))
-        plain[..., b] = entries_of(forms, len(ends), n, b) * np.array([1.0, 2.0, 1.0])[:, None]
+        plain[..., b] = entries_of(forms, Y, n, b) * np.array([1.0, 2.0, 1.0])[:, None]
         return rows, plain, pairs
 
     groups = [read(forms) for forms in _doubled(problem, powers, h, _OCTAVE, tables.flight_propagator, signal)][::-1]
     steps = [np.concatenate(parts)[: len(tables.flight_step)] for parts in zip(*groups, strict=True)]
-    rows, plain, pairs = (np.concatenate(both) for both in zip(steps, read(carried(last, ends[None])), strict=True))
+    cell = read(carried(last, _ends(size, Y, spacing)))
+    rows, plain, pairs = (np.concatenate(both) for both in zip(steps, cell, strict=True))
     return energy_tables._replace(
         **{"closed": 1.0, "driver": driver.astype(np.int64), "plain": plain},
         **{"rows": _beside(rows.reshape(*rows.shape[:-1], 2, n)), "pairs": _beside(pairs[:, :, :, None])},
@@ -167,27 +166,37 @@ def _power_forms(problem: Problem, tables: Tables) -> Any:
     return forms
 
 
-def _generator(problem: Problem) -> Any:
-    """(Y, Y) B of y' = B y."""
+def _ends(size: int, Y: int, h: float) -> Forms:
+    """The flow from the signals' values and derivatives at both ends of a cell to those at its start."""
+    matrix = np.eye(Y)
+    for first in range(size, Y, 6):
+        matrix[first : first + 6, first : first + 6] = derivatives_of_ends(h)
+    rows, columns = np.nonzero(matrix)
+    return flow_of(rows, columns, matrix[rows, columns][None], Y)
+
+
+def _generator(problem: Problem) -> tuple[Any, Any, Any]:
+    """B of y' = B y: rows, columns and values of its entries."""
     n, size = len(problem.k), 2 * len(problem.k)
-    out, b = np.zeros((size + 6 * len(problem.table_dt),) * 2), np.arange(n)
-    out[b, n + b], out[n + b, b], out[n + b, n + b] = 1.0, -problem.k, -problem.c
+    b, state, shifts = np.arange(n), np.arange(size), np.arange(5)
+    parts = [(b, n + b, np.ones(n)), (n + b, b, -problem.k), (n + b, n + b, -problem.c)]
     for j, load in enumerate(problem.table_load):
         first = size + 6 * j
-        out[:size, first] = problem.load[load]
-        out[first + np.arange(5), first + np.arange(1, 6)] = 1.0
-    return out
+        parts += [(state, np.full(size, first), problem.load[load]), (first + shifts, first + shifts + 1, np.ones(5))]
+    rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return rows, columns, values
 
 
 def _brief_forms(problem: Problem, powers: Any, h: Any) -> Forms:
     """(len(h), 2, Y, Y) forms of steps of at most `_BRIEF`, by Gauss's rule on the Taylor series of Φ."""
-    generator, (points, weights) = _generator(problem), gauss(8)
-    flows = [taylor(generator, point * h, 12) for point in points]
-    start = forms_of(powers, len(h))
-    parts = (
-        carried(start, np.sqrt(weight * h)[:, None, None] * flow) for weight, flow in zip(weights, flows, strict=True)
-    )
-    return sum(parts, start=0.0 * start)
+    (rows, columns, values), (points, weights), Y = _generator(problem), gauss(8), powers.shape[-1]
+    start, all_rows, ones = forms_of(powers, len(h)), np.arange(Y), np.ones(Y)
+    total = 0.0 * start
+    for point, weight in zip(points, weights, strict=True):
+        begin = flow_of(all_rows, all_rows, np.sqrt(weight * h)[:, None] * ones, Y)
+        generator = flow_of(rows, columns, point * h[:, None] * values, Y)
+        total = total + carried(start, taylor(begin, generator, 12))
+    return total
 
 
 def _doubled(problem: Problem, powers: Any, h: Any, octave: int, propagator: Any, signal: Any) -> Iterator[Forms]:
@@ -213,8 +222,10 @@ def _doubled(problem: Problem, powers: Any, h: Any, octave: int, propagator: Any
 
 def _moves(problem: Problem, h: Any) -> tuple[Any, Any]:
     """Propagators and responses to signals for a few steps."""
-    moves = [[propagate(k, c, step) for k, c in zip(problem.k, problem.c, strict=True)] for step in h]
-    return np.array(moves).transpose(0, 2, 1), signal_responses(problem, np.ascontiguousarray(h))
+    steps, n = np.ascontiguousarray(h), len(problem.k)
+    moves = np.empty((len(steps), 2, n))
+    fill_propagators(problem.k, problem.c, (0, n), steps, moves)
+    return moves, signal_responses(problem, steps)
 
 
 def _halved(problem: Problem, h: float) -> tuple[Any, int, Any, Any]:
@@ -230,23 +241,26 @@ def _last(forms: Iterator[Forms]) -> Forms:
     return last
 
 
-def _flow(problem: Problem, h: Any, propagator: Any, signal: Any) -> Any:
-    """(len(h), Y, Y) Φ(h)."""
-    n, b = len(problem.k), np.arange(len(problem.k))
-    size = 2 * n
-    out = np.zeros((len(h), *(size + 6 * len(problem.table_dt),) * 2))
+def _flow(problem: Problem, h: Any, propagator: Any, signal: Any) -> Forms:
+    """Φ(h)."""
+    n, b, state = len(problem.k), np.arange(len(problem.k)), np.arange(2 * len(problem.k))
     alpha, beta = propagator[:, 0, :n], propagator[:, 1, :n]
-    out[:, b, b], out[:, b, n + b] = alpha, beta
-    out[:, n + b, b], out[:, n + b, n + b] = -problem.k * beta, alpha - problem.c * beta
+    parts: list[Any] = [
+        (b, b, alpha),
+        (b, n + b, beta),
+        (n + b, b, -problem.k * beta),
+        (n + b, n + b, alpha - problem.c * beta),
+    ]
     for j, load in enumerate(problem.table_load):
-        first = size + 6 * j
-        out[:, :size, first : first + 6] = signal[:, load].transpose(0, 2, 1)
-        power = np.ones_like(h)
+        first, power = 2 * n + 6 * j, np.ones_like(h)
         for apart in range(6):
-            rows = first + np.arange(6 - apart)
-            out[:, rows, rows + apart] = power[:, None]
+            parts.append((state, np.full(2 * n, first + apart), signal[:, load, apart]))
+            own = first + np.arange(6 - apart)
+            parts.append((own, own + apart, np.repeat(power[:, None], len(own), axis=1)))
             power = power * h / (apart + 1.0)
-    return out
+    rows, columns, values = zip(*parts, strict=True)
+    places = np.concatenate(rows), np.concatenate(columns)
+    return flow_of(*places, np.concatenate(values, axis=1), 2 * n + 6 * len(problem.table_dt))
 
 
 # --- contact

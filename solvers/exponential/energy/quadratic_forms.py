@@ -23,19 +23,28 @@ def forms_of(both: Any, count: int) -> Forms:
     return csr_array(block_diag([csr_array(one) for one in both] * count, format="csr"))
 
 
-def carried(forms: Forms, flow: Any) -> Forms:
-    """ΦᵀMΦ, with Φ (l, Y, Y).
+def flow_of(rows: Any, columns: Any, values: Any, size: int) -> Forms:
+    """Φ of l steps, (l, Y, Y) or sparse as the forms are, from its entries: their places, and values (l, entries)."""
+    if size <= MOST_DENSE:
+        out = np.zeros((len(values), size, size))
+        out[:, rows, columns] = values
+        return out
+    first = size * np.arange(2 * len(values))[:, None]
+    places = (first + rows).ravel(), (first + columns).ravel()
+    return csr_array((np.repeat(values, 2, axis=0).ravel(), places), shape=(2 * len(values) * size,) * 2)
+
+
+def carried(forms: Forms, flow: Forms) -> Forms:
+    """ΦᵀMΦ.
 
     Examples
     --------
-    >>> carried(np.ones((1, 2, 1, 1)), np.full((1, 1, 1), 3.0)).ravel().tolist()
+    >>> carried(np.ones((1, 2, 1, 1)), flow_of([0], [0], np.array([[3.0]]), 1)).ravel().tolist()
     [9.0, 9.0]
     """
     if isinstance(forms, np.ndarray):
         return flow[:, None].transpose(0, 1, 3, 2) @ forms @ flow[:, None]
-    each = [csr_array(one) for one in flow]
-    moves = csr_array(block_diag([one for one in each for _ in range(2)], format="csr"))
-    return csr_array(moves.T @ forms @ moves)
+    return csr_array(flow.T @ forms @ flow)
 
 
 def rows_of(forms: Forms, size: int, chosen: Any) -> Any:
@@ -59,22 +68,10 @@ def entries_of(forms: Forms, size: int, n: int, b: Any) -> Any:
     return np.stack((main[:, b], beside[:, b], main[:, n + b]), axis=1)
 
 
-def taylor(generator: Any, h: Any, terms: int) -> Any:
-    """(l, Y, Y) exp(B h) by its series, of B (Y, Y) and brief steps h (l,)."""
-    if len(generator) > MOST_DENSE:
-        return np.stack([_sparse_taylor(csr_array(generator), step, terms) for step in h])
-    term = np.broadcast_to(np.eye(len(generator)), (len(h), *generator.shape))
-    flow = term.copy()
+def taylor(begin: Forms, generator: Forms, terms: int) -> Forms:
+    """A exp(B h) by its series, of A and B h as flows."""
+    flow = term = begin
     for i in range(1, terms):
-        term = (h / i)[:, None, None] * (term @ generator)
-        flow += term
-    return flow
-
-
-def _sparse_taylor(generator: Any, h: float, terms: int) -> Any:
-    """(Y, Y) the same of one step, of a sparse B."""
-    term = flow = csr_array(np.eye(generator.shape[0]))
-    for i in range(1, terms):
-        term = (h / i) * (term @ generator)
+        term = (term @ generator) / i
         flow = flow + term
-    return flow.toarray()
+    return flow
