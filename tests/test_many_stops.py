@@ -121,6 +121,23 @@ def size_of(stops):
     return sum(array.nbytes for array in tables if isinstance(array, np.ndarray))
 
 
+@pytest.mark.parametrize("springs", [6, 24])  # by pairs of rows, and through the blocks
+def test_many_springs_that_always_act_are_part_of_the_structure(springs):
+    number, rng = np.arange(1, MODES + 1), np.random.default_rng(4)
+    plain = tube(0)
+    rows, stiffness = np.sin(np.pi * number * rng.random((springs, 1))), rng.uniform(20.0, 60.0, springs)
+    contacts = [Contact(row, KelvinVoigt(k, 0.02), always=True) for row, k in zip(rows, stiffness, strict=True)]
+    whole = System(plain.M, plain.C + 0.02 * rows.T @ rows, plain.K + (rows.T * stiffness) @ rows, loads=plain.loads)
+    start = 1.0 / number**3
+    found, wanted = (
+        integrate(system, 0.01 * start, 0.3 * start, 0.3, 0.01, Exponential(1e-11))
+        for system in (System(plain.M, plain.C, plain.K, contacts, plain.loads), whole)
+    )
+    assert np.abs(found.q - wanted.q).max() < 1e-10 * np.abs(wanted.q).max()
+    assert np.abs(found.q_dot - wanted.q_dot).max() < 1e-10 * np.abs(wanted.q_dot).max()
+    assert np.abs(found.energy.residual).max() < 1e-11 * np.abs(found.energy.input).max()
+
+
 def test_memory_grows_linearly_with_the_stops():
     """But for the matrix of mobilities, eight bytes for each pair."""
     sizes = np.array([size_of(stops) for stops in (20, 40, 60)])

@@ -321,8 +321,8 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
         if rubs(problem, s):
             calls += _add_rubbing(problem, s, t, segment[s], entry_rate[s], x, rate, batch)
         elif segment[s] > 0:
-            delta_dot = indentation_rate(problem, s, x)
-            delta = off_knots(problem, s, segment[s], indentation(problem, s, x))
+            delta, delta_dot = indentation_and_rate(problem, s, x)
+            delta = off_knots(problem, s, segment[s], delta)
             force = force_at(problem, s, delta, delta_dot, entry_rate[s], batch)
             add_push(problem, s, force, x, rate)
             rate[size + 2 + 2 * s] = force * delta_dot
@@ -506,6 +506,15 @@ def indentation_rate(problem, s, x):
     if is_circle(problem, s):
         return radial_motion(problem, s, x)[1]
     return dot(problem.read_rate[row_of(problem, s)], x, 2 * problem.k.size)
+
+
+@inlined
+def indentation_and_rate(problem, s, x):
+    """Both: of a circle for the cost of one."""
+    if is_circle(problem, s):
+        return radial_motion(problem, s, x)
+    row, size = row_of(problem, s), 2 * problem.k.size
+    return dot(problem.read[row], x, size) - problem.gap[row], dot(problem.read_rate[row], x, size)
 
 
 @part(RADIAL_MOTION, types.UniTuple(REAL, 2), types.int64, VECTOR)

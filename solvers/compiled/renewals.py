@@ -12,8 +12,7 @@ from solvers.compiled.kernels import (
     call_force,
     call_renewal,
     force_at,
-    indentation,
-    indentation_rate,
+    indentation_and_rate,
     inlined,
     inner,
     rubs,
@@ -44,8 +43,7 @@ def margins(problem, state, s, n, delta, rate, out):
 @inner
 def margins_in(problem, state, s, x, batch, out):
     """The same in one state; returns δ and δ̇."""
-    batch[0] = indentation(problem, s, x)
-    batch[1] = indentation_rate(problem, s, x)
+    batch[0], batch[1] = indentation_and_rate(problem, s, x)
     margins(problem, state, s, 1, batch[0:1], batch[1:2], out)
     return batch[0], batch[1]
 

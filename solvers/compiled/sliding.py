@@ -25,6 +25,7 @@ from solvers.compiled.kernels import (
     delta_of,
     force_at,
     indentation,
+    indentation_and_rate,
     indentation_rate,
     inlined,
     inner,
@@ -137,7 +138,7 @@ def slider_force(problem, s, segment, entry_rate, t, x):
     """F_t of a stop with friction in a state, 0 while it is open."""
     if segment == 0:
         return 0.0
-    normal = normal_force(problem, s, segment, entry_rate, indentation(problem, s, x), indentation_rate(problem, s, x))
+    normal = normal_force(problem, s, segment, entry_rate, *indentation_and_rate(problem, s, x))
     return friction_force(radius_of(problem, s), slider_of(problem, s), slide_of(problem, s, t, x)[0], normal)
 
 

@@ -15,7 +15,7 @@ from solvers.compiled.kernels import (
     abs_dot,
     angle_of,
     element_of,
-    indentation,
+    indentation_and_rate,
     indentation_rate,
     inlined,
     inner,
@@ -133,7 +133,7 @@ def open_contact(problem, state, s, t, delta_dot):
 def begin_contacts(problem, state):
     """Find the segment of every stop at the start, on a knot that into which it moves, and begin contacts under way."""
     for s in range(problem.law.size):
-        delta, rate = indentation(problem, s, state.x), indentation_rate(problem, s, state.x)
+        delta, rate = indentation_and_rate(problem, s, state.x)
         segment, near = 0, surface_tolerance(problem, s, state.x)
         while delta > problem.knots[s, segment] + near:
             segment += 1
@@ -264,7 +264,7 @@ def switch_on_surface(problem, state, locates):
 @inlined
 def _way_out(problem, state, s, locates):
     """Direction in which a stop on an end of its segment moves out of it, or 0."""
-    delta, delta_dot = indentation(problem, s, state.x), indentation_rate(problem, s, state.x)
+    delta, delta_dot = indentation_and_rate(problem, s, state.x)
     tolerance, segment = surface_tolerance(problem, s, state.x) if locates else 0.0, state.segment[s]
     if delta >= problem.knots[s, segment] - tolerance and delta_dot > 0.0:
         return 1

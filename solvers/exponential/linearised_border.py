@@ -16,8 +16,7 @@ from solvers.compiled.kernels import (
     call_renewal_gradient,
     copy,
     force_at,
-    indentation,
-    indentation_rate,
+    indentation_and_rate,
     inner,
     merged,
     rhs,
@@ -99,7 +98,7 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
         return
     t, most, width = past.now[T], problem.latched.shape[1], problem.parameters.shape[1]
     stops = problem.law.size
-    delta, rate = indentation(problem, s, past.x), indentation_rate(problem, s, past.x)
+    delta, rate = indentation_and_rate(problem, s, past.x)
     rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
     acceleration = acceleration_of(problem, s, past.x, derivatives.rate[0])
     first = most * (2 + most) + width

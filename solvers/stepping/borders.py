@@ -17,8 +17,7 @@ from solvers.compiled.kernels import (
     acceleration_of,
     copy,
     dot,
-    indentation,
-    indentation_rate,
+    indentation_and_rate,
     inner,
     kernel,
     rubs,
@@ -80,7 +79,7 @@ def _present(problem, state, space, s, t, x, rate_of_x):
     if rubs(problem, s):
         _present_of_slider(problem, state, space, s, t, x, rate_of_x)
         return space.point[0, 0], space.point[0, 1]
-    delta, rate = indentation(problem, s, x), indentation_rate(problem, s, x)
+    delta, rate = indentation_and_rate(problem, s, x)
     scale, count = space.scale[s], problem.border_count[s]
     scale[0] = max(scale[0], 4.0 * surface_tolerance(problem, s, x))
     scale[1] = max(scale[1], rate_tolerance(problem, s, x))

@@ -18,7 +18,7 @@ from solvers.compiled.kernels import (
     copy,
     dot,
     force_at,
-    indentation,
+    indentation_and_rate,
     indentation_rate,
     inlined,
     inner,
@@ -109,7 +109,7 @@ def end_rubbing(problem, ahead, behind, derivatives, variation, s):
 def _place_of_slider(problem, s, entry_rate, segment, t, x):
     """ξ - F_t/k_t."""
     own, way = slider_of(problem, s), slide_of(problem, s, t, x)[0]
-    normal = normal_force(problem, s, segment, entry_rate, indentation(problem, s, x), indentation_rate(problem, s, x))
+    normal = normal_force(problem, s, segment, entry_rate, *indentation_and_rate(problem, s, x))
     return way - friction_force(radius_of(problem, s), own, way, normal) / own[STIFFNESS]
 
 
@@ -120,7 +120,7 @@ def _by_law(problem, ahead, behind, past, variation, s):
         return 0.0, 0.0
     entry, segment, t, x, width = past.entry_rate[s], past.segment[s], past.now[T], past.x, 2.0 * variation.law_step
     place = _place_of_slider(ahead, s, entry, segment, t, x) - _place_of_slider(behind, s, entry, segment, t, x)
-    delta, rate = indentation(problem, s, x), indentation_rate(problem, s, x)
+    delta, rate = indentation_and_rate(problem, s, x)
     pressed = normal_force(ahead, s, segment, entry, delta, rate)
     return (pressed - normal_force(behind, s, segment, entry, delta, rate)) / width, place / width
 
@@ -134,7 +134,7 @@ def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
     t, own, entry = past.now[T], slider_of(problem, s), past.entry_rate[s]
     rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
     was, share, by_law = own[CODE], share_of(own) / own[STIFFNESS], _by_law(problem, ahead, behind, past, variation, s)
-    delta, rate = indentation(problem, s, past.x), indentation_rate(problem, s, past.x)
+    delta, rate = indentation_and_rate(problem, s, past.x)
     acceleration = acceleration_of(problem, s, past.x, derivatives.rate[0])
     normal_force(problem, s, past.segment[s], entry, delta, rate)
     by_delta, by_rate, by_entry = slopes_of(problem, s, entry)

@@ -31,6 +31,7 @@ from solvers.compiled.kernels import (
     copy,
     element_of,
     indentation,
+    indentation_and_rate,
     indentation_rate,
     inlined,
     inner,
@@ -55,7 +56,7 @@ from solvers.exponential.contact.node_response import (
     motion_of,
     node_forces,
     own_accelerance,
-    respond,
+    respond_all,
     ripple_of,
     unresolved_part,
     unresolved_signal,
@@ -81,9 +82,7 @@ def _alone(problem, tables, state):
 def _iterate(problem, tables, state, scratch, node_set, level):
     """One iteration for the forces of all stops in contact; Σ change² and Σ force² in units of their tolerance."""
     change, largest = 0.0, 0.0
-    for r in range(problem.gap.size):
-        if acts(problem, state, r):
-            respond(problem, tables, state, scratch, node_set, level, r)
+    respond_all(problem, tables, state, scratch, node_set, level)
     for s in range(problem.law.size):
         if state.segment[s] > 0:
             node_forces(problem, tables, state, scratch, s)
@@ -259,7 +258,7 @@ def _hidden_kink(problem, state, scratch, s, largest):
     saturates within that time, as hysteresis of a knee that is small beside the motion does after a border.
     """
     delta, rate = scratch.clipped[0:2], scratch.trial[0:2]
-    delta[0], rate[0] = indentation(problem, s, scratch.x_new), indentation_rate(problem, s, scratch.x_new)
+    delta[0], rate[0] = indentation_and_rate(problem, s, scratch.x_new)
     delta[1] = off_knots(problem, s, state.segment[s], indentation(problem, s, state.x))
     rate[1] = indentation_rate(problem, s, state.x)
     contact_forces(problem, s, delta, rate, state.entry_rate[s], scratch.trial[2:4])

@@ -142,8 +142,8 @@ def _watch(problem, tables, state, scratch, node_set, level, s, carried):
     """Motion at the nodes of a stop out of contact; returns whether the motion of the blocks has been computed."""
     through = uses_blocks(tables)
     if through and not carried:
-        add_block_motion(problem, tables, state, scratch, node_set, level, CONTINUING)
-        add_block_motion(problem, tables, state, scratch, node_set, level, ENTERING)
+        add_block_motion(problem, tables, state, scratch, node_set, level, CONTINUING, scratch.block_motion)
+        add_block_motion(problem, tables, state, scratch, node_set, level, ENTERING, scratch.block_motion)
     for r in range(row_of(problem, s), row_of(problem, s + 1)):
         if through:
             motion_at_nodes(problem, scratch, r, problem.gap[r], scratch.motion[r])

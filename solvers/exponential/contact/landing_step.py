@@ -18,6 +18,7 @@ from solvers.compiled.kernels import (
     copy,
     delta_of,
     indentation,
+    indentation_and_rate,
     indentation_rate,
     inner,
     law_forces,
@@ -85,8 +86,7 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
                 rows = rows_at(problem, s, w)
                 delta, rate = delta_of(radius_of(problem, s), rows)
             else:
-                rate = indentation_rate(problem, s, w)
-                delta = indentation(problem, s, w)
+                delta, rate = indentation_and_rate(problem, s, w)
             force = _force(problem, tables, s, segment[s], delta, rate, side[s], entry_rate[s], batch)
             calls += 1
             if rubs(problem, s):
@@ -97,16 +97,12 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
             no_friction(problem, s, out)
         out[size + 2 + 2 * s] = force * rate
         out[size + 3 + 2 * s] = force
-    delta_dot = indentation_rate(problem, stop, w)
     factor = span
-    if variable == INDENTATION:
-        factor = span / delta_dot
-    elif variable == ROOT:
+    if variable in (ROOT, SINCE):
         kappa = tables.time_exponent[1 + stop]
-        factor = span * kappa * raised(w[t + 1], kappa - 1.0) / delta_dot
-    elif variable == SINCE:
-        kappa = tables.time_exponent[1 + stop]
-        factor = span * kappa * raised(w[t + 1], kappa - 1.0)
+        factor = factor * kappa * raised(w[t + 1], kappa - 1.0)
+    if variable in (INDENTATION, ROOT):
+        factor /= indentation_rate(problem, stop, w)
     for e in range(t):
         out[e] *= factor
     out[t] = factor

@@ -3,7 +3,8 @@
 Up to `block_tables.FEW` stops there are tables of the response of each stop to each force. Their size, and the part a
 step must load, grow with the square of the number of stops. With more stops ``scratch.block_motion`` holds p and v of
 all blocks at the nodes, without forces or with all of them. The response of one stop to the force of another is summed
-up when both are in contact for the first time, and kept in a pool of bounded size.
+up when both are in contact for the first time, and kept in a pool of bounded size; with many in contact at once the
+blocks take less time than all pairs.
 """
 
 from __future__ import annotations
@@ -96,17 +97,12 @@ def _sum_pushes(problem, tables, state, scratch, force, node_set, group):
     return found
 
 
-@part(PUSHED_BLOCKS, types.void, *[types.int64] * 3)
-def add_block_motion(problem, tables, state, scratch, node_set, level, group):
-    """Add the response to the present forces of one group, or to the signals, to the blocks at the nodes."""
+@part(PUSHED_BLOCKS, types.void, *[types.int64] * 3, MATRIX)
+def add_block_motion(problem, tables, state, scratch, node_set, level, group, motion):
+    """Add the response to the present forces of one group, or to the signals, to blocks' motion at the nodes."""
     if not _sum_pushes(problem, tables, state, scratch, scratch.force, node_set, group):
         return
-    n, own, block_motion, block_force = (
-        problem.k.size,
-        tables.block_response.shape[3] // 2,
-        scratch.block_motion,
-        scratch.block_force,
-    )
+    n, own, block_force = problem.k.size, tables.block_response.shape[3] // 2, scratch.block_force
     weighting = tables.entering[node_set] if group == ENTERING else tables.kind[node_set]
     for j in range(S):
         rows = tables.block_response[weighting, level, j]
@@ -114,8 +110,8 @@ def add_block_motion(problem, tables, state, scratch, node_set, level, group):
             p, v = block_force[b, j], block_force[own + b, j]
             alpha, beta = load8(rows[b], 0), load8(rows[own + b], 0)
             turned = splat8(problem.k[b] * p + problem.c[b] * v)
-            store8(block_motion[b], 0, load8(block_motion[b], 0) + alpha * splat8(p) + beta * splat8(v))
-            store8(block_motion[n + b], 0, load8(block_motion[n + b], 0) + alpha * splat8(v) - beta * turned)
+            store8(motion[b], 0, load8(motion[b], 0) + alpha * splat8(p) + beta * splat8(v))
+            store8(motion[n + b], 0, load8(motion[n + b], 0) + alpha * splat8(v) - beta * turned)
 
 
 @part(PUSHED_END, types.void, MATRIX, types.int64, types.int64, VECTOR)
@@ -132,6 +128,31 @@ def add_end_response(problem, tables, state, scratch, force, node_set, level, x)
             alpha, beta = load8(ending[0, b], 0), load8(ending[1, b], 0)
             x[b] += sum8(alpha * p + beta * v)
             x[n + b] += sum8(alpha * v - beta * (splat8(problem.k[b]) * p + splat8(problem.c[b]) * v))
+
+
+@inlined
+def prefers_blocks(problem, tables, state):
+    """Whether sums over the blocks take less time than sums over all pairs of rows in contact."""
+    n, active = problem.k.size, 0
+    if not uses_blocks(tables):
+        return False
+    for r in range(problem.gap.size):
+        active += 1 if acts(problem, state, r) else 0
+    return S * active * active > 3 * n * (active + S)
+
+
+@inner
+def respond_through_blocks(problem, tables, state, scratch, node_set, level):
+    """Displacement and rate of all rows in contact at the nodes under the present forces, into ``scratch.motion``."""
+    size, moved = 2 * problem.k.size, scratch.along
+    for e in range(size):
+        store8(moved[e], 0, splat8(0.0))
+    add_block_motion(problem, tables, state, scratch, node_set, level, CONTINUING, moved)
+    add_block_motion(problem, tables, state, scratch, node_set, level, ENTERING, moved)
+    for r in range(problem.gap.size):
+        if acts(problem, state, r):
+            combine(moved, problem.read[r], size, scratch.free[r, 0], scratch.motion[r, 0])
+            combine(moved, problem.read_rate[r], size, scratch.free[r, 1], scratch.motion[r, 1])
 
 
 @part(STOP_AT_NODES, types.void, types.int64, REAL, MATRIX)

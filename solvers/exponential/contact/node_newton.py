@@ -11,7 +11,7 @@ from solvers.compiled.state import CALLS, acts, rate_tolerance
 from solvers.exponential.circles.contact import linearise_circle
 from solvers.exponential.circles.friction import linearise_rubbing
 from solvers.exponential.contact.many_stops import pair_response
-from solvers.exponential.contact.node_response import motion_of, node_forces, respond
+from solvers.exponential.contact.node_response import motion_of, node_forces, respond_all
 from solvers.exponential.contact.nodes import S
 
 MOST_ITERATIONS = 16
@@ -103,11 +103,10 @@ def newton(problem, tables, state, scratch, node_set, level):
     """Solve for the forces by Newton's method, where the fixed-point iteration diverges; whether it converged."""
     for _ in range(MOST_ITERATIONS):
         place = 0
+        respond_all(problem, tables, state, scratch, node_set, level)
         for s in range(problem.law.size):
             if state.segment[s] == 0:
                 continue
-            for r in range(row_of(problem, s), row_of(problem, s + 1)):
-                respond(problem, tables, state, scratch, node_set, level, r)
             node_forces(problem, tables, state, scratch, s)
             for r in range(row_of(problem, s), row_of(problem, s + 1)):
                 for i in range(S):

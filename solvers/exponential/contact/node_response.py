@@ -30,6 +30,8 @@ from solvers.exponential.contact.many_stops import (
     free_block_motion,
     motion_at_nodes,
     pair_response,
+    prefers_blocks,
+    respond_through_blocks,
     uses_blocks,
 )
 from solvers.exponential.contact.nodes import S
@@ -248,7 +250,7 @@ def free_response(problem, tables, state, scratch, node_set, level):
     if through:
         free_block_motion(problem, tables, scratch, node_set, level, state.x)
         if problem.table_dt.size:
-            add_block_motion(problem, tables, state, scratch, node_set, level, SIGNALS)
+            add_block_motion(problem, tables, state, scratch, node_set, level, SIGNALS, scratch.block_motion)
     for r in range(rows):
         free = scratch.free[r]
         if through:
@@ -271,6 +273,17 @@ def respond(problem, tables, state, scratch, node_set, level, r):
         if acts(problem, state, u):
             combine(pair_response(problem, tables, scratch, node_set, level, r, u), scratch.force[u], S, start, motion)
             start = motion
+
+
+@inner
+def respond_all(problem, tables, state, scratch, node_set, level):
+    """The same of all rows in contact."""
+    if prefers_blocks(problem, tables, state):
+        respond_through_blocks(problem, tables, state, scratch, node_set, level)
+        return
+    for r in range(problem.gap.size):
+        if acts(problem, state, r):
+            respond(problem, tables, state, scratch, node_set, level, r)
 
 
 @inlined

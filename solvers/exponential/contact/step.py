@@ -17,6 +17,7 @@ from solvers.compiled.kernels import (
     contact_forces,
     copy,
     indentation,
+    indentation_and_rate,
     indentation_rate,
     inlined,
     is_circle,
@@ -101,8 +102,7 @@ def _nearest_surface(problem, state, scratch):
     """
     near, stop, direction = np.inf, -1, 0
     for s in range(problem.law.size):
-        delta = indentation(problem, s, state.x)
-        rate = indentation_rate(problem, s, state.x)
+        delta, rate = indentation_and_rate(problem, s, state.x)
         scratch.start_motion[s, 0], scratch.start_motion[s, 1] = delta, rate
         scratch.reference_speed[s] = max(scratch.reference_speed[s], abs(rate))
         segment = state.segment[s]
