@@ -137,7 +137,7 @@ def _fill_weightings(tables: Blocks, problem: Problem, contact_h: Any, node_sets
             *(problem.k, problem.c, problem.read, problem.read_rate, contact_h),
             *(node_sets.time_exponent[f], node_sets.weight_exponent[f] * weighted, node_sets.nodes[f]),
             *(node_sets.lagrange[f, weighted], gauss(12), inputs, response[i], ending[i], tables.forced[i]),
-            *(tables.end_response[i], np.zeros((S + 1, S, 2)), np.zeros(max(2 * own, S))),
+            *(tables.end_response[i], np.zeros((S + 1, S, 2)), np.zeros((S + 2, 12, S + 1)), np.zeros(2 * own)),
         )
 
 

@@ -44,8 +44,28 @@ def fill_propagators(k, c, blocks, h, out):
 
 
 @inner
+def _fill_basis(time_exponent, weight_exponent, nodes, weights, gauss, begin, width, out):
+    """At the points of a panel dτ/h w(σ) L_j(σ)/w(σ_j) of every node, and behind them τ/h = σ^κ."""
+    for g in range(gauss.shape[1]):
+        sigma, measure = begin + width * gauss[0, g], width * gauss[1, g]
+        out[g, S] = sigma
+        if time_exponent > 1.0:
+            pace = sigma ** (time_exponent - 1.0)
+            out[g, S] = sigma * pace
+            measure *= time_exponent * pace
+        if weight_exponent > 0.0:
+            measure *= sigma**weight_exponent
+        lagrange(nodes, weights, sigma, out[g])
+        for j in range(S):
+            out[g, j] *= measure
+
+
+@inner
 def _block_response(k, c, h, time_exponent, weight_exponent, nodes, weights, gauss, out, basis):
-    """out[i, j] = (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ; i = S is the end of the step."""
+    """out[i, j] = (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ; i = S is the end of the step.
+
+    ``basis`` holds the polynomials between all nodes, for where one panel is enough, and has room for those of another.
+    """
     count, rate = nodes.size, math.sqrt(k) + c
     for i in range(count + 1):
         a = nodes[i - 1] if i > 0 else 0.0
@@ -57,23 +77,17 @@ def _block_response(k, c, h, time_exponent, weight_exponent, nodes, weights, gau
             beta = out[i - 1, j, 1] if i > 0 else 0.0
             out[i, j, 0] = ea * alpha - k * eb * beta
             out[i, j, 1] = ea * beta + eb * alpha - c * eb * beta
-        panels = 1 + int(rate * (tb - ta) / _PANEL)
+        panels, known = 1 + int(rate * (tb - ta) / _PANEL), i
         for panel in range(panels):
-            left = a + (b - a) * panel / panels
-            width = (b - a) / panels
+            if panels > 1:
+                known, width = count + 1, (b - a) / panels
+                begin = a + (b - a) * panel / panels
+                _fill_basis(time_exponent, weight_exponent, nodes, weights, gauss, begin, width, basis[known])
             for g in range(gauss.shape[1]):
-                sigma = left + width * gauss[0, g]
-                t, measure = h * sigma, h * width * gauss[1, g]
-                if time_exponent > 1.0:
-                    pace = sigma ** (time_exponent - 1.0)
-                    t, measure = t * pace, measure * time_exponent * pace
-                if weight_exponent > 0.0:
-                    measure *= sigma**weight_exponent
-                alpha, beta = propagate(k, c, tb - t)
-                lagrange(nodes, weights, sigma, basis)
+                alpha, beta = propagate(k, c, tb - h * basis[known, g, S])
                 for j in range(count):
-                    out[i, j, 0] += alpha * measure * basis[j]
-                    out[i, j, 1] += beta * measure * basis[j]
+                    out[i, j, 0] += alpha * (h * basis[known, g, j])
+                    out[i, j, 1] += beta * (h * basis[known, g, j])
 
 
 @inner
@@ -135,6 +149,7 @@ def fill_weighting(
     forced,
     end_response,
     work,
+    basis,
     sums,
 ):
     """Responses of one weighting on all step lengths: of the blocks and, for a few stops, of all pairs.
@@ -142,9 +157,12 @@ def fill_weighting(
     For a few stops (``forced`` is not empty) the blocks' responses are scratch for one length.
     """
     pairs = forced.shape[0] > 0
+    for i in range(S + 1):
+        begin, end = nodes[i - 1] if i > 0 else 0.0, nodes[i] if i < S else 1.0
+        _fill_basis(time_exponent, weight_exponent, nodes, weights, gauss, begin, end - begin, basis[i])
     for level in range(h.size):
         rows, ends = response[0 if pairs else level], ending[0 if pairs else level]
-        _fill_level(k, c, h[level], time_exponent, weight_exponent, nodes, weights, gauss, rows, ends, work, sums)
+        _fill_level(k, c, h[level], time_exponent, weight_exponent, nodes, weights, gauss, rows, ends, work, basis)
         for u in range(inputs.shape[0] if pairs else 0):
             _fill_end_response(k, c, inputs[u], ends, end_response[level, u])
             for s in range(read.shape[0]):

@@ -38,35 +38,25 @@ def contact_table(
     apart = 1.0 / (nodes[:, None] - nodes + np.eye(len(nodes))).prod(axis=1)
     weights = np.array([apart, apart * nodes ** (-weight_exponent)])
     points = gauss(_POINTS)
-    out = np.zeros((len(h), len(k), _ROWS, _WIDE))
-    shapes = (_POINTS, _ROWS), (2, _POINTS, S), (_POINTS, 2, _BEGIN), (2, _ROWS)
+    out = np.zeros((len(h), len(k), SQUARES + S + 2, 2 * S))
+    shapes = (_POINTS, _ROWS), (2, _POINTS, S), (_POINTS, 2, _BEGIN), (2, _ROWS), (_ROWS, _WIDE)
     scratch = [np.zeros(shape) for shape in shapes]
     structure = k.copy(), c.copy(), h.copy()
     kind = time_exponent, weight_exponent, nodes.copy(), weights
     _fill(*structure, *kind, points, np.vstack((so_far(points[0]), points[1])), *scratch, out)
-    return _once(out[..., :S], out[..., S:])
-
-
-def _once(moments: Any, squares: Any) -> Any:
-    """The table from ∫ L_i v dt and ∫ v v_row dt of all rows, of which those up to the row's own block are known."""
-    f, g, x, (p, v) = slice(S), slice(S, _BEGIN), slice(_BEGIN, _ROWS), (_BEGIN, _BEGIN + 1)
-    out = np.zeros((*moments.shape[:2], SQUARES + S + 2, 2 * S))
-    for rows, of, times in (slice(S), f, 1.0), (slice(S, BEGAN), x, 2.0), (slice(ENTERING, SQUARES), g, 2.0):
-        out[..., rows, :S], out[..., rows, S:] = moments[..., of, :], times * squares[..., of, f]
-    for i, (row, column, times) in enumerate(((p, p, 1.0), (v, p, 2.0), (v, v, 1.0))):
-        out[..., BEGAN, i] = times * squares[..., row, column]
-    out[..., SQUARES : SQUARES + S, :S], out[..., SQUARES + S :, :S] = squares[..., g, g], 2.0 * squares[..., x, g]
     return out
 
 
 @kernel
-def _fill(k, c, h, time_exponent, weight_exponent, nodes, weights, points, so_far, velocity, basis, pushed, state, out):
+def _fill(
+    k, c, h, time_exponent, weight_exponent, nodes, weights, points, so_far, velocity, basis, pushed, state, sums, out
+):
     """All tables of a kind; the arguments between ``so_far`` and the result are scratch."""
     for level in range(h.size):
         known = 0  # panels of which ``basis`` is that of the only one
         for b in range(k.size):
             panels = 1 + int(time_exponent * (math.sqrt(k[b]) + c[b]) * h[level] / _PANEL)
-            state[:] = 0.0
+            state[:], sums[:] = 0.0, 0.0
             state[0, _BEGIN], state[1, _BEGIN + 1] = 1.0, 1.0
             for panel in range(panels):
                 begin, width = panel / panels, 1.0 / panels
@@ -78,7 +68,23 @@ def _fill(k, c, h, time_exponent, weight_exponent, nodes, weights, points, so_fa
                 for q in range(points.shape[1]):
                     sigma = begin + width * points[0, q]
                     measure = points[1, q] * width * h[level] * time_exponent * sigma ** (time_exponent - 1.0)
-                    _add_products(measure, basis[0, q], velocity[q], out[level, b])
+                    _add_products(measure, basis[0, q], velocity[q], sums)
+            _write(sums, out[level, b])
+
+
+@inner
+def _write(sums, out):
+    """The table from ∫ L_i v dt and ∫ v_e v_f dt, each form once."""
+    x = _BEGIN
+    for i in range(S):
+        for j in range(S):
+            out[j, i], out[j, S + i] = sums[j, i], sums[j, S + i]
+            out[ENTERING + j, i], out[ENTERING + j, S + i] = sums[S + j, i], 2.0 * sums[S + j, S + i]
+            out[SQUARES + j, i] = sums[S + j, 2 * S + i]
+        for j in range(2):
+            out[S + j, i], out[S + j, S + i] = sums[x + j, i], 2.0 * sums[x + j, S + i]
+            out[SQUARES + S + j, i] = 2.0 * sums[x + j, 2 * S + i]
+    out[BEGAN, 0], out[BEGAN, 1], out[BEGAN, 2] = sums[x, S + x], 2.0 * sums[x + 1, S + x], sums[x + 1, S + x + 1]
 
 
 @inner
