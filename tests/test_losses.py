@@ -52,6 +52,20 @@ def test_losses_of_a_cycle(method):
     assert one[0] == pytest.approx(10.0 * (4.0 * X - 2.5e-3), rel=1e-8)  # slip X - f/k, 2 (X - f/k), X - 2 f/k
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9])
+@pytest.mark.parametrize("sharpness", [10.0, 40.0])
+def test_loss_of_a_light_element_with_a_sharp_knee(rtol, sharpness):
+    """2 (1 - α) k/c (ln cosh √c L - ½) per cycle, c = 2 β = 2 γ, n = 2, L = 2 X - 1/√c; of no weight in the motion.
+
+    A reversal at ± X begins with a line of the slope k, down to z = 0; from there on it is a tanh of the length L.
+    """
+    root = sharpness / X
+    law = BoucWen(1e4, 0.0, 1.0, 0.5 * root**2, 0.5 * root**2, 2)
+    one, two = (swing([law], n, Exponential(rtol)).losses.loss[0] for n in (1, 2))
+    straight = 2.0 * sharpness - 1.0  # √c L; ln cosh of it is this less ln 2 to 1e-16
+    assert two - one == pytest.approx(2e4 / root**2 * (straight - np.log(2.0) - 0.5), rel=20.0 * rtol)
+
+
 @METHODS
 def test_path_of_slip(method):
     """4 (X - f/k) per cycle of each slider; a slip cut by the end of a run counts on both sides."""

@@ -324,6 +324,20 @@ def test_codes_that_are_no_segment_of_the_law_are_refused(law, numbers, place, c
         orbit(system, 2.0 * np.pi / 1.3, [*x, 0.0, 0.0, *numbers])
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+def test_to_and_fro_at_the_start_after_the_border_of_another_element(rtol):
+    """q = cos Ωt + v/Ω sin Ωt goes past δ = 0 at once and back: it turns at v/Ω², and z is zero at 2 v/Ω².
+
+    A slider beside it lets go before, so that the step that goes on has its nodes behind both.
+    """
+    swift, v = 100.0, 0.01
+    contacts = element(BoucWen(1.0, 0.1, 1.0, 1.0, 1.0), -1.0, 0.0, gap=1.0), element(Jenkins(1.0, 0.5), 0.0, -1.0)
+    system = System(np.eye(2), np.zeros((2, 2)), np.diag([swift**2, 1.0]), contacts)
+    rows = integrate(system, [1.0, 0.5 - 1e-7], [v, 1.0], 1e-3, method=Exponential(rtol)).transitions
+    assert rows.event.tolist() == ["slip", "reversal", "zero"]
+    np.testing.assert_allclose(rows.t, [1e-7, v / swift**2, 2.0 * v / swift**2], rtol=1e-6)
+
+
 @pytest.mark.parametrize("seed", [50914, 51815, 51997, 50754, 50871, 51142, 100007, 920091])
 def test_random_systems_against_the_reference(monkeypatch, seed):
     """Slips that begin against their force, that would have come back within a step, or did within a landing.

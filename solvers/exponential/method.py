@@ -141,7 +141,8 @@ class Exponential:
     ----------
     rtol : error of an indentation rate that one contact step may make, relative to the speed of entry (or a tenth of
         what the motion could reach at the stop, whichever is larger), in [1e-12, 1e-2]. Flight is exact. Later
-        contacts multiply such errors as they multiply any change of the state.
+        contacts multiply such errors as they multiply any change of the state. The force of an element with memory is
+        resolved to 10 rtol of its largest besides, so that its work and loss are right where it hardly moves anything.
     ledger : keep the energy balance of runs with output samples, by closed forms of the steps; without it their input
         and damping are NaN, the motion is the same and 1.3 to 1.5 times as quick. Runs with ``dt=None`` keep none.
 

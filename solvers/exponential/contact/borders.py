@@ -147,12 +147,13 @@ def _falls_at_once(problem, state, scratch, s, j, time):
 
 
 @inlined
-def _before_first_node(problem, state, scratch, s, j, before, time):
+def _before_first_node(problem, state, scratch, s, j, before, time, h):
     """Time at which a margin that goes on as the run begins falls to zero, if that is before the first node, or inf.
 
-    A law that has not moved yet has a margin by the sign of δ: it would not know of a motion to and fro.
+    A law that has not moved yet has a margin by the sign of δ: it would not know of a motion to and fro. From the start
+    on that takes as long forth as back: a step shorter than what the run has lasted has nodes within.
     """
-    if state.now[T] > 0.0 or before <= scratch.noise[s, j]:
+    if state.now[T] > h or before <= scratch.noise[s, j]:
         return np.inf
     fall = before - _soon(problem, state, scratch, s, j, _BEFORE * time)
     return _BEFORE * time * before / fall if fall > _BEFORE * before else np.inf
@@ -220,7 +221,7 @@ def _crossing(problem, tables, state, scratch, s, j, node_set, h):
             return _by_nodes(tables, scratch, s, j, node_set, h, i, t + (after - t) * share)
         before, t = value, after
     first = h * tables.times[node_set, 0]
-    return _before_first_node(problem, state, scratch, s, j, scratch.ends[ENDS * j], first)
+    return _before_first_node(problem, state, scratch, s, j, scratch.ends[ENDS * j], first, h)
 
 
 @inlined

@@ -25,6 +25,7 @@ import numpy as np
 from solvers.compiled.dop853_tableau import E3, E5, STAGES
 from solvers.compiled.kernels import (
     abs_dot,
+    contact_gradient,
     copy,
     element_of,
     indentation,
@@ -59,7 +60,16 @@ from solvers.exponential.contact.borders import margins_later, margins_of, passe
 from solvers.exponential.contact.crossings import CLEAR, TOO_LONG, before_landing, force_turns, side_at
 from solvers.exponential.contact.first_step import BALANCED, NEW, NODE_SET
 from solvers.exponential.contact.landing_step import INDENTATION, ROOT, SINCE, TIME, landing_step, start_landing
-from solvers.exponential.contact.node_response import BATCH, DIFFERENCE, LANDED, REACH, RTOL, START
+from solvers.exponential.contact.node_response import (
+    BATCH,
+    DIFFERENCE,
+    LANDED,
+    REACH,
+    RTOL,
+    START,
+    STRAIGHT,
+    error_of_work,
+)
 from solvers.exponential.contact.peaks import state_peaks
 from solvers.problem.friction import PEAK
 
@@ -102,19 +112,44 @@ def _difference(problem, r, d, span):
     return abs_dot(problem.read_rate[r], d, size) + abs_dot(problem.read[r], d, size) / span
 
 
+@inlined
+def _mixed(fifth, third):
+    """The error that two embedded differences tell of."""
+    return fifth * fifth / math.hypot(fifth, 0.1 * third) if fifth > 0.0 else fifth
+
+
+@inlined
+def _error_of_work_in_time(problem, state, scratch, s, span):
+    """The same of the force of an element with memory, the rate of its impulse, as a mean over the step."""
+    work, impulse, largest = scratch.stages, 2 * problem.k.size + 3 + 2 * s, 1e-300
+    deltas, rates, slope = scratch.clipped[0:2], scratch.trial[0:2], scratch.slope[s, :, 0:2]
+    deltas[0], rates[0] = indentation(problem, s, work[START]), indentation_rate(problem, s, work[START])
+    deltas[1], rates[1] = indentation(problem, s, work[LANDED]), indentation_rate(problem, s, work[LANDED])
+    contact_gradient(problem, s, deltas, rates, state.entry_rate[s], slope[0], slope[1], slope[2])
+    by_delta, by_rate = max(abs(slope[0, 0]), abs(slope[0, 1])), max(abs(slope[1, 0]), abs(slope[1, 1]))
+    bent = abs(slope[0, 0] - slope[0, 1]) > STRAIGHT * by_delta or abs(slope[1, 0] - slope[1, 1]) > STRAIGHT * by_rate
+    if not bent:  # the force is as exact as the motion
+        return 0.0
+    for i in range(1, STAGES):
+        largest = max(largest, abs(work[i, impulse]) / work[i, state.x.size])
+    unresolved = _mixed(abs(work[DIFFERENCE, impulse]), abs(work[BATCH, impulse])) / span
+    return error_of_work(problem, state, scratch, s, unresolved, largest, (by_delta, by_rate))
+
+
 @inner
-def _error_in_time(problem, scratch, span):
-    """The same of a step in time, from both embedded differences of rate and indentation."""
+def _error_in_time(problem, state, scratch, span):
+    """The same of a step in time, from both embedded differences of rate and indentation, and of memory's forces."""
     fifth, third, worst = scratch.stages[DIFFERENCE], scratch.stages[BATCH], 0.0
     combine(scratch.stages, E5, STAGES, None, fifth)
     combine(scratch.stages, E3, STAGES, None, third)
     for r in range(problem.gap.size):
-        error = _difference(problem, r, fifth, span)
-        if error > 0.0:
-            error *= error / math.hypot(error, 0.1 * _difference(problem, r, third, span))
+        error = _mixed(_difference(problem, r, fifth, span), _difference(problem, r, third, span))
         error /= scratch.accuracy[RTOL] * scratch.reference_speed[element_of(problem, r)]
         if not error <= worst:
             worst = error
+    for s in range(problem.law.size):
+        if problem.border_count[s] > 0 and problem.knots[s, 0] < 0.0:
+            worst = max(worst, _error_of_work_in_time(problem, state, scratch, s, span))
     return worst
 
 
@@ -401,7 +436,7 @@ def _begin_at_opening(problem, tables, state, scratch, stop, border, near):
 def _is_exact(problem, tables, state, scratch, variable, stop, time):
     """Whether the landing just tried, so long, is within the tolerance."""
     if variable != ROOT:
-        return _error_in_time(problem, scratch, time) <= 1.0
+        return _error_in_time(problem, state, scratch, time) <= 1.0
     part = _part_of_error(problem, tables, state, scratch, variable, stop)
     return _goes_ahead(scratch, state.x.size) and _error(problem, scratch, part) <= 1.0
 

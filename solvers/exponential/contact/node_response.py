@@ -20,7 +20,7 @@ from solvers.compiled.kernels import (
     table_value,
 )
 from solvers.compiled.simd import largest8, load8, size8, splat8, store8
-from solvers.compiled.state import CALLS, T, acts
+from solvers.compiled.state import CALLS, PEAK_FORCE, T, acts, rate_tolerance, surface_tolerance
 from solvers.compiled.sums import above, combine
 from solvers.exponential.circles.contact import radial_forces
 from solvers.exponential.circles.friction import rubbing_forces
@@ -48,6 +48,9 @@ DELTAS, RATES, FORCES, KNOWN = range(
 
 RTOL, REACH = range(2)  # places in Scratch.accuracy
 _KINK = 1e-2  # of a smooth signal the jumps are a tenth of this or less, see `solvers.problem.common_grid`
+STRAIGHT = 1e-9  # change of a law's slope on a step, in units of the slope, up to which it is none
+_OF_WORK = 10.0  # part of the largest force of a law with memory, in units of rtol, that a step may leave out
+_ROUNDINGS = 4.0  # that coefficients of a force show beside those of its values
 _SEEN = 4.0  # times the last two coefficients of a signal: a difference up to this is what they stand for
 
 
@@ -146,6 +149,17 @@ def unresolved_part(coefficients, largest, power):
         return 0.0
     decay = min(last / before, 1.0) if before > 0.0 else 1.0
     return last * max(decay**power, min(last / largest, 1.0))
+
+
+@inlined
+def error_of_work(problem, state, scratch, s, unresolved, largest, slopes):
+    """Part of a force that a step leaves out, N, in units of what the work of an element with memory may err by.
+
+    With the slopes of the law by δ and δ̇, what rounding of these makes of the force is no error of the step.
+    """
+    rounding = slopes[0] * surface_tolerance(problem, s, state.x) + slopes[1] * rate_tolerance(problem, s, state.x)
+    allowed = _OF_WORK * scratch.accuracy[RTOL] * max(largest, state.active[s, PEAK_FORCE])
+    return max(unresolved - _ROUNDINGS * rounding, 0.0) / allowed
 
 
 @inner
