@@ -9,6 +9,7 @@ are functions of these or of a `Model`. Imports: `scene`, `beams`, `support`, `r
 
 from fembeam.response.backbone import backbone
 from fembeam.response.contact_force import forces, latched_before
+from fembeam.response.contact_log import PlacedLog, Site, site
 from fembeam.response.friction import losses_by_friction, read_back, sliding, states
 from fembeam.response.histories import Histories, coordinates, directed, frame_motion
 from fembeam.response.mean_force import mean_force

@@ -38,6 +38,19 @@ def sign_of(direction: Any) -> float:
     return -1.0 if isinstance(direction, str) and direction.startswith("-") else 1.0
 
 
+def opposite(direction: Any) -> Any:
+    """The direction turned round; None of none.
+
+    Examples
+    --------
+    >>> opposite("-y"), opposite("x"), opposite((0.0, 2.0))
+    ('y', '-x', (-0.0, -2.0))
+    """
+    if isinstance(direction, str):
+        return direction[1:] if direction.startswith("-") else "-" + direction.removeprefix("+")
+    return None if direction is None else tuple(-number for number in direction)
+
+
 def is_place(value: Any) -> bool:
     """Whether a value can name a place: a finite number, a name, (member, distance), (body, place).
 

@@ -307,7 +307,7 @@ class FoundOrbit(Result):
             "residual": one.found.residual,
             "multipliers": [{"size": float(abs(m)), "angle": float(np.angle(m))} for m in one.multipliers],
             "extremes": {name: {"min": low, "max": high} for name, (low, high) in self._extremes.items()},
-            "contacts": [{name: float(column[i]) for name, column in log.arrays().items()} for i in range(len(log))],
+            "contacts": log.table(),
             "phase": one.found.phase,
             "state": one.state.tolist(),
             "units": "SI: m, s, N, J, rad",
@@ -319,11 +319,7 @@ class FoundOrbit(Result):
         kind, sizes = "stable" if one.stable else "unstable", ", ".join(f"{abs(m):.4g}" for m in one.multipliers)
         head = f"{kind} orbit of period {one.period}, {one.found.period:.6g} s, |μ| = {sizes}"
         extremes = [(f"displacement, {name}", *both) for name, both in self._extremes.items()]
-        columns = {"t_in": "begins/s", "t_out": "ends/s", "speed_in": "entry speed/(m/s)", "peak_force": "peak force/N"}
-        values = [getattr(log, name).tolist() for name in columns]
-        rows = list(zip(log.name, *values, strict=True))
-        contacts: list[Part] = ["", (("", *columns.values()), rows)]
-        return [head, "", (("", "min/m", "max/m"), extremes), *(contacts if rows else [])]
+        return [head, "", (("", "min/m", "max/m"), extremes), *([""] if len(log) else []), *log.parts]
 
     def figure(self) -> Figure:
         """History and phase portrait."""
