@@ -160,7 +160,8 @@ class ModalEquations:
 
         Of other bodies at (place, direction), or a list of such pairs.
         """
-        return (self.shapes, *self.others)[body](z, derivative)
+        shapes = (self.shapes, *self.others)[body]
+        return shapes(shapes.place(z), derivative)
 
     @cached_property
     def section_forces(self) -> tuple[SectionForces | FrameForces | JoinedForces | None, ...]:

@@ -86,9 +86,9 @@ def histories(
     require(not unknown, f"quantities must be among {', '.join(UNITS)}", unknown, "Run", "choose from these")
     where: dict[str, Any] = usual_places(run.shapes)
     if places is not None and not named:
-        astray = [z for z in places if not is_finite(z)]
+        astray = [z for z in places if not is_finite(run.shapes.place(z))]
         require(not astray, "places of a beam must be numbers", astray, "Run", "give z in m")
-        where = {f"at {z:.12g} m": z for z in places}
+        where = {f"at {z}" if isinstance(z, str) else f"at {z:.12g} m": z for z in places}
     require(named or "section forces" not in asked, "section forces are of a frame", list(asked), "Run",
             "ask for moment and shear")  # fmt: skip
     columns, there = {"t [s]": run.t}, [what for what in asked if what not in ELSEWHERE]
@@ -201,7 +201,7 @@ def to_dataframe(run: Run, stride: int = 1, **chosen: Any) -> Any:
 def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
     """See `Run.to_xarray`."""
     named = isinstance(run.shapes, PlacedShapes)
-    given = list(usual_places(run.shapes).values()) if z is None and named else z
+    given = list(usual_places(run.shapes).values()) if z is None and named else run.shapes.place(z)
     place: Any = (
         [given]
         if isinstance(given, tuple)

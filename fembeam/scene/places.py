@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     Place: TypeAlias = Any
     Second: TypeAlias = Any
 else:  # as a scene file on a beam gives them
-    Place = float
-    Second = float | tuple[int, float]
+    Place = float | str
+    Second = float | str | tuple[int, float]
 At: TypeAlias = tuple[Any, Any]  # (place, direction)
 
 

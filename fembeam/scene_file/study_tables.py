@@ -197,8 +197,8 @@ class Simulate:
     dt : output sampling in s, > 0.
     solver : a method of `solvers`; None is the library's best. In a file { kind = "…", … }.
     discard : s at the beginning that statistics leave out, 0 to below the duration.
-    places : z in m of the outputs; None: tip and mid-beam. Of frames and structures places with a direction, or
-        without: for section forces, and for motion along all components.
+    places : z in m of the outputs, or names of parts; None: tip and mid-beam. Of frames and structures places with a
+        direction, or without: for section forces, and for motion along all components.
     quantities : outputs at the places, of stops and of supports; None: displacement, velocity, indentation, force.
         With either, means and extremes are tabled and histories written as CSV.
     """
@@ -207,7 +207,7 @@ class Simulate:
     dt: float
     solver: Any = None
     discard: float = 0.0
-    places: Sequence[float] | None = None
+    places: Sequence[Place] | None = None
     quantities: Sequence[Output] | None = None
 
     def __post_init__(self) -> None:
@@ -223,12 +223,13 @@ class Simulate:
     def check(self, scene: Scene) -> None:
         """Places lie on the beam, sections know their fibre where stress is asked for."""
         beam = scene.beam
+        asked = None if self.places is None else scene.at(list(self.places), "places")
         if scene.named:
-            check_named(beam, self.places, self.quantities or ())
+            check_named(beam, asked, self.quantities or ())
             return
         require("section forces" not in (self.quantities or ()), "section forces are of a Frame", self.quantities,
                 "simulate", "ask for moment and shear")  # fmt: skip
-        places = (0.0, beam.length / 2, beam.length) if self.places is None else self.places
+        places = (0.0, beam.length / 2, beam.length) if asked is None else asked
         z = on_beam(np.array(places, dtype=float), beam, "places")
         if "stress" in (self.quantities or ()) and not np.isfinite(beam.profile(z).fibre).all():
             raise ValueError("stress needs the outer fibre of sections; give fibre in m, or a shape that knows it")
