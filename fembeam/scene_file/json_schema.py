@@ -103,6 +103,8 @@ class _Kinds:
         """One key."""
         if key == "motion":
             return _object({dof: self.reference(SIGNAL) for dof in COMPONENTS}, [])
+        if key == "places":
+            return {"type": "array", "items": PLACE}
         if kind := nested(key, parameter):
             one = self.reference(kind)
             several = {"type": "array", "items": one}
