@@ -24,5 +24,6 @@ from fembeam.structures.joined_bodies import JoinedBodies, JoinedForces, has_pla
 from fembeam.structures.joints import Joint, joined, joining
 from fembeam.structures.massless import following
 from fembeam.structures.members import Member
+from fembeam.structures.modes_given import GivenModes
 from fembeam.structures.scale import Scale
 from fembeam.structures.structure import Structure
