@@ -135,9 +135,9 @@ class Orbit(Printed):
         """What laws with memory do to the orbit: that it is one of a family, how many multipliers are zero."""
         family, found = self.found.family, list[Part]()
         if family:
-            which = ", ".join(str(contact) for contact in sorted({contact for contact, _ in family}))
+            which = ", ".join(self.model.contact_rows[contact].name for contact in sorted({one for one, _ in family}))
             count = counted(len(family), "latched number")
-            found.append(f"one of a family: {count} of contact {which} never renewed, each a multiplier 1")
+            found.append(f"one of a family: {count} of {which} never renewed, each a multiplier 1")
         if self.found.forgotten:
             found.append(f"{counted(self.found.forgotten, 'multiplier')} zero: what is latched forgets its past")
         return found
