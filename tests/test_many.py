@@ -263,6 +263,14 @@ def test_a_linear_beam_has_one_basin():
     assert str(found).splitlines()[-1].split() == ["period", "1", "with", "0", "impacts", "20", "100.00%"]
 
 
+def test_a_start_whose_run_fails_is_marked_and_the_others_are_settled():
+    """Forces of the far starts overflow: they are marked wherever they lie, on the coarse grid too."""
+    scene = replace(paper_scene(), stops=[fb.Stop(0.2, Hertz(1e9, exponent=3.0), gap=1.0)])
+    found = fb.study.basins(scene.reduce(1), x_span=(-1e110, 0.0), y_span=(0.0, 1.0), points=(2, 3))
+    assert found.label[:, 0].tolist() == [-2] * 3
+    assert (found.label[:, 1] >= 0).all()
+
+
 def test_starts_settled_one_by_one_come_to_what_the_map_says(map_of_both):
     """Well inside of a basin, where rounding does not decide."""
     assert {one.name for one in map_of_both.attractors} == {"period 2 with 2 impacts", "period 2 with 3 impacts"}

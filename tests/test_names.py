@@ -102,7 +102,7 @@ def test_the_log_has_names(run):
     assert run.names == tuple(NAMES)
     assert {0, 1, 3, 4} >= set(log.stop.tolist()) >= {0, 1}
     assert log.name.tolist() == [NAMES[stop] for stop in log.stop]
-    assert list(log.named_arrays())[:3] == ["stop", "name", "t_in"]
+    assert list(log.named_arrays())[:5] == ["stop", "name", "z", "side", "t_in"]
     assert set(run.transitions.name) == {"damper"}
     assert run.losses.names == run.names
 

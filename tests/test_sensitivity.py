@@ -210,6 +210,13 @@ def test_a_graze_has_no_derivative(gap, words):
     assert len(sensitivity(swinging(0.999), [-1.0], [0.0], 5.0, method=FINE).contacts) == 1
 
 
+@pytest.mark.parametrize(("name", "said"), [("valve", "no derivative: valve "), ("", "no derivative: contact 0 ")])
+def test_a_graze_names_its_stop(name, said):
+    stop = Contact([-1.0], PiecewiseLinear([9.0]), 1.0 - 1e-11, name=name)
+    with pytest.raises(NoDerivativeError, match=said):
+        sensitivity(System([[1.0]], [[0.0]], [[1.0]], [stop]), [-1.0], [0.0], 5.0, method=FINE)
+
+
 def test_a_start_on_the_surface():
     """By the gap it differs on both sides, by the stiffness it does not."""
 

@@ -178,7 +178,7 @@ def test_a_saved_run_is_the_run(runs, tmp_path):
     assert [again.name(i) for i in range(4)] == ["upper", "stop at 5, -y", "stop at middle, -rx",
                                                  "element from 2, y to 6"]  # fmt: skip
     assert str(again) == str(run)
-    with pytest.raises(ValueError, match="a place must be one that the run keeps; 'tip' is the nearest there is"):
+    with pytest.raises(ValueError, match="one of the body, or the name of a part; 'tip' is the nearest there is"):
         again.displacement("tipp", "y")
 
 
@@ -190,7 +190,7 @@ def test_tables_have_names(runs, tmp_path):
                  "reaction rx 0 (Fixed at 'root') [N m]"):  # fmt: skip
         assert word in head
     first, *rest = contacts.read_text(encoding="utf-8").splitlines()
-    assert first.startswith("stop,name,t_in")
+    assert first.startswith("stop,name,place,direction,t_in")
     assert len(rest) == len(runs[1].contacts)
     assert sum(row.startswith("0,upper,") for row in rest) == np.sum(runs[1].contacts.stop == 0)
 

@@ -18,6 +18,7 @@ import numpy as np
 import reduction
 import solvers
 from fembeam.model import initial_states
+from fembeam.response import Site, site
 from fembeam.response.shapes import Vector
 from fembeam.scene import contact_rows, loads, signals_of, static_rows, support_loads, tangent, weight
 from fembeam.scene.contact_rows import ContactRow
@@ -159,7 +160,8 @@ class ModalEquations:
 
         Of other bodies at (place, direction), or a list of such pairs.
         """
-        return (self.shapes, *self.others)[body](z, derivative)
+        shapes = (self.shapes, *self.others)[body]
+        return shapes(shapes.place(z), derivative)
 
     @cached_property
     def section_forces(self) -> tuple[SectionForces | FrameForces | JoinedForces | None, ...]:
@@ -172,6 +174,13 @@ class ModalEquations:
     def contact_rows(self) -> list[ContactRow]:
         """The contacts in the order of the log: of each beam its stops, then its impactors."""
         return contact_rows(self.scene, self.matrices)
+
+    @cached_property
+    def sites(self) -> tuple[Site, ...]:
+        """Where the contacts are."""
+        plane = [not one.named for one in self.matrices.beams]
+        rows = self.contact_rows
+        return tuple(site(one.acting, one.push, one.body, one.rotation, one.always, plane[one.body]) for one in rows)
 
     @cached_property
     def directions(self) -> Vector:

@@ -19,6 +19,7 @@ import reduction
 import solvers
 from fembeam.model import initial_states
 from fembeam.model.equations import ModalEquations
+from fembeam.response import PlacedLog
 from fembeam.response.shapes import Vector
 from fembeam.scene import for_duration, respun, with_signals, with_value
 from fembeam.support import Part, Printed, bar, note, require, require_no_text, require_positive
@@ -42,6 +43,7 @@ UNDRIVEN = (
     "moving_mass",
     "section_forces",
     "contact_rows",
+    "sites",
     "directions",
     "rows_of",
     "turning",
@@ -90,7 +92,7 @@ class Model(Printed, ModalEquations):
         spun = respun(self.matrices, self.scene, scene)
         return replace(self, scene=scene, matrices=spun) if spun else scene.reduce(**self.reduction_options)
 
-    def strike(self, speed: float, stop: int = 0) -> solvers.ContactLog:
+    def strike(self, speed: float, stop: int = 0) -> PlacedLog:
         """Contacts with one stop when the model swings into it in the first mode that moves it, nothing else acting.
 
         Tells what to expect before a study: contact time ``t_out - t_in`` of the first contact and peak force, and so
@@ -114,7 +116,7 @@ class Model(Printed, ModalEquations):
             start[:, mode] = np.array([-contact.gap, -speed]) / contact.direction[mode]
         system = solvers.System(self.system.M, self.system.C, self.system.K, [contact], gyroscopic=self.turning)
         slowest = max(float(self.omega[mode]), 1.0)
-        return solvers.integrate(system, *start, np.pi / slowest).contacts
+        return PlacedLog.of(solvers.integrate(system, *start, np.pi / slowest).contacts, self.sites[stop : stop + 1])
 
     def under(self, scene: Scene) -> Model:
         """The same model of a scene that differs in its signals only; what does not depend on them is kept."""

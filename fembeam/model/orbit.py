@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.model.equations import load_period
-from fembeam.scene import unit_of
+from fembeam.response import PlacedLog
 from fembeam.support import Part, Printed, is_whole, require
 from solvers.orbits import at_zero, delayed, periods_of_decay, settled, state_after, with_initial_memory
 from solvers.orbits import run as run_from
@@ -70,10 +70,10 @@ class Orbit(Printed):
         """Whether small disturbances die out."""
         return self.found.stable
 
-    @property
-    def contacts(self) -> solvers.ContactLog:
+    @cached_property
+    def contacts(self) -> PlacedLog:
         """Contacts of one period."""
-        return self.found.contacts
+        return PlacedLog.of(self.found.contacts, self.model.sites)
 
     @property
     def parameter(self) -> float:
@@ -129,22 +129,15 @@ class Orbit(Printed):
         doubt += self._of_memory()
         multipliers = [(float(abs(one)), float(np.angle(one))) for one in self.multipliers]
         table: Part = ("multiplier |μ|", "angle / rad"), multipliers
-        names = "t_in", "t_out", "speed_in", "peak_force"
-        columns = [getattr(self.contacts, name).tolist() for name in names]
-        rows = list(zip(self.contacts.name, *columns, strict=True))
-        speed, force = (unit_of(of, [one.rotation for one in self.model.contact_rows]) for of in ("speed", "force"))
-        log: list[Part] = [
-            (("contact", "t_in / s", "t_out / s", f"entry speed / {speed}", f"peak force / {force}"), rows)
-        ]
-        return [repr(self), *doubt, table, *(log if rows else [])]
+        return [repr(self), *doubt, table, *self.contacts.parts]
 
     def _of_memory(self) -> list[Part]:
         """What laws with memory do to the orbit: that it is one of a family, how many multipliers are zero."""
         family, found = self.found.family, list[Part]()
         if family:
-            which = ", ".join(str(contact) for contact in sorted({contact for contact, _ in family}))
+            which = ", ".join(self.model.contact_rows[contact].name for contact in sorted({one for one, _ in family}))
             count = counted(len(family), "latched number")
-            found.append(f"one of a family: {count} of contact {which} never renewed, each a multiplier 1")
+            found.append(f"one of a family: {count} of {which} never renewed, each a multiplier 1")
         if self.found.forgotten:
             found.append(f"{counted(self.found.forgotten, 'multiplier')} zero: what is latched forgets its past")
         return found

@@ -154,15 +154,15 @@ def _shapes_of_each(scene: Scene, matrices: Matrices, basis: reduction.Basis) ->
     """The shapes of each beam on all coordinates: zero on those of other bodies."""
     shapes: list[Shapes | PlacedShapes] = []
     done = 0
-    for number, beam in enumerate(matrices.beams):
-        size = beam.M.shape[0]
+    for number, (beam, own) in enumerate(zip(matrices.beams, (scene, *scene.bodies), strict=True)):
+        size, parts, carried = beam.M.shape[0], own.part_places, carried_on(scene, beam, number)
         mine = basis.vectors[done : done + size]
         if isinstance(beam, BodyMatrices):
-            shapes.append(placed_shapes(beam, mine, loaded(scene, number), carried_on(scene, beam, number)))
+            shapes.append(placed_shapes(beam, mine, loaded(scene, number), carried, parts))
         else:
             values = np.zeros((beam.dofs.size, basis.count))
             values[beam.dofs.ravel() >= 0] = mine
-            shapes.append(Shapes(beam.nodes, values, carried_on(scene, beam, number)))
+            shapes.append(Shapes(beam.nodes, values, carried, parts))
         done += size
     return shapes
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
-from fembeam.response import Histories
+from fembeam.response import Histories, PlacedLog
 from fembeam.scene import ON, Source
 from fembeam.support import Part, Printed, is_finite
 from solvers.problem import FrictionLog, Losses, counted
@@ -43,8 +43,8 @@ class Run(Histories, Printed):
     Attributes
     ----------
     t, q, q_dot : (k,) s, (k, n) and (k, n) modal coordinates and rates.
-    contacts : log of contacts: stop, name, t_in, t_out, speed_in, speed_out, peak_indentation, peak_force, impulse,
-        energy_loss, entry_rate_clipped (arrays).
+    contacts : log of contacts: stop, name, z and side (of other bodies than a `Beam` place and direction), t_in, t_out,
+        speed_in, speed_out, peak_indentation, peak_force, impulse, energy_loss, entry_rate_clipped (arrays); it prints.
     energy : energy balance at t: input, damping, contact, stored, residual in J, of friction also friction and spin;
         made by ``ledger`` when first read.
     end : (2n + l,) [q, q̇] at the time reached and what laws have latched: a start from which another run goes on.
@@ -56,7 +56,7 @@ class Run(Histories, Printed):
     t: Vector
     q: Vector
     q_dot: Vector
-    contacts: solvers.ContactLog
+    contacts: PlacedLog
     ledger: Callable[[], solvers.Energy] = field(repr=False)
     status: str
     cost: solvers.Cost
@@ -157,9 +157,19 @@ class Run(Histories, Printed):
             status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
         reached = made.duration if made and solution.status.good else float(solution.t[-1]) if len(solution.t) else 0.0
         return cls(
-            *(solution.t, solution.q, solution.q_dot, solution.contacts, solution.ledger, status, solution.cost),
-            *(model.shapes, stops.reshape(-1, 3), model.directions, masses, repr(model.scene)),
-            *(solution.borders, solution.lost, model),
+            *(solution.t, solution.q, solution.q_dot),
+            contacts=PlacedLog.of(solution.contacts, model.sites),
+            ledger=solution.ledger,
+            status=status,
+            cost=solution.cost,
+            shapes=model.shapes,
+            stops=stops.reshape(-1, 3),
+            directions=model.directions,
+            impactor_masses=masses,
+            scene=repr(model.scene),
+            borders=solution.borders,
+            lost=solution.lost,
+            model=model,
             others=model.others,
             began=began,
             end=solution.end,
@@ -167,7 +177,7 @@ class Run(Histories, Printed):
             kinds=np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
             names=tuple(one.name for one in rows),
             given=tuple(one.given for one in rows),
-            acting=tuple(one.z if one.direction is None else (one.z, one.direction) for one in rows),
+            acting=tuple(one.acting for one in rows),
             sampled=sampled,
             circles=np.array([one.circle for one in rows], dtype=float).reshape(-1, 3),
             rubs=np.array([one.rub for one in rows], dtype=float).reshape(-1, 4),

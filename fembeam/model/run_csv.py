@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from fembeam.model.run import Run, Vector
     from fembeam.support import Part
 
-CONTACT_UNITS = {"t_in": "s", "t_out": "s", "energy_loss": "J", "angle_in": "rad", "angle_out": "rad"}
-CONTACT_QUANTITIES = {"speed_in": "speed", "speed_out": "speed", "peak_indentation": "indentation",
-                      "peak_force": "force", "impulse": "impulse"}  # fmt: skip
 FRICTION_UNITS = {"t_in": "s", "t_out": "s", "angle_in": "rad", "angle_out": "rad", "speed_in": "m/s",
                   "speed_out": "m/s", "peak_friction": "N", "impulse": "N s", "slip": "m",
                   "energy_loss": "J"}  # fmt: skip
@@ -65,7 +62,7 @@ def write(run: Run, folder: Path, stride: int = 1, **chosen: Any) -> list[Path]:
     """Write `histories.csv` and `contacts.csv`, with friction `friction.csv`; see `Run.to_csv`."""
     kept = histories(run, stride, **chosen)
     folder.mkdir(parents=True, exist_ok=True)
-    units = ((name, _unit_of_column(run, name), column) for name, column in run.contacts.named_arrays().items())
+    units = ((name, run.contacts.unit(name), column) for name, column in run.contacts.named_arrays().items())
     log = {f"{name} [{unit}]" if unit else name: column for name, unit, column in units}
     written = [_write(folder / "histories.csv", kept), _write(folder / "contacts.csv", log)]
     if not run.rubs.any():
@@ -73,11 +70,6 @@ def write(run: Run, folder: Path, stride: int = 1, **chosen: Any) -> list[Path]:
     rubbed = {f"{name} [{FRICTION_UNITS[name]}]" if name in FRICTION_UNITS else name: column
               for name, column in run.friction_log.named_arrays().items()}  # fmt: skip
     return [*written, _write(folder / "friction.csv", rubbed)]
-
-
-def _unit_of_column(run: Run, name: str) -> str:
-    """Unit of a column of the log; "m or rad" where stops of both kinds share it."""
-    return run.unit(CONTACT_QUANTITIES[name]) if name in CONTACT_QUANTITIES else CONTACT_UNITS.get(name, "")
 
 
 def histories(
@@ -94,9 +86,9 @@ def histories(
     require(not unknown, f"quantities must be among {', '.join(UNITS)}", unknown, "Run", "choose from these")
     where: dict[str, Any] = usual_places(run.shapes)
     if places is not None and not named:
-        astray = [z for z in places if not is_finite(z)]
+        astray = [z for z in places if not is_finite(run.shapes.place(z))]
         require(not astray, "places of a beam must be numbers", astray, "Run", "give z in m")
-        where = {f"at {z:.12g} m": z for z in places}
+        where = {f"at {z}" if isinstance(z, str) else f"at {z:.12g} m": z for z in places}
     require(named or "section forces" not in asked, "section forces are of a frame", list(asked), "Run",
             "ask for moment and shear")  # fmt: skip
     columns, there = {"t [s]": run.t}, [what for what in asked if what not in ELSEWHERE]
@@ -209,7 +201,7 @@ def to_dataframe(run: Run, stride: int = 1, **chosen: Any) -> Any:
 def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
     """See `Run.to_xarray`."""
     named = isinstance(run.shapes, PlacedShapes)
-    given = list(usual_places(run.shapes).values()) if z is None and named else z
+    given = list(usual_places(run.shapes).values()) if z is None and named else run.shapes.place(z)
     place: Any = (
         [given]
         if isinstance(given, tuple)
@@ -233,7 +225,9 @@ def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
         "z": ("z", [said(at) for at in place], {}) if named else ("z", place, {"units": "m"}),
         "stop": np.arange(len(run.stops)),
     }
-    axes["name"] = "stop", list(run.names)
+    sites = run.contacts.sites
+    axes |= {"name": ("stop", list(run.names)), "place": ("stop", [one.place for one in sites])}
+    axes["direction"] = "stop", [one.direction for one in sites]
     return optional("xarray", "a data set").Dataset(variables, axes, {"status": run.status, "scene": run.scene})
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import solvers
 from fembeam.model import saved_arrays
 from fembeam.model.run import Run
-from fembeam.response import READOUT_UNITS, PlacedShapes, Shapes, packed, tuples, unpacked
+from fembeam.response import READOUT_UNITS, PlacedLog, PlacedShapes, Shapes, Site, packed, site, tuples, unpacked
 from fembeam.scene import Source
 from fembeam.support import versions, written_whole
 from solvers.problem import FrictionLog, Losses, Transitions, columns_of, optional
@@ -236,7 +236,7 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
     energy = {name.removeprefix("energy_"): array for name, array in arrays.items() if name.startswith("energy_")}
     return Run(
         *(arrays["t"], arrays["q"], arrays["q_dot"]),
-        contacts=solvers.ContactLog(*log, names=names),
+        contacts=PlacedLog(*log, names=names, sites=_sites(about, arrays, shapes)),
         ledger=partial(solvers.Energy, **energy),
         status=about["status"],
         cost=solvers.Cost(**about["cost"]),
@@ -263,6 +263,14 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         names=names,
         given=tuple(map(bool, about["given"])),
     )
+
+
+def _sites(about: dict[str, Any], arrays: dict[str, Any], shapes: list[Any]) -> tuple[Site, ...]:
+    """Where the contacts are."""
+    plane = [isinstance(one, Shapes) for one in shapes]
+    columns = (arrays["stops"][:, 1], arrays["on"][:, 0], arrays["kinds"])
+    each: Any = zip(tuples(about["acting"]), *(column.tolist() for column in columns), strict=True)
+    return tuple(site(at, push, body, rotation, always, plane[body]) for at, push, body, (rotation, always) in each)
 
 
 def _rubbed(columns: list[Any]) -> dict[str, Any]:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.model.equations import load_period
-from fembeam.response import directed
+from fembeam.response import PlacedLog, directed
 from fembeam.scene import called, changes_structure, path_of, replaced, value_of
 from fembeam.scene.signals import is_of_signal
 from fembeam.support import Part, Printed, require
@@ -29,7 +29,6 @@ from solvers.problem import counted, dataframe
 from solvers.sensitivities import Nearby, indentation_change, sensitivities, sensitivity
 
 if TYPE_CHECKING:
-    import solvers
     from fembeam.model.model import Model
     from fembeam.model.orbit import Orbit
     from fembeam.model.run import Run
@@ -83,9 +82,9 @@ class Sensitivity(Printed):
         return self.found.states[0]  # type: ignore[no-any-return]
 
     @property
-    def contacts(self) -> solvers.ContactLog:
+    def contacts(self) -> PlacedLog:
         """The contacts to which the entries of `entries`, `exits`, `peak_force` and `impulse` belong."""
-        return self.found.contacts  # type: ignore[no-any-return]
+        return PlacedLog.of(self.found.contacts, self.run.contacts.sites)
 
     @property
     def entries(self) -> Vector:
@@ -166,8 +165,8 @@ class Sensitivity(Printed):
     def table(self) -> list[dict[str, Any]]:
         """One contact a row: its name and times, and its derivatives."""
         log = self.contacts
-        columns = {"contact": log.name, "t_in": log.t_in, "t_out": log.t_out, "entry": self.entries}
-        columns |= {"exit": self.exits, "peak force": self.peak_force, "impulse": self.impulse}
+        columns = {"stop": log.stop, "name": log.name, **log.where, "t_in": log.t_in, "t_out": log.t_out}
+        columns |= {"entry": self.entries, "exit": self.exits, "peak force": self.peak_force, "impulse": self.impulse}
         rows = zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
         return [dict(zip(columns, row, strict=True)) for row in rows]
 
@@ -184,8 +183,9 @@ class Sensitivity(Printed):
         head = f"derivatives by {self.parameter}" + ("" if np.isnan(self.value) else f" = {self.value:.9g}")
         growth = f"small changes of the start grow by {self.growth:.3g} to the end"
         rows = [tuple(row.values()) for row in self.table()[:LONGEST]]
-        names = "contact", "t_in / s", "t_out / s", "d t_in", "d t_out", "d peak force", "d impulse"
-        left = len(self.contacts) - len(rows)
+        log, left = self.contacts, len(self.contacts) - len(rows)
+        names = ["stop", "name", *map(log.head, (*log.where, "t_in", "t_out"))]
+        names += ["d t_in", "d t_out", "d peak force", "d impulse"]
         more: list[Part] = [f"and {counted(left, 'contact')} more"] if left else []
         return [head, growth, *([(names, rows)] if rows else []), *more]
 

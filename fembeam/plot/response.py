@@ -196,7 +196,7 @@ def _watched(run: Run, lo: float, hi: float) -> tuple[int, Any]:
 
 def _stops_at(run: Run, body: int, z: Any) -> NDArray[np.int64]:
     """Numbers of the stops at a place, or of all where there is none; elements have no contacts."""
-    stops = ~run.kinds[:, 1]
+    stops, z = ~run.kinds[:, 1], run._beam(body).place(z)
     if isinstance(z, tuple):
         here = np.array([place_of(run, stop) == z for stop in range(len(run.stops))], dtype=bool)
     else:
@@ -214,7 +214,7 @@ def _listed(stops: NDArray[np.int64], run: Run) -> str:
 
 def _name(run: Run, body: int, z: Any) -> str:
     """A place as words."""
-    if isinstance(z, tuple):
+    if isinstance(z, (tuple, str)):
         return place_name(z) + (f" of body {body}" if body else "")
     known = (name for name, at in places(run.shapes).items() if body == 0 and np.isclose(at, z))
     return next(known, place_name(z)) + (f" of beam {body}" if body else "")

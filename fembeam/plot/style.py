@@ -66,6 +66,8 @@ def place_name(z: Any) -> str:
     """A place in mm, beyond 1 m in m; one by name with its direction."""
     if isinstance(z, tuple):
         return said(z)
+    if isinstance(z, str):  # of a part
+        return z
     return f"z = {z:.5g} m" if abs(z) > 1.0 else f"z = {1e3 * z:.5g} mm"
 
 

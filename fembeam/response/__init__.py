@@ -9,6 +9,7 @@ are functions of these or of a `Model`. Imports: `scene`, `beams`, `support`, `r
 
 from fembeam.response.backbone import backbone
 from fembeam.response.contact_force import forces, latched_before
+from fembeam.response.contact_log import PlacedLog, Site, site
 from fembeam.response.friction import losses_by_friction, read_back, sliding, states
 from fembeam.response.histories import Histories, coordinates, directed, frame_motion
 from fembeam.response.mean_force import mean_force
@@ -16,6 +17,12 @@ from fembeam.response.placed_shapes import PlacedShapes, placed_shapes, tuples
 from fembeam.response.readout import READOUT_FINITE, READOUT_UNITS, Readout, expected_readout, packed, unpacked
 from fembeam.response.section_forces import Extremes, SectionForces, extremes, frame_forces_of, rows_of, section_forces
 from fembeam.response.shapes import Shapes
-from fembeam.response.spectra import ResponseSpectrum, floor_spectrum, response_spectrum
+from fembeam.response.spectra import (
+    ResponseSpectrum,
+    checked_damping,
+    checked_oscillators,
+    floor_spectrum,
+    response_spectrum,
+)
 from fembeam.response.support_reactions import BodyReaction, Reaction, Reactions, reactions
 from fembeam.response.transfer import FrequencyResponse, frequency_response

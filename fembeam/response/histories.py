@@ -89,7 +89,7 @@ class Histories:
         """u(z, t) of a beam (0 the scene's own), m: (k,) at one z, (k, j) at z (j,).
 
         Relative to the frame, or ``absolute``: u + y. Of other bodies along a direction, "x", "-y", "rz" or a vector,
-        of a place or a list of places: ``displacement("lever", "z")``.
+        of a place or a list of places: ``displacement("lever", "z")``. The name of a part is the place of that part.
         """
         return self._motion(self.q, z, direction, body, absolute, 0)
 
@@ -109,6 +109,7 @@ class Histories:
     def motion(self, place: Any, body: int = 0) -> Vector:
         """All components (k, c) of a place, m and rad: those of `shapes.components`; of a beam u and u_z."""
         shapes = self._beam(body)
+        place = shapes.place(place)
         if isinstance(shapes, PlacedShapes):
             return self._q_of(body) @ shapes.motion_with_supports(place).T
         return self._q_of(body) @ np.array([shapes.rows_with_supports(place, i) for i in (0, 1)]).T
@@ -117,9 +118,10 @@ class Histories:
         """A derivative of u at z (k,) or (k, j), with that of the frame's motion if absolute."""
         if is_whole(direction):  # (z, body, absolute) by position, as where places are numbers
             direction, body, absolute = None, direction, absolute or body is True
-        shapes, at = self._beam(body), z
+        shapes = self._beam(body)
+        at = shapes.place(z)
         if isinstance(shapes, PlacedShapes):
-            at = directed(z, direction)
+            at = directed(at, direction)
             rows = shapes.rows_with_supports(at if isinstance(at, list) else [at])
             rows = rows if isinstance(at, list) else rows[0]
         else:
@@ -167,7 +169,7 @@ class Histories:
         positive where it stretches the lower fibre, Q = M'; Q2 and M2 of bending across; T in N m. In the plane N, Q
         and M. At a point load those of the side ahead. Accuracy: see `moment`.
         """
-        self._beam(body)
+        place = self._beam(body).place(place)
         forces = frame_forces_of(self, body)
         values = self._q_of(body) @ forces.rows(place).T
         return {name: values[:, i] + forces.preload(place, name) for i, name in enumerate(forces.names_at(place))}
@@ -182,6 +184,7 @@ class Histories:
             displacement, of (member, distance) for section forces.
         """
         shapes = self._beam(body)
+        z = shapes.place(z)
         if isinstance(shapes, PlacedShapes):
             given: Any = z
             if given is None:
@@ -208,6 +211,7 @@ class Histories:
 
     def _field(self, quantity: str, z: ArrayLike, body: int) -> Vector:
         """A field over time: (k,) at one z, (k, j) at z (j,)."""
+        z = self._beam(body).place(z)
         if isinstance(self._beam(body), PlacedShapes):
             shapes, _, offset = rows_of(self, quantity, z if isinstance(z, list) else [z], body)
             along = self._q_of(body) @ shapes.T + offset

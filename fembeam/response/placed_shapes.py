@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.scene import At, BodyMatrices, LocalCoordinate, is_pair, said, split, told
+from fembeam.scene import At, BodyMatrices, LocalCoordinate, at_parts, is_pair, said, split, told
 from fembeam.structures import COMPONENTS, direction_of, named, nearest, require_components, turns
 from fembeam.support import is_whole, require
 
@@ -29,6 +29,7 @@ class PlacedShapes:
     positions : (p, 3) m, NaN where unknown. lines : (k, 2) numbers of places that figures join.
     more : what gives (c, n + k) at places that are not among them, None of a run read from a file.
     carried : (p, c, k) what supports that move carry along by themselves, per unit of each of their k dofs.
+    parts : {name: place} of the parts that have a name.
     """
 
     components: tuple[str, ...]
@@ -39,6 +40,7 @@ class PlacedShapes:
     lines: NDArray[np.int64]
     more: Callable[[Any], Vector] | None = field(default=None, repr=False)
     carried: Vector = field(default_factory=lambda: np.zeros((0, 0, 0)), repr=False)
+    parts: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
         return f"<{self.values.shape[2]} shapes at {len(self.known)} places>"
@@ -65,6 +67,7 @@ class PlacedShapes:
             "lines": self.lines.tolist(),
             "moving": self.moving,
             "carried": carried,
+            "parts": dict(self.parts),
         }
 
     @classmethod
@@ -81,7 +84,18 @@ class PlacedShapes:
         for *at, value in words.get("carried", ()):
             carried[tuple(at)] = value
         placed_at = np.array(positions, dtype=float).reshape(-1, 3)
-        return cls(components, known, whole, usual, placed_at, lines, carried=carried)
+        parts = {name: tuples(place) for name, place in words.get("parts", {}).items()}
+        return cls(components, known, whole, usual, placed_at, lines, carried=carried, parts=parts)
+
+    def place(self, at: Any) -> Any:
+        """The same place, or places, with or without directions, with places for names of parts."""
+        return at_parts(at, self.parts, self.names)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Places that are told by a name alone."""
+        own = [one[1] if is_pair(one) and is_whole(one[0]) else one for one in self.known]
+        return tuple(name for name in own if isinstance(name, str))
 
     def motion(self, place: Any) -> Vector:
         """All components (c, n) of a place; ValueError for one that does not exist."""
@@ -137,10 +151,18 @@ def _motion_at(body: BodyMatrices, vectors: Vector, place: Any) -> Vector:
 
 
 def placed_shapes(
-    body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoordinate], carried: Vector
+    body: BodyMatrices,
+    vectors: Vector,
+    loaded: Sequence[LocalCoordinate],
+    carried: Vector,
+    parts: Mapping[str, Any],
 ) -> PlacedShapes:
-    """The shapes of a body from its part of the basis, (N, n), and what supports that move carry, (N_all, k)."""
-    extra = [at.z for at in loaded] + [at.to[1] for at in loaded if at.to is not None and at.to[0] == 0]
+    """The shapes of a body from its part of the basis, (N, n), and what supports that move carry, (N_all, k).
+
+    ``parts``: {name: place} of those that have a name.
+    """
+    extra = [*parts.values(), *(at.z for at in loaded)]
+    extra += [at.to[1] for at in loaded if at.to is not None and at.to[0] == 0]
     joined = list(getattr(body.beam, "edges", ()))
     drawn = [place for pair in joined for place in pair]
     names = list(dict.fromkeys([*_places(body), *(tuple(z) if isinstance(z, list) else z for z in extra), *drawn]))
@@ -160,6 +182,7 @@ def placed_shapes(
         np.array(edges, dtype=int).reshape(-1, 2),
         partial(_motion_at, body, full),
         values[:, :, n:],
+        parts,
     )
     seen = {name: at for name, at in made.usual.items() if np.any(made(at))}
     return replace(made, usual=dict(list((seen or made.usual).items())[:USUAL]))

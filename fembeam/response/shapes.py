@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.beams import hermite_rows
+from fembeam.scene import at_parts
 from fembeam.support import require
 
 Vector = NDArray[np.float64]
@@ -25,6 +26,7 @@ class Shapes:
     nodes: Vector
     values: Vector
     carried: Vector = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
+    parts: Mapping[str, float] = field(default_factory=dict, repr=False)  # z of those that have a name
 
     def __repr__(self) -> str:
         return f"<{self.values.shape[1]} shapes over {self.nodes[0]:g} to {self.nodes[-1]:g} m>"
@@ -36,19 +38,27 @@ class Shapes:
 
     @property
     def words(self) -> dict[str, Any] | None:
-        """For JSON what supports that move carry; None where none does."""
+        """For JSON what supports that move carry, and parts with names; None where there are neither."""
         found = [[int(dof), int(i), float(self.carried[dof, i])] for dof, i in np.argwhere(self.carried)]
-        return {"moving": self.moving, "carried": found} if self.moving else None
+        words = {"moving": self.moving, "carried": found, "parts": dict(self.parts)}
+        return words if self.moving or self.parts else None
 
     @classmethod
     def of_words(cls, words: Mapping[str, Any] | None, nodes: Vector, values: Vector) -> Shapes:
         """The same of a file."""
         if words is None:
             return cls(nodes, values)
-        carried = np.zeros((2 * len(nodes), int(words["moving"])))
+        carried = np.zeros((2 * len(nodes) if words["moving"] else 0, int(words["moving"])))
         for dof, i, value in words["carried"]:
             carried[dof, i] = value
-        return cls(nodes, values, carried)
+        return cls(nodes, values, carried, {name: float(z) for name, z in words.get("parts", {}).items()})
+
+    def place(self, z: Any) -> Any:
+        """The same place, or places, with z for names of parts."""
+        known = bool(self.parts) or not isinstance(z, str)
+        require(known, "places of a beam must be numbers, for no part has a name", z, "Run",
+                "give m, or name the part there")  # fmt: skip
+        return at_parts(z, self.parts)
 
     def rows_with_supports(self, z: ArrayLike, derivative: int = 0) -> Vector:
         """φ(z) (…, n + k), with what supports that move carry."""

@@ -119,7 +119,7 @@ def response_spectrum(
     array([[2., 2.]])
     """
     step, values = _checked_record(t, acceleration)
-    omega, zeta = _checked_oscillators(omega, periods), _checked_damping(zeta)
+    omega, zeta = checked_oscillators(omega, periods), checked_damping(zeta)
     found = np.array([[_largest(step, values, w, d) for w in omega] for d in zeta])
     return ResponseSpectrum(omega, zeta, *np.moveaxis(found, -1, 0))
 
@@ -159,7 +159,7 @@ def _checked_record(t: ArrayLike, acceleration: ArrayLike) -> tuple[float, Vecto
     return float(step), values
 
 
-def _checked_oscillators(omega: ArrayLike | None, periods: ArrayLike | None) -> Vector:
+def checked_oscillators(omega: ArrayLike | None, periods: ArrayLike | None) -> Vector:
     """Frequencies (p,), rad/s."""
     require((omega is None) != (periods is None), "give omega or periods, one of them", (omega, periods),
             "response_spectrum", "omega in rad/s, or periods in s")  # fmt: skip
@@ -170,7 +170,7 @@ def _checked_oscillators(omega: ArrayLike | None, periods: ArrayLike | None) -> 
     return values if periods is None else 2 * np.pi / values
 
 
-def _checked_damping(zeta: ArrayLike) -> Vector:
+def checked_damping(zeta: ArrayLike) -> Vector:
     """Damping ratios (d,)."""
     values = np.atleast_1d(np.array(zeta, dtype=float))
     valid = values.ndim == 1 and values.size > 0 and bool(np.all((values >= 0) & (values < 1)))

@@ -74,7 +74,8 @@ def frequency_response(
     slipping: bool = False,
 ) -> FrequencyResponse:
     """The response of a model without its contacts; `Model.frequency_response` explains it."""
-    driven = _named_base(model, driven)
+    shapes: Any = (model.shapes, *model.others)[body]
+    output, driven = shapes.place(output), _named_input(model, driven)
     moved = isinstance(driven, str) and driven.split(".")[0] == "base"
     require(not absolute or moved, "absolute is for the input 'base'", driven, WHERE, "leave it out")
     if model.scene.named and isinstance(output, np.ndarray):
@@ -85,7 +86,6 @@ def frequency_response(
     vector, power, said, unit = _driving(model, driven)
     values = _solved(model, frequencies, vector, slipping) @ places.T
     values = (values.T * frequencies**power).T + (_carried_along(model, driven, output) if absolute else 0.0)
-    shapes: Any = (model.shapes, *model.others)[body]
     shown, unit = _shown(shapes, output), _unit(unit, shapes, output)
     return FrequencyResponse(frequencies, values, said, shown, absolute, unit, model.omega)
 
@@ -130,8 +130,10 @@ def _carried_along(model: Model, driven: str | float, output: Any) -> Any:
     return parts if isinstance(output, list) else parts[0]
 
 
-def _named_base(model: Model, driven: Any) -> Any:
-    """The input "base" with its direction, where there is but one of a structure."""
+def _named_input(model: Model, driven: Any) -> Any:
+    """The input "base" with its direction, where there is but one of a structure; the place of a part for its name."""
+    if isinstance(driven, tuple) or (isinstance(driven, str) and driven in model.shapes.parts):
+        return model.shapes.place(driven)
     if driven != "base" or not model.scene.named:
         return driven
     known = tuple(model.scene.motions) or model.moved_along

@@ -193,8 +193,8 @@ def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:
     rows, parts = [], plot.batches(run, discard)
     for stop in np.flatnonzero(run.kinds[:, 1] == 0).tolist():
         kept = (log.stop == stop) & (log.t_in >= discard) & np.isfinite(log.t_out)
-        z = float(run.stops[stop, 0])
-        row: dict[str, Any] = {"stop": stop, "name": run.name(stop), "z": None if np.isnan(z) else z}
+        row: dict[str, Any] = {"stop": stop, "name": run.name(stop)}
+        row |= {head: getattr(log.sites[stop], head) for head in log.heads}
         row["number"] = int(kept.sum())
         row["rate"] = row["number"] / span if span > 0 else None
         row["rate_error"] = _error_of_rate(log.t_in[kept], discard, discard + span, parts)

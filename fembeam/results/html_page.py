@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 CONTACT_ROWS = (  # words, unit of the figures per SI unit, place in the summary
     ("at z / mm", 1e3, "z", ""),
+    ("at", 1.0, "place", ""),
+    ("side", 1.0, "side", ""),
+    ("closes along", 1.0, "direction", ""),
     ("number", 1.0, "number", ""),
     ("per second", 1.0, "rate", ""),
     ("± s.e.", 1.0, "rate_error", ""),
@@ -30,6 +33,7 @@ CONTACT_ROWS = (  # words, unit of the figures per SI unit, place in the summary
     ("largest peak / {force}", 1.0, "peak_force", "max"),
     ("mean entry / {speed}", 1.0, "entry_speed", "mean"),
 )
+WHERE = "z", "place", "side", "direction"  # of which a summary has two
 MOMENT_ROWS = (
     ("mean / {}", 1e3, "mean"),
     ("std / {}", 1e3, "std"),
@@ -142,6 +146,7 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
                 *(_scaled(_of_stop(row, *keys), unit, words) for row in found["contacts"]),
             ]
             for words, unit, *keys in CONTACT_ROWS
+            if keys[0] in found["contacts"][0] or keys[0] not in WHERE
         ]
         stops = [row["name"] for row in found["contacts"]]
         yield "<h2>Contacts</h2>" + html_table(["", *stops], rows)
@@ -167,8 +172,8 @@ def _of_stop(row: dict[str, Any], key: str, part: str = "") -> Any:
 
 
 def _scaled(value: Any, unit: float, words: str) -> Any:
-    """A number in the unit of its row; of a standard error two digits, of a place all."""
-    if value is None or isinstance(value, int):
+    """A number in the unit of its row; of a standard error two digits, of a place all; words as they are."""
+    if value is None or isinstance(value, (int, str)):
         return value
     return f"{unit * value:.6g}" if " z " in words else _rounded(unit * value, 2 if "s.e." in words else 4)
 

@@ -8,6 +8,7 @@ Imports: `beams`, `structures`, `excitation`, `support`, `reduction`, of `solver
 from fembeam.scene.annular_stop import AnnularStop
 from fembeam.scene.assembly import MOST_DENSE, Matrices, unsupported
 from fembeam.scene.body_assembly import BodyMatrices, respun
+from fembeam.scene.body_checks import components_at
 from fembeam.scene.contact_rows import (
     ON,
     carried_on,
@@ -25,6 +26,7 @@ from fembeam.scene.impactor import Impactor
 from fembeam.scene.local_coordinate import LocalCoordinate, unit_of
 from fembeam.scene.parameters import called, changes_structure, numbered, path_of, replaced, value_of, with_value
 from fembeam.scene.part import ScenePart
+from fembeam.scene.part_places import at_parts
 from fembeam.scene.parts import (
     Clamped,
     Dashpot,

@@ -207,7 +207,7 @@ def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequ
     meshed = any(getattr(part.beam, "meshed", True) for part in (scene, *scene.bodies))
     require(elements is None or meshed, "elements must be left out: a structure has its own matrices", elements,
             "Scene.matrices", "ask for modes, or modes='all'")  # fmt: skip
-    own = _one_beam(scene, elements, modes, probes)
+    own = _one_beam(scene, elements, modes, scene.at(list(probes), "probes of Scene.matrices"))
     if not scene.bodies and not scene.impactors:
         _check_beside(scene, (own,))
         return own

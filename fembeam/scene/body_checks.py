@@ -143,7 +143,8 @@ def check_plain(feature: Any, name: str, where: str) -> None:
     """Raise ValueError for what a part on a Beam cannot say: a place by name, a direction out of its plane."""
     require(not isinstance(feature, AnnularStop), "an AnnularStop needs a body in space, a Beam bends in one plane",
             feature, where, "use two stops of this gap, side='below' and side='above'")  # fmt: skip
-    require(is_finite(feature.z), "z must be a number on a Beam, which has no names", feature.z, where, "in m")
+    require(is_finite(feature.z), "z must be a number on a Beam, which has no names", feature.z, where,
+            "give m, or name the part there")  # fmt: skip
     require(not isinstance(feature, Disk), "a Disk needs a shaft: a straight Frame in space", feature, where,
             "use Frame.straight, or a LumpedMass")  # fmt: skip
     rubs = getattr(feature, "friction", None) is not None or getattr(feature, "tangent", None) is not None

@@ -25,6 +25,7 @@ from fembeam.scene.body_assembly import BodyMatrices
 from fembeam.scene.body_checks import components_at
 from fembeam.scene.element import force_both_ways
 from fembeam.scene.local_coordinate import LocalCoordinate
+from fembeam.scene.places import opposite
 from fembeam.scene.rubbing import Friction, spin_of, turning_row
 from fembeam.scene.signals import support_motion
 
@@ -54,7 +55,7 @@ class ContactRow:
     on : ("frame", 0), ("body", b) or ("impactor", i): what it pushes from.
     rotation : whether it acts on the slope: rad and N m. always : whether it acts at both signs of δ, an element.
     name : of the part, given or made; of an impactor on both sides with its side. given : whether it was given.
-    direction : as given, of places by name; of a circular clearance both.
+    direction : as given, of places by name; of a circular clearance both; of an impactor the way to it.
     circle : (radius, x, y) of a circular clearance, m: the radius negative where the place is outside; else zeros.
     friction : as given, or None. radius : R of the place's own surface, m, 0 without. spin : Ω there, rad/s.
     """
@@ -83,6 +84,11 @@ class ContactRow:
             return (0.0, 0.0, 0.0, 0.0)
         arm = -self.radius if self.circle[0] < 0.0 else self.radius
         return self.friction.mu, float(self.friction.stiffness or 0.0), arm, self.spin
+
+    @property
+    def acting(self) -> Any:
+        """Its z, or (place, direction); both directions of a circular clearance."""
+        return self.z if self.direction is None else (self.z, self.direction)
 
     @property
     def is_circle(self) -> bool:
@@ -140,7 +146,8 @@ def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
             for push in impactor.pushes:
                 side = {1.0: ", below", -1.0: ", above"}[push] if len(impactor.pushes) > 1 else ""
                 facing = body, impactor.z, ("impactor", count)
-                said: Any = {"name": label + side, "given": given, "direction": impactor.direction}
+                closes = opposite(impactor.direction) if push > 0.0 else impactor.direction
+                said: Any = {"name": label + side, "given": given, "direction": closes}
                 yield ContactRow(push * row, impactor.law, impactor.gap, push, *facing, **said)
             count += 1
 

@@ -7,15 +7,13 @@ from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
 from fembeam.scene.body_checks import is_body
+from fembeam.scene.part_places import SECOND
 from fembeam.scene.places import is_pair
 from fembeam.structures import JoinedBodies
 from fembeam.support import is_whole, require
 
 if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
-
-
-SECOND = ("on", "to")  # fields of stops and elements that lead to a second place
 
 
 def merged(scene: Scene, features: Sequence[str]) -> dict[str, Any]:

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from scipy import sparse
 
-from fembeam.scene.places import is_pair, is_place, place_words, unsigned
+from fembeam.scene.places import is_directed, is_pair, is_place, place_words, unsigned
 from fembeam.structures import TURN, UP, Six, direction_of, turns
-from fembeam.support import is_finite, is_whole, require
+from fembeam.support import is_whole, require
 
 if TYPE_CHECKING:
     from fembeam.scene.assembly import Matrices
@@ -105,8 +105,8 @@ def local_coordinate(z: Any, of: str, to: Any, where: str, key: str, direction: 
     """The coordinate that `of` or a direction and a second place (or pair, None) name; ValueError for others."""
     require(of in KINDS, "of must be 'displacement' or 'rotation'", of, where, "choose one")
     pair = to if to is None or (is_pair(to) and is_whole(to[0])) else (0, to)
-    valid = is_finite if direction is None else is_place  # names come with directions
-    require(pair is None or valid(pair[1]), f"{key} must be a place z, (body, z) or None", to, where,
+    is_end = pair is None or (is_place(pair[1]) and not (direction is None and is_directed(pair)))
+    require(is_end, f"{key} must be a place z, (body, z) or None", to, where,
             "give z on the same beam, or name a beam of bodies, 1 the first, and a place")  # fmt: skip
     second = None if pair is None else (pair[0], pair[1])
     if direction is None:

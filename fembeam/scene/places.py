@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     Place: TypeAlias = Any
     Second: TypeAlias = Any
 else:  # as a scene file on a beam gives them
-    Place = float
-    Second = float | tuple[int, float]
+    Place = float | str
+    Second = float | str | tuple[int, float]
 At: TypeAlias = tuple[Any, Any]  # (place, direction)
 
 
@@ -36,6 +36,19 @@ def unsigned(direction: Any) -> Any:
 def sign_of(direction: Any) -> float:
     """-1 of a name that begins with "-", else 1."""
     return -1.0 if isinstance(direction, str) and direction.startswith("-") else 1.0
+
+
+def opposite(direction: Any) -> Any:
+    """The direction turned round; None of none.
+
+    Examples
+    --------
+    >>> opposite("-y"), opposite("x"), opposite((0.0, 2.0))
+    ('y', '-x', (-0.0, -2.0))
+    """
+    if isinstance(direction, str):
+        return direction[1:] if direction.startswith("-") else "-" + direction.removeprefix("+")
+    return None if direction is None else tuple(-number for number in direction)
 
 
 def is_place(value: Any) -> bool:

@@ -20,6 +20,7 @@ from fembeam.scene.element import Element
 from fembeam.scene.impactor import Impactor
 from fembeam.scene.joined_scene import merged
 from fembeam.scene.local_coordinate import LocalCoordinate
+from fembeam.scene.part_places import at_parts, part_places, placed_parts
 from fembeam.scene.parts import (
     Dashpot,
     LumpedMass,
@@ -127,6 +128,8 @@ class Scene:
         for name, kinds in {**FEATURES, "bodies": (Scene,), "joints": (Joint,)}.items():
             object.__setattr__(self, name, _listed(name, getattr(self, name), kinds))
         self._check_bodies()
+        for name, parts in placed_parts(self, list(FEATURES)):
+            object.__setattr__(self, name, parts)
         if self.joints:  # one body with all parts, in the place of this scene's own
             for name, value in merged(self, [*FEATURES]).items():
                 object.__setattr__(self, name, value)
@@ -321,6 +324,17 @@ class Scene:
             not self.named, "buckling_load is for a Beam", self.beam, "Scene.buckling_load", "ask a scene of a Beam"
         )
         return buckling_load(self, elements)
+
+    @property
+    def part_places(self) -> dict[str, Any]:
+        """{name: place} of the parts of the scene's own body that were given a name, which stands for their place."""
+        return part_places(self.beam, [part for name in FEATURES for part in getattr(self, name)])
+
+    def at(self, places: Any, where: str = "Scene") -> Any:
+        """Places of the scene's own body, with or without directions, with places for names of parts."""
+        offered: Any = getattr(self.beam, "places", ()) if self.named else ()
+        names = [one for one in (offered() if callable(offered) else offered) if isinstance(one, str)]
+        return at_parts(places, self.part_places, names, where)
 
     @property
     def named_parts(self) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 from fembeam.scene import FEATURES, Scene
 from fembeam.scene_file.frames import frame
 from fembeam.scene_file.structures import is_place, place, structure
-from fembeam.structures import Joint
+from fembeam.structures import GivenModes, Joint
 from fembeam.support import is_whole
 
 if TYPE_CHECKING:
@@ -45,6 +45,8 @@ def named_body(reader: TableReader, kind: str, table: Any) -> Any:
 
 def _changed(reader: TableReader, body: Any, table: Mapping[str, Any], where: str) -> Any:
     """A body reduced, then turned."""
+    if isinstance(body, GivenModes) and any(key in table for key in CHANGES):
+        reader.fail(where, "modes can neither be turned nor reduced; give those that are wanted")
     if "reduced" in table:
         options = table["reduced"]
         if not isinstance(options, dict):

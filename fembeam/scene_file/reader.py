@@ -5,7 +5,7 @@
     [damping] [base]
     gravity = 9.81
     [reduce] [simulate] [orbit] [branch] [basins] [mode_count] [smallest_model]
-    [ensemble] [speed_accuracy] [vary] [minimise]
+    [ensemble] [speed_accuracy] [vary] [minimise] [floor_spectra]
 
 The keys of a table are the arguments of the constructor behind it, read from its signature, so that nothing is
 declared twice: a constructor that gains an argument gains a key. Units are SI, names those of the library.

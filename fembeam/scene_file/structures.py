@@ -1,4 +1,4 @@
-"""The table [structure] of a scene file: matrices of another program by their files."""
+"""The table [structure] of a scene file: matrices of another program by their files, or modes."""
 
 from __future__ import annotations
 
@@ -6,14 +6,18 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fembeam.scene import Fixed
-from fembeam.structures import Scale, Structure
+from fembeam.structures import GivenModes, Scale, Structure
+from fembeam.structures.readers import read_modes, read_nodes
 
 if TYPE_CHECKING:
     from fembeam.scene_file.tables import TableReader
 
 PLACES = ("at", "on", "to")  # keys that hold places by name
 FILES = ("stiffness", "mass", "damping")
-KEYS = (*FILES, "labels", "nodes", "points", "lines", "scale")
+PLACED = ("labels", "nodes", "points", "lines")
+KEYS = (*FILES, *PLACED, "scale")
+GIVEN = ("omega", "shapes", "participation")
+MODES = ("modes", *GIVEN, *PLACED)
 
 
 def fixed(z: float, dofs: Sequence[str] = (), motion: Any = None, name: str | None = None) -> Fixed:
@@ -21,9 +25,11 @@ def fixed(z: float, dofs: Sequence[str] = (), motion: Any = None, name: str | No
     return Fixed(z, *dofs, motion=motion, name=name)
 
 
-def structure(reader: TableReader, table: Mapping[str, Any]) -> Structure:
-    """The structure of a table: files of stiffness, mass and damping; labels, nodes, points, lines, scale."""
+def structure(reader: TableReader, table: Mapping[str, Any]) -> Structure | GivenModes:
+    """The structure of a table: files of stiffness, mass and damping, or modes; labels, nodes, points, lines, scale."""
     where = "[structure]"
+    if any(key in table for key in MODES[:3]):
+        return _of_modes(reader, table, where)
     reader.check_keys(table, KEYS, where, "key")
     for key in FILES[:2]:
         if key not in table:
@@ -45,6 +51,27 @@ def structure(reader: TableReader, table: Mapping[str, Any]) -> Structure:
             reader.fail(where, f"scale must be a list of three units, such as ['mm', 't', 's'], got {units!r}")
         given["scale"] = reader.made(Scale, dict(zip(("length", "mass", "time"), units, strict=True)), where)
     made: Structure = reader.made(Structure.read, given, where)
+    return made
+
+
+def _of_modes(reader: TableReader, table: Mapping[str, Any], where: str) -> GivenModes:
+    """The structure of modes that a .npz or the table itself holds."""
+    reader.check_keys(table, MODES, where, "key")
+    given: dict[str, Any] = {}
+    if "modes" in table:
+        if not isinstance(table["modes"], str):
+            reader.fail(where, f"modes must be the path of a .npz, got {table['modes']!r}")
+        given = reader.made(read_modes, {"path": reader.file(table["modes"], where)}, where)
+    twice = [key for key in given if key in table]
+    if twice:
+        reader.fail(where, f"{twice[0]} stands here and in {table['modes']}; keep one")
+    if isinstance(table.get("nodes"), str):
+        given["nodes"] = reader.made(read_nodes, {"path": reader.file(table["nodes"], where)}, where)
+    given |= {key: _inline(key, table[key]) for key in (*GIVEN, *PLACED) if key in table and key not in given}
+    for key in ("omega", "shapes", "labels"):
+        if key not in given:
+            reader.fail(where, f"the key {key!r} is missing; modes need omega, shapes and labels, here or in a .npz")
+    made: GivenModes = reader.made(Structure.of_modes, given, where)
     return made
 
 

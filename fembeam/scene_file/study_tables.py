@@ -18,13 +18,16 @@ from fembeam import plot
 from fembeam.beams import on_beam
 from fembeam.model import Branch, Orbit
 from fembeam.model.run_csv import SECTIONS, Output
-from fembeam.scene import Place, is_directed, path_of
+from fembeam.response import checked_damping, checked_oscillators
+from fembeam.scene import Place, components_at, is_directed, path_of, told
 from fembeam.scene_file.keys import Constructors, parameters
+from fembeam.structures import direction_of, require_components
 from fembeam.study import (
     Backbone,
     Basins,
     Campbell,
     Ensemble,
+    FloorSpectra,
     Fold,
     Minimum,
     Peak,
@@ -35,6 +38,7 @@ from fembeam.study import (
     campbell,
     characteristics,
     ensemble,
+    floor_spectra,
     fold,
     minimise,
     peak,
@@ -197,8 +201,8 @@ class Simulate:
     dt : output sampling in s, > 0.
     solver : a method of `solvers`; None is the library's best. In a file { kind = "…", … }.
     discard : s at the beginning that statistics leave out, 0 to below the duration.
-    places : z in m of the outputs; None: tip and mid-beam. Of frames and structures places with a direction, or
-        without: for section forces, and for motion along all components.
+    places : z in m of the outputs, or names of parts; None: tip and mid-beam. Of frames and structures places with a
+        direction, or without: for section forces, and for motion along all components.
     quantities : outputs at the places, of stops and of supports; None: displacement, velocity, indentation, force.
         With either, means and extremes are tabled and histories written as CSV.
     """
@@ -207,7 +211,7 @@ class Simulate:
     dt: float
     solver: Any = None
     discard: float = 0.0
-    places: Sequence[float] | None = None
+    places: Sequence[Place] | None = None
     quantities: Sequence[Output] | None = None
 
     def __post_init__(self) -> None:
@@ -223,12 +227,13 @@ class Simulate:
     def check(self, scene: Scene) -> None:
         """Places lie on the beam, sections know their fibre where stress is asked for."""
         beam = scene.beam
+        asked = None if self.places is None else scene.at(list(self.places), "places")
         if scene.named:
-            check_named(beam, self.places, self.quantities or ())
+            check_named(beam, asked, self.quantities or ())
             return
         require("section forces" not in (self.quantities or ()), "section forces are of a Frame", self.quantities,
                 "simulate", "ask for moment and shear")  # fmt: skip
-        places = (0.0, beam.length / 2, beam.length) if self.places is None else self.places
+        places = (0.0, beam.length / 2, beam.length) if asked is None else asked
         z = on_beam(np.array(places, dtype=float), beam, "places")
         if "stress" in (self.quantities or ()) and not np.isfinite(beam.profile(z).fibre).all():
             raise ValueError("stress needs the outer fibre of sections; give fibre in m, or a shape that knows it")
@@ -245,6 +250,9 @@ def check_named(body: Any, places: Sequence[Any] | None, quantities: Sequence[st
     own = [at[0] if is_directed(at) else at for at in places or ()]
     for at in own:
         body.check_place(at, "places")
+    for place, way in filter(is_directed, places or ()):
+        along = direction_of(way, f"places, {told(place)}")
+        require_components(along, components_at(body, place), f"the place {told(place)}", "places")
     require("slope" not in quantities, "slope is of a Beam", quantities, "simulate",
             "ask for displacement at a place with direction rx, ry or rz")  # fmt: skip
     sections = [name for name in quantities if name in SECTIONS]
@@ -307,7 +315,7 @@ class FoundOrbit(Result):
             "residual": one.found.residual,
             "multipliers": [{"size": float(abs(m)), "angle": float(np.angle(m))} for m in one.multipliers],
             "extremes": {name: {"min": low, "max": high} for name, (low, high) in self._extremes.items()},
-            "contacts": [{name: float(column[i]) for name, column in log.arrays().items()} for i in range(len(log))],
+            "contacts": log.table(),
             "phase": one.found.phase,
             "state": one.state.tolist(),
             "units": "SI: m, s, N, J, rad",
@@ -319,11 +327,7 @@ class FoundOrbit(Result):
         kind, sizes = "stable" if one.stable else "unstable", ", ".join(f"{abs(m):.4g}" for m in one.multipliers)
         head = f"{kind} orbit of period {one.period}, {one.found.period:.6g} s, |μ| = {sizes}"
         extremes = [(f"displacement, {name}", *both) for name, both in self._extremes.items()]
-        columns = {"t_in": "begins/s", "t_out": "ends/s", "speed_in": "entry speed/(m/s)", "peak_force": "peak force/N"}
-        values = [getattr(log, name).tolist() for name in columns]
-        rows = list(zip(log.name, *values, strict=True))
-        contacts: list[Part] = ["", (("", *columns.values()), rows)]
-        return [head, "", (("", "min/m", "max/m"), extremes), *(contacts if rows else [])]
+        return [head, "", (("", "min/m", "max/m"), extremes), *([""] if len(log) else []), *log.parts]
 
     def figure(self) -> Figure:
         """History and phase portrait."""
@@ -454,6 +458,61 @@ class CampbellTable:
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Campbell:
         """The diagram."""
         return campbell(file.scene, np.linspace(*self.spins, self.points), self.modes)
+
+
+@dataclass(frozen=True)
+class FloorSpectraTable:
+    """The table [floor_spectra]: what equipment has to stand, by a run of its own; `fb.study.floor_spectra` says more.
+
+    Parameters
+    ----------
+    places : z in m or names of parts; of frames and structures with a direction, or without: along x, y and z.
+    duration : s. dt : output sampling in s, a tenth of the shortest contact.
+    periods : of the oscillators, s; or omega, rad/s. points : how many between the two given ones, evenly in their
+        logarithm; None: those given.
+    zeta : damping ratio of the oscillators, one or several.
+    solver : a method of `solvers`; None is the library's best. In a file { kind = "…", … }.
+    """
+
+    places: Sequence[Place]
+    duration: float
+    dt: float
+    periods: Sequence[float] | None = None
+    omega: Sequence[float] | None = None
+    points: int | None = None
+    zeta: float | Sequence[float] = 0.05
+    solver: Any = None
+
+    def __post_init__(self) -> None:
+        where = "[floor_spectra]"
+        require(len(self.places) > 0, "places must be one or more", self.places, where, 'such as [["valve", "x"]]')
+        require_positive("duration", self.duration, where, "give s")
+        require_positive("dt", self.dt, where, "give the output sampling in s")
+        require(self.dt < self.duration, "dt must be below the duration", self.dt, where, "give s")
+        checked_oscillators(self.omega, self.periods)
+        checked_damping(self.zeta)
+        ends = self.periods or self.omega or ()
+        between = self.points is None or (self.points > 1 and len(ends) == 2)
+        require(between, "points must be at least 2, between two periods or frequencies", self.points, where,
+                "write periods = [0.02, 1.0] and points = 50, or list all")  # fmt: skip
+
+    def check(self, scene: Scene) -> None:
+        """Raise ValueError for places and directions that the scene does not have."""
+        asked = scene.at(list(self.places), "places")
+        if scene.named:
+            check_named(scene.beam, asked, ())
+        else:
+            on_beam(np.array(asked, dtype=float), scene.beam, "places")
+
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> FloorSpectra:
+        """The spectra."""
+        run = file.model().simulate(self.duration, self.dt, solver=self.solver, progress=progress)
+        oscillators = {"omega": self._spread(self.omega), "periods": self._spread(self.periods)}
+        return floor_spectra(run, self.places, zeta=self.zeta, **oscillators)
+
+    def _spread(self, given: Sequence[float] | None) -> Any:
+        """The oscillators, those between the two given ones too."""
+        return given if given is None or self.points is None else np.geomspace(given[0], given[1], self.points)
 
 
 @dataclass(frozen=True)
@@ -657,6 +716,7 @@ STUDIES: Constructors = {
     "branch": BranchTable,
     "basins": BasinsTable,
     "campbell": CampbellTable,
+    "floor_spectra": FloorSpectraTable,
     "peak": PeakTable,
     "fold": FoldTable,
     "backbone": BackboneTable,

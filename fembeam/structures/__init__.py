@@ -20,9 +20,10 @@ from fembeam.structures.directions import (
 from fembeam.structures.frame import Frame, total_mass
 from fembeam.structures.frame_forces import FORCES, FrameForces
 from fembeam.structures.frame_mesh import FrameMatrices, FrameMesh
-from fembeam.structures.joined_bodies import JoinedBodies, JoinedForces, located_among
+from fembeam.structures.joined_bodies import JoinedBodies, JoinedForces, has_place, located_among
 from fembeam.structures.joints import Joint, joined, joining
 from fembeam.structures.massless import following
 from fembeam.structures.members import Member
+from fembeam.structures.modes_given import GivenModes
 from fembeam.structures.scale import Scale
 from fembeam.structures.structure import Structure

@@ -361,7 +361,7 @@ def located_among(bodies: Mapping[int, Any], place: Any, where: str) -> tuple[in
         )
         bodies[number].check_place(own, where)
         return number, own
-    having = [number for number, body in bodies.items() if _has(body, place)]
+    having = [number for number, body in bodies.items() if has_place(body, place)]
     if not having:
         known = list(dict.fromkeys(name for body in bodies.values() for name in body.places()))
         require(False, f"a place must be one of the joined bodies; {nearest(place, known)}", place, where,
@@ -372,8 +372,10 @@ def located_among(bodies: Mapping[int, Any], place: Any, where: str) -> tuple[in
     return having[0], place
 
 
-def _has(body: Any, place: Any) -> bool:
-    """Whether a place is one of a body."""
+def has_place(body: Any, place: Any) -> bool:
+    """Whether a place is one of a body; a `Beam` has none by name."""
+    if not hasattr(body, "check_place"):
+        return False
     try:
         body.check_place(place, "")
     except (ValueError, TypeError):

@@ -57,6 +57,8 @@ class GivenModes(NamedBody):
         require(right, f"shapes must be finite and have a row for each dof and {w.size} columns, one for each omega",
                 phi.shape, WHERE, "transpose them if need be")  # fmt: skip
         names = labelled(labels, len(phi), WHERE)
+        require(participation is None or isinstance(participation, Mapping),
+                "participation must name its directions", participation, WHERE, "write {'x': ...}")  # fmt: skip
         gamma: dict[str, Vector] = {}
         for direction, given in (participation or {}).items():
             value = np.array(real("participation", given, WHERE), dtype=float)

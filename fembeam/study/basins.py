@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -199,9 +200,15 @@ def _coarse(starts: Vector) -> Vector:
 
 
 def _found(model: Model, starts: Sequence[Vector] | Vector, longest: int, T: float) -> list[_Known]:
-    """The stable orbits that starts come to."""
-    found = model.attractors(starts=list(starts), longest=longest)
-    return [_Known.of(one.orbit, T) for one in found if one.orbit is not None and one.orbit.stable]
+    """The stable orbits that starts come to; of one whose run fails none, as of that point of the grid."""
+    found: list[_Known] = []
+    for start in starts:
+        with suppress(solvers.SolverError):
+            (one,) = model.attractors(starts=[start], longest=longest)
+            known = any(other.holds(one.state[None]).any() for other in found)
+            if one.orbit is not None and one.orbit.stable and not known:
+                found.append(_Known.of(one.orbit, T))
+    return found
 
 
 def _settled(

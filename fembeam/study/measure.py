@@ -177,7 +177,7 @@ def cut(run: Run, start: float, end: float) -> Run:
         t = run.t[kept] - start
     part = replace(
         run, t=t, q=run.q[kept], q_dot=run.q_dot[kept],
-        contacts=solvers.ContactLog(**columns, names=log.names), ledger=partial(_ledger_of, run, kept),
+        contacts=replace(log, **columns), ledger=partial(_ledger_of, run, kept),
         lost=partial(_lost_of, run, kept), rubbing=partial(_rubbed, run, start, end),
         borders=partial(_passed, run, start, end), reached=end - start,
         began=latched_before(run, start),

@@ -193,6 +193,7 @@ def _doubts(orbit: Orbit) -> Iterator[str]:
     log = orbit.contacts
     if len(log) and log.speed_in.min() < 0.01 * log.speed_in.max():
         slowest = log.speed_in.argmin()
-        yield f"the contact at {log.t_in[slowest]:.6g} s grazes: it is entered at {log.speed_in[slowest]:.3g} m/s"
+        name, t_in, speed = log.name[slowest], log.t_in[slowest], log.speed_in[slowest]
+        yield f"the contact of {name} at {t_in:.6g} s grazes: it is entered at {speed:.3g} m/s"
     elif np.any(log.entry_rate_clipped):
         yield "an entry rate lies below its law's floor"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.problem import Array
+from solvers.problem import Array, System
 from solvers.problem import event_list as at
 from solvers.problem.friction import CODE, FREE, MU, STIFFNESS
 from solvers.sensitivities import laws
@@ -27,6 +27,11 @@ _BEHIND = 1e-6  # part of what a margin is made of, by which it is negative wher
 
 class NoDerivativeError(ArithmeticError):
     """The motion has no derivative: a contact grazes, or an event is no crossing."""
+
+
+def called(system: System, contact: int) -> str:
+    """What messages call a contact: by its name, if it has one."""
+    return system.contacts[contact].name or f"contact {contact}"
 
 
 def cross(flow: Flow, t: float, row: Array, acting: Acting, span: float, last: Array | None) -> tuple[Acting, Array]:
@@ -118,10 +123,9 @@ def _at_knot(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[Any
     if t == 0.0 and still and not np.any(late[flow.own]):
         return np.zeros(flow.columns)  # at rest on the surface: it begins at once
     if still:
-        what = (
-            f"contact {s} is entered with {abs(rate):.3g} m/s" if up and not border else f"contact {s} turns on a knot"
-        )
-        raise NoDerivativeError(f"no derivative: {what} at t = {t:.9g} s, which grazes; change the parameter a little")
+        what = f"is entered with {abs(rate):.3g} m/s" if up and not border else "turns on a knot"
+        told = f"{called(flow.system, s)} {what} at t = {t:.9g} s"
+        raise NoDerivativeError(f"no derivative: {told}, which grazes; change the parameter a little")
     return -late / rate
 
 

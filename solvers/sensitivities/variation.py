@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from solvers.problem import Array, ContactLog, Solution, System, dense
 from solvers.problem import event_list as at
-from solvers.sensitivities.events import GRAZING, NoDerivativeError, cross
+from solvers.sensitivities.events import GRAZING, NoDerivativeError, called, cross
 from solvers.sensitivities.flow import Flow, latched_columns
 from solvers.sensitivities.nearby import Change, Nearby, unchanged
 from solvers.sensitivities.panels import Panels, S, coefficients, interpolated, largest, zeros
@@ -230,8 +230,8 @@ class _Asked:
             for t, _, top in self._tops(closer, s):
                 if abs(top) <= GRAZING * self.span[s]:
                     raise NoDerivativeError(
-                        f"no derivative: contact {s} is touched but not entered at t = {t:.6g} s, to {abs(top):.2g} m; "
-                        "change the parameter a little"
+                        f"no derivative: {called(self.system, s)} is touched but not entered at t = {t:.6g} s, "
+                        f"to {abs(top):.2g} m; change the parameter a little"
                     )
 
     def _stops(self) -> list[int]:
@@ -350,8 +350,8 @@ class _Walk:
             near = abs(self.flow.motion_of(0.0, s).delta[0]) <= GRAZING * span
             if near and not self.acting.segment[s] and np.any(self.flow.change(0.0, s)[0][self.flow.own]):
                 raise NoDerivativeError(
-                    f"no derivative: contact {s} is touched at the start, so that it differs on both sides; "
-                    "begin off the surface"
+                    f"no derivative: {called(self.flow.system, s)} is touched at the start, "
+                    "so that it differs on both sides; begin off the surface"
                 )
 
     def _keep(self, t: float) -> None:

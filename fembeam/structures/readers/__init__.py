@@ -6,4 +6,5 @@ Imports: numpy, scipy. Begin with `reading.read_matrices`.
 
 from fembeam.structures.readers.given import Given
 from fembeam.structures.readers.node_files import read_nodes
+from fembeam.structures.readers.npz import read_modes
 from fembeam.structures.readers.reading import read_matrices, structure_arguments

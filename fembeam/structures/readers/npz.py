@@ -34,14 +34,12 @@ BROKEN = (
 
 def read_npz(path: Path) -> Given:
     """The matrices of a .npz; nothing in it is executed: arrays of objects are refused."""
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        if {"format", "shape", "data"} <= set(arrays):
+    arrays = _arrays(path)
+    if {"format", "shape", "data"} <= set(arrays):
+        try:
             return Given(path, ((path.stem, sparse.csr_matrix(sparse.load_npz(path), dtype=float)),))
-    except BROKEN as error:
-        told = "something else" if "pickle" in str(error) else error  # NumPy's advice is to trust the file
-        raise wrong(path, "as a whole", "arrays of numbers in a .npz", told) from None
+        except BROKEN as error:
+            raise _broken(path, error) from None
     labels = _labels(path, arrays.pop("labels")) if "labels" in arrays else None
     size = 0 if labels is None else len(labels)
     found: dict[str, Any] = {}
@@ -56,6 +54,42 @@ def read_npz(path: Path) -> Given:
             path, "as a whole", "square arrays, or K_data with K_row and K_col", f"{', '.join(arrays) or 'none'}"
         )
     return Given(path, tuple(found.items()), labels)
+
+
+def read_modes(path: Path) -> dict[str, Any]:
+    """Modes of a .npz, as `Structure.of_modes` takes them.
+
+    Arrays omega (n,) in rad/s and shapes (d, n) in 1/√kg; if there are any, labels (d, 2) and participation_x, _y, _z
+    (n,) in √kg.
+    """
+    arrays = _arrays(path)
+    found: dict[str, Any] = {}
+    for name in ("omega", "shapes"):
+        if name not in arrays:
+            raise wrong(path, "as a whole", "arrays omega and shapes", ", ".join(arrays) or "none")
+        found[name] = arrays.pop(name)
+    if "labels" in arrays:
+        found["labels"] = _labels(path, arrays.pop("labels"))
+    along = {f"participation_{direction}": direction for direction in "xyz"}
+    astray = [name for name in arrays if name not in along]
+    if astray:
+        raise wrong(path, f"array {astray[0]}", f"omega, shapes, labels, {', '.join(along)}", "another name")
+    return found | ({"participation": {along[name]: one for name, one in arrays.items()}} if arrays else {})
+
+
+def _arrays(path: Path) -> dict[str, Any]:
+    """All arrays of a .npz by name."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return {name: file[name] for name in file.files}
+    except (*BROKEN, AttributeError) as error:  # a .npy has no files
+        raise _broken(path, error) from None
+
+
+def _broken(path: Path, error: Exception) -> ValueError:
+    """The error of a damaged file."""
+    told = "something else" if "pickle" in str(error) else error  # NumPy's advice is to trust the file
+    return wrong(path, "as a whole", "arrays of numbers in a .npz", told)
 
 
 def read_npy(path: Path) -> Given:
