@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contacts.law import Law
+from contacts.law import BATCH, Law
 from contacts.numbers import reals
 
 Vector = NDArray[np.float64]
@@ -160,9 +160,9 @@ def borders(law: Law, delta: Vector, rate: float, row: Vector) -> Vector:
     """Border functions of a law at points, (B, n)."""
     values = np.empty((law.borders, delta.size))
     if law.borders:
-        arrays = (np.ascontiguousarray(delta), np.full(delta.size, rate), row, values)
-        d, v, p, b = (x.ctypes.data_as(_REALS) for x in arrays)
-        law.memory_kernel("borders").ctypes(delta.size, d, v, 1.0, p, b)
+        arrays = np.ascontiguousarray(delta), np.full(delta.size, rate), row, values
+        d, v, p, b = (x.ctypes.data for x in arrays)
+        BATCH(law.memory_kernel("borders").address)(delta.size, d, v, 1.0, p, b)
     return values
 
 
