@@ -43,6 +43,9 @@ if TYPE_CHECKING:
 
 ENTRY_RATE_FLOOR = 1e-3
 """Smallest entry rate a law is given by default, m/s: a/entry_rate is singular at grazing."""
+_ARRAY = ctypes.c_void_p
+BATCH = ctypes.CFUNCTYPE(None, ctypes.c_int64, _ARRAY, _ARRAY, ctypes.c_double, _ARRAY, _ARRAY)
+"""A force or border kernel at its address; arrays as numbers: pointers to doubles take as long as short batches."""
 STORED = 1e-11  # of the work of the largest force: error of an energy that is integrated, far above rounding
 
 
@@ -197,15 +200,13 @@ class Law(ABC):
 
         With memory at the start of a run, or with other ``parameters``.
         """
-        pointer = ctypes.POINTER(ctypes.c_double)
-        call, rate = self.kernel.ctypes, max(entry_rate, self.entry_rate_floor)
+        call, rate = BATCH(self.kernel.address), max(entry_rate, self.entry_rate_floor)
         parameters = self.parameters if parameters is None else parameters
 
         def evaluate(delta: NDArray, delta_dot: NDArray) -> NDArray:
             force = np.empty(len(delta))
-            arrays = [np.ascontiguousarray(x, dtype=float) for x in (delta, delta_dot, parameters)]
-            d, v, p, f = (x.ctypes.data_as(pointer) for x in (*arrays, force))
-            call(force.size, d, v, rate, p, f)
+            d, v, p = (np.ascontiguousarray(x, dtype=float) for x in (delta, delta_dot, parameters))
+            call(force.size, d.ctypes.data, v.ctypes.data, rate, p.ctypes.data, force.ctypes.data)
             return force
 
         return evaluate

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from contacts.law import Law
+from contacts.law import BATCH, Law
 from contacts.numbers import reals
 
 Vector = NDArray[np.float64]
@@ -98,13 +98,14 @@ def monotone_runs(path: Vector) -> Iterator[tuple[int, int]]:
 def _pieces(law: Law, row: Vector, at: float, goal: float, rate: float, tiny: float) -> Iterator[tuple[float, float]]:
     """Begin and end of every stretch of a run; renews the row between them."""
     near, since, met = max(NEAR * abs(goal - at), tiny), at, list[str]()
+    borders = borders_of(law, rate, row)
     while True:
         if abs(at - since) > near:
             since, met = at, []
         length = abs(goal - at)
         ahead = np.unique(np.minimum([tiny, NEAR * length, *length * SAMPLES[1:-1]], length))
         points = np.concatenate(([at], at + math.copysign(1.0, goal - at) * ahead, [goal]))
-        values = borders(law, points, rate, row)
+        values = borders(points)
         fired = np.flatnonzero(np.all(values[:, :3] < 0.0, axis=1))
         if fired.size and at != goal:
             met += [law.border_name(int(j), row) for j in fired]
@@ -118,19 +119,19 @@ def _pieces(law: Law, row: Vector, at: float, goal: float, rate: float, tiny: fl
             yield at, goal
             return
         k = int(np.argmax(fallen))
-        end = _first_fallen(law, row, points[k], points[k + 1], rate, floor)
+        end = _first_fallen(borders, points[k], points[k + 1], floor)
         yield at, end
         at = end
-        met.append(law.border_name(int(np.argmin(borders(law, np.array([at]), rate, row))), row))
+        met.append(law.border_name(int(np.argmin(borders(np.array([at])))), row))
         _check_met(law, met, at, rate)
 
 
-def _first_fallen(law: Law, row: Vector, low: float, high: float, rate: float, floor: Vector) -> float:
+def _first_fallen(borders: Callable[[Vector], Vector], low: float, high: float, floor: Vector) -> float:
     """Where the first border falls below its floor between two points, to rounding: at ``high`` it has."""
     while True:
         points = low + (high - low) * SAMPLES
         points[-1] = high
-        k = int(np.argmax(np.any(borders(law, points[1:], rate, row) < floor, axis=0)))
+        k = int(np.argmax(np.any(borders(points[1:]) < floor, axis=0)))
         if points[k] == low and points[k + 1] == high:
             return high
         if abs(high - low) <= 2.0 * np.spacing(max(abs(high), abs(low))):
@@ -158,12 +159,22 @@ def _check_met(law: Law, met: list[str], at: float, rate: float) -> None:
 
 def borders(law: Law, delta: Vector, rate: float, row: Vector) -> Vector:
     """Border functions of a law at points, (B, n)."""
-    values = np.empty((law.borders, delta.size))
-    if law.borders:
-        arrays = (np.ascontiguousarray(delta), np.full(delta.size, rate), row, values)
-        d, v, p, b = (x.ctypes.data_as(_REALS) for x in arrays)
-        law.memory_kernel("borders").ctypes(delta.size, d, v, 1.0, p, b)
-    return values
+    return borders_of(law, rate, row)(delta)
+
+
+def borders_of(law: Law, rate: float, row: Vector) -> Callable[[Vector], Vector]:
+    """The same as a lean function of points (n,), also after ``row`` was renewed in place."""
+    count = law.borders
+    kernel = BATCH(law.memory_kernel("borders").address) if count else None
+
+    def at(delta: Vector) -> Vector:
+        values = np.empty((count, delta.size))
+        if kernel:
+            d, v = np.ascontiguousarray(delta), np.full(delta.size, rate)
+            kernel(delta.size, d.ctypes.data, v.ctypes.data, 1.0, row.ctypes.data, values.ctypes.data)
+        return values
+
+    return at
 
 
 def renew(law: Law, border: int, delta: float, rate: float, row: Vector) -> int:

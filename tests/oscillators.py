@@ -5,6 +5,7 @@ Signs as everywhere: δ = -q - gap, the stop pushes q upward. All drives are f c
 
 import math
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy.optimize import brentq, root
@@ -13,17 +14,24 @@ from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear
 from solvers import Contact, System
 
 
+@dataclass(frozen=True)
 class Tone:
     """Re a e^{iΩt}, as a tone; a real: a cos Ωt."""
 
-    def __init__(self, amplitude, omega):
-        self.amplitude, self.omega = amplitude, omega
+    amplitude: complex
+    omega: float
 
     def __call__(self, t):
         return (self.amplitude * np.exp(1j * self.omega * np.asarray(t))).real
 
     def tones(self):
         return np.array([self.omega]), np.array([self.amplitude + 0j])
+
+
+@cache
+def _bilinear(stiffness, zeta):
+    """A system whose tables serve all that differ in gap and drive."""
+    return System.modal([1.0], zeta, [Contact([1.0], PiecewiseLinear([stiffness]))], [([1.0], Tone(1.0, 1.0))])
 
 
 @dataclass(frozen=True)
@@ -46,8 +54,8 @@ class Bilinear:
     def system(self, phase=0.0):
         """The same for `solvers`; ``phase`` s later."""
         tone = Tone(self.amplitude * np.exp(1j * self.omega * phase), self.omega)
-        stop = Contact([1.0], PiecewiseLinear([self.stiffness]), self.gap)
-        return System.modal([1.0], self.zeta, [stop], [([1.0], tone)])
+        base = _bilinear(self.stiffness, self.zeta)
+        return base.like([replace(base.contacts[0], gap=self.gap)], [([1.0], tone)])
 
     def propagator(self, closed, t):
         """exp(A t), shape (..., 2, 2)."""

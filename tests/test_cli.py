@@ -20,6 +20,7 @@ import pytest
 
 import fembeam as fb
 import reduction
+from fembeam import support
 from fembeam.cli import main
 from fembeam.results import html_page as html
 from fembeam.scene import Source
@@ -197,18 +198,8 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
-@pytest.mark.skipif(os.name != "posix", reason="sends signals to another process")
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_leaves_what_was_computed(tmp_path, number, code):
-    out = tmp_path / "out"
-    command = [sys.executable, "-c", RUN_THAT_TELLS, "run", str(scene(tmp_path, duration="600")), "--out", str(out)]
-    heard = partial(signal.signal, signal.SIGINT, signal.default_int_handler)  # background jobs ignore it
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heard) as process:
-        while not process.stderr.readline().startswith("at"):
-            assert process.poll() is None
-        process.send_signal(number)
-        said = process.communicate(timeout=120)[1]
-    assert process.returncode == code, said
+def check_partial(out, said):
+    """What was computed until a signal came is there, and is marked."""
     assert "interrupted: partial result" in said
     assert "Traceback" not in said
     summary, run = json.loads((out / "summary.json").read_text()), fb.load(out / "run.npz")
@@ -218,6 +209,36 @@ def test_a_signal_leaves_what_was_computed(tmp_path, number, code):
     assert 0.0 < run.t[-1] < 600.0
     assert summary["simulated_seconds"] == run.t[-1]
     assert (out / "psd.png").exists()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals to another process")
+def test_ctrl_c_from_another_process_leaves_what_was_computed(tmp_path):
+    out = tmp_path / "out"
+    command = [sys.executable, "-c", RUN_THAT_TELLS, "run", str(scene(tmp_path, duration="600")), "--out", str(out)]
+    heard = partial(signal.signal, signal.SIGINT, signal.default_int_handler)  # background jobs ignore it
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heard) as process:
+        while not process.stderr.readline().startswith("at"):
+            assert process.poll() is None
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=120)[1]
+    assert process.returncode == 130, said
+    check_partial(out, said)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
+def test_sigterm_leaves_what_was_computed(tmp_path, capsys, monkeypatch):
+    """Sent as soon as the run tells how far it is."""
+    plain, out, before = support.bar, tmp_path / "out", signal.getsignal(signal.SIGTERM)
+
+    @contextlib.contextmanager
+    def bar(duration, wanted):
+        with plain(duration, wanted) as report:
+            yield lambda t: (signal.raise_signal(signal.SIGTERM), report(t))
+
+    monkeypatch.setattr("fembeam.model.model.bar", bar)
+    assert main(["run", str(scene(tmp_path, duration="600")), "--out", str(out)]) == 143
+    assert signal.getsignal(signal.SIGTERM) is before
+    check_partial(out, capsys.readouterr().err)
 
 
 def test_ctrl_c_before_the_run_is_one_line(capsys, monkeypatch):

@@ -3,6 +3,7 @@
 import itertools
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -33,9 +34,14 @@ def over(problem, name="omega", periods=1):
     return make
 
 
-def duffing(omega):
+@cache
+def between_cubic_stops():
     stops = [Contact([sign], cubic(stiffness=1.0)) for sign in (1.0, -1.0)]
-    return System.modal([1.0], 0.05, stops, [([1.0], Tone(0.2, omega))]), 2.0 * math.pi / omega
+    return System.modal([1.0], 0.05, stops, [([1.0], Tone(0.2, 1.0))])
+
+
+def duffing(omega):
+    return between_cubic_stops().like(loads=[([1.0], Tone(0.2, omega))]), 2.0 * math.pi / omega
 
 
 def state_at_zero(found):

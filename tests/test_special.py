@@ -171,9 +171,13 @@ def ball(phase):
     """A ball on a vibrating plate over its amplitude: q'' = A cos(t + phase) - 1 + what a Kelvin–Voigt stop does."""
     zero, stop = np.zeros((1, 1)), Contact([1.0], KelvinVoigt(1000.0, 5.0))
 
+    def loads(amplitude):
+        return [([1.0], Tone(amplitude * np.exp(1j * phase), 1.0)), ([-1.0], Tone(1.0, 0.0))]
+
+    base = System(np.eye(1), zero, zero, [stop], loads(1.0))  # its tables serve all
+
     def make(amplitude):
-        loads = [([1.0], Tone(amplitude * np.exp(1j * phase), 1.0)), ([-1.0], Tone(1.0, 0.0))]
-        return System(np.eye(1), zero, zero, [stop], loads), 2.0 * math.pi
+        return base.like(loads=loads(amplitude)), 2.0 * math.pi
 
     return make
 

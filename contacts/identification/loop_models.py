@@ -18,6 +18,8 @@ from contacts.law import Law
 from contacts.memory import BoucWen, Iwan, Jenkins
 from contacts.path import Vector, monotone_runs
 
+_WEN = BoucWen(1.0, 0.0, 1.0, 1.0, 0.0)  # its kernel takes the parameters that are tried
+
 
 @dataclass(frozen=True, eq=False)
 class Loop:
@@ -37,20 +39,17 @@ def extensions(loop: Loop, widths: Vector, start: Vector) -> NDArray[np.float64]
     out = np.empty((widths.size, loop.x.size))
     out[:, 0] = start
     for a, b in loop.runs:
-        out[:, a : b + 1] = np.clip(out[:, a : a + 1] + (loop.x[a : b + 1] - loop.x[a]), low, high)
+        free = out[:, a : a + 1] + (loop.x[a : b + 1] - loop.x[a])
+        np.minimum(np.maximum(free, low), high, out=out[:, a : b + 1])
     return out
 
 
-def extension_slopes(loop: Loop, widths: Vector, found: NDArray[np.float64]) -> NDArray[np.float64]:
+def extension_slopes(widths: Vector, found: NDArray[np.float64]) -> NDArray[np.float64]:
     """(2, N, k) derivatives of extensions by widths and by start, which is forgotten where a slider gives way."""
-    out = np.empty((2, *found.shape))
-    out[:, :, 0] = [[0.0], [1.0]]
-    for a, b in loop.runs:
-        e = found[:, a : b + 1]
-        side = np.sign(e) * (np.abs(e) == widths[:, None])
-        out[0, :, a : b + 1] = np.where(side != 0.0, side, out[0, :, a : a + 1])
-        out[1, :, a : b + 1] = np.where(side != 0.0, 0.0, out[1, :, a : a + 1])
-    return out
+    side = np.sign(found) * (np.abs(found) == widths[:, None])
+    last = np.maximum.accumulate(np.where(side != 0.0, np.arange(found.shape[1]), 0), axis=1)  # time it gave way
+    by_width = np.take_along_axis(side, last, axis=1)
+    return np.stack((by_width, by_width == 0.0))
 
 
 @dataclass(frozen=True)
@@ -95,7 +94,7 @@ class Sliders:
         """(k, main + states) derivatives of the forces."""
         stiffness, widths = np.exp(theta[: 2 * self.count]).reshape(2, -1)
         e = extensions(loop, widths, widths * np.sin(state))
-        by_width, by_start = stiffness[:, None] * extension_slopes(loop, widths, e)
+        by_width, by_start = stiffness[:, None] * extension_slopes(widths, e)
         own = widths * (by_width.T + by_start.T * np.sin(state))
         spring = [loop.x] * self.spring
         return np.column_stack((stiffness * e.T, own, *spring, by_start.T * widths * np.cos(state)))
@@ -137,12 +136,12 @@ class Smooth:
         """(k,) forces of a record; nan beyond a pole."""
         elastic, c, z = theta[1], np.exp(theta[0]), state[0]
         row = np.array([elastic, c, 1.0, theta[2], theta[3], self.n, 0.0, 0.0, 0.0])
-        law, force = BoucWen(1.0, 0.0, 1.0, 1.0, 0.0), np.empty(loop.x.size)
+        of_law, force = _WEN.batch(1.0, row), np.empty(loop.x.size)
         for a, b in loop.runs:
             points = loop.x[a : b + 1]
             direction = 1.0 if points[-1] >= points[0] else -1.0
             row[6:] = direction, points[0], z
-            force[a : b + 1] = law.batch(1.0, row)(points, np.full(points.size, direction))
+            force[a : b + 1] = of_law(points, np.full(points.size, direction))
             z = (force[b] - elastic * points[-1]) / c
         return force
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from contacts.identification.loop_fit import ROUNDING, Fit, Measured
 from contacts.identification.loop_models import Loop, Sliders, Smooth, extensions
@@ -99,23 +101,30 @@ class _Tried:
         self.loads = np.concatenate([[own, *same] for own in settled])  # shares of the limit
         each = [extensions(x, self.widths, self.widths * b) for x, b in zip(measured.loops, self.loads.T, strict=True)]
         linear = [np.concatenate([loop.x for loop in measured.loops])] * spring
-        self.fixed = list(range(self.widths.size, self.widths.size + spring + measured.offset))
+        self.fixed = self.widths.size + np.arange(spring + measured.offset)
         columns = np.vstack((*[np.concatenate(each, axis=1)], *linear, *[np.ones(measured.count)] * measured.offset))
         self.products, self.target = columns @ columns.T, columns @ measured.target
 
-    def weights(self, chosen: list[int]) -> Vector:
-        """Of the sliders, and of spring and offset."""
-        rows = [*chosen, *self.fixed]
-        return np.asarray(np.linalg.lstsq(self.products[np.ix_(rows, rows)], self.target[rows], rcond=1e-12)[0])
+    def weights(self, chosen: Any) -> Vector:
+        """(..., r) of the sliders (..., n), and of spring and offset."""
+        rows = self._rows(chosen)
+        inverse = np.linalg.pinv(self.products[rows[..., None], rows[..., None, :]], rcond=1e-12, hermitian=True)
+        return np.asarray((inverse @ self.target[rows][..., None])[..., 0])
 
-    def explained(self, chosen: list[int]) -> float:
-        """Sum of squares explained by sliders together; 0 where the fit gives one a negative stiffness."""
+    def explained(self, chosen: Any) -> Vector:
+        """Sum of squares explained by sliders (..., n) together; 0 where the fit gives one a negative stiffness."""
         weights = self.weights(chosen)
-        return float(weights @ self.target[[*chosen, *self.fixed]]) if np.all(weights[: len(chosen)] > 0.0) else 0.0
+        together = np.sum(weights * self.target[self._rows(chosen)], axis=-1)
+        return np.where(np.all(weights[..., : np.shape(chosen)[-1]] > 0.0, axis=-1), together, 0.0)
+
+    def _rows(self, chosen: Any) -> NDArray[np.intp]:
+        """Numbers of their columns, those of spring and offset behind."""
+        sliders = np.asarray(chosen, dtype=np.intp)
+        return np.concatenate((sliders, np.broadcast_to(self.fixed, (*sliders.shape[:-1], len(self.fixed)))), axis=-1)
 
     def with_one_more(self, chosen: list[int]) -> list[int]:
         """A further slider; then each is exchanged for a better one until there is none."""
-        chosen, before = [*chosen, self.best(chosen)], -1.0
+        chosen, before = [*chosen, self.best(chosen)], np.array(-1.0)
         while self.explained(chosen) > before * (1.0 + 1e-9):
             before = self.explained(chosen)
             for _ in range(len(chosen)):
@@ -124,7 +133,8 @@ class _Tried:
 
     def best(self, others: list[int]) -> int:
         """The slider that explains most beside others."""
-        return int(np.argmax([self.explained([*others, i]) for i in range(self.widths.size)]))
+        each = np.arange(self.widths.size)
+        return int(np.argmax(self.explained(np.column_stack((*[np.full_like(each, i) for i in others], each)))))
 
     def starts(self, chosen: list[int]) -> list[Vector]:
         """θ of these sliders, and with one of them wider or narrower: whether cycles slip makes many minima."""

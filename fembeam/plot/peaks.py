@@ -104,7 +104,7 @@ def fold_curve(found: Fold, axes: Sequence[Axes] | None = None) -> Figure:
     >>> scene = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)],
     ...                  elements=[fb.Element(0.5, Polynomial([0.0, 0.0, 2e7]))], damping=fb.ModalDamping(0.01),
     ...                  forces=[fb.PointForce(0.5, fb.Harmonic(0.2, 190.0))])
-    >>> branch = scene.reduce(modes=1).branch("omega", (170.0, 210.0)).run()
+    >>> branch = scene.reduce(modes=1).branch("omega", (182.0, 192.0)).run()
     >>> found = fb.study.fold(branch, "forces[0].signal.amplitude", (0.19, 0.21))
     >>> fold_curve(found).axes[0].get_ylabel()
     'drive frequency ω / rad s⁻¹'

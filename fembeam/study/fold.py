@@ -117,8 +117,8 @@ def fold(branch: Branch, over: str, span: tuple[float, float], number: int = 0, 
     >>> rod = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
     >>> scene = fb.Scene(rod, [fb.Clamped(0.0)], elements=[fb.Element(0.5, Polynomial([0.0, 0.0, 2e7]))],
     ...                  forces=[fb.PointForce(0.5, fb.Harmonic(0.2, 190.0))], damping=fb.ModalDamping(0.01))
-    >>> branch = scene.reduce(modes=1).branch("omega", (170.0, 210.0)).run()
-    >>> found = fold(branch, "forces[0].signal.amplitude", (0.05, 0.3))
+    >>> branch = scene.reduce(modes=1).branch("omega", (182.0, 192.0)).run()
+    >>> found = fold(branch, "forces[0].signal.amplitude", (0.1, 0.21))
     >>> round(float(found.values[found.cusps[0]]), 4)  # below this force nothing jumps
     0.1196
     """

@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, NonlinearConstraint, minimize, nnls
-from scipy.stats import qmc
 
 from fembeam import plot
 from fembeam.scene import Scene
@@ -188,7 +187,7 @@ def minimise(
     asked = [quantity, *(one for one, _ in limits)]
     known = gradients is None or isinstance(gradients, (bool, np.bool_))
     require(known, "gradients must be True, False or None", gradients, WHERE, "leave it out")
-    first = qmc.Halton(len(box), scramble=False).random(looks + 1)[1:]  # the sequence begins in a corner
+    first = _spread(looks, len(box))
     trial = Trial.of(scene, list(parameters), asked, plan, reduction).prepared(_within(box, first))
     if gradients is not False:
         gradients = has_gradients(trial, insist=gradients is True)
@@ -218,6 +217,13 @@ def _limits(constraints: Mapping[Any, float]) -> list[tuple[Quantity, float]]:
             is_finite(bound), f"the bound of {label(one)} must be a finite number", bound, WHERE, "give the largest"
         )
     return made
+
+
+def _spread(looks: int, numbers: int) -> Vector:
+    """Shares (looks, numbers) of the box that Halton's sequence spreads over it; it begins in a corner, left out."""
+    from scipy.stats import qmc  # here: it takes longer to load than all else of SciPy
+
+    return np.asarray(qmc.Halton(numbers, scramble=False).random(looks + 1)[1:])
 
 
 def _within(box: Vector, share: Vector) -> Vector:

@@ -144,7 +144,8 @@ def _folder(name: str) -> Path | None:
 
 _STAMPS = _stamps()
 _OPENED: set[str] = set()  # rooms whose folder has been made
-_NAMES = {room: PREFIX + _digest([path for path in _STAMPS if _room(path) == room]) for room in map(_room, _STAMPS)}
+_ROOMS = {path: _room(path) for path in _STAMPS}
+_NAMES = {room: PREFIX + _digest([path for path in _STAMPS if _ROOMS[path] == room]) for room in {*_ROOMS.values()}}
 FOLDER = _folder(_NAMES[""])
 
 

@@ -115,8 +115,8 @@ def explanation(method: Any, system: System, q: Array, q_dot: Array, duration: f
     share = np.abs(q_dot * (system.M @ q_dot))
     if modal:  # among the modes that a step amplifies, if any
         k, c = np.diag(system.K), np.diag(system.C)
-        grows = [max(method.radius(h, *pair) for h in method.steps) > 1.0 + 1e-9 for pair in zip(k, c, strict=True)]
-        share = np.where(grows, share + k * q**2, 0.0) if any(grows) else share + k * q**2
+        grows = np.maximum(*(method.radius(h, k, c) for h in method.steps)) > 1.0 + 1e-9
+        share = np.where(grows, share + k * q**2, 0.0) if grows.any() else share + k * q**2
     worst = int(np.argmax(np.nan_to_num(share, nan=math.inf, posinf=math.inf)))
     where = f"coordinate {worst} of {system.size}"
     if modal:

@@ -62,7 +62,8 @@ class MatrixEngine(Engine):
 
     def gained(self, problem: Any, state: Any, space: Any) -> bool:
         """Whether energy comes from nowhere."""
-        space.watch[NOW] = self.system.energy(*np.split(state.x[: 2 * self.system.size], 2))
+        q, q_dot = state.x[: self.system.size], state.x[self.moving]
+        space.watch[NOW] = 0.5 * (q_dot @ (self.M @ q_dot) + q @ (self.K @ q))
         return bool(gains(problem, state, space))
 
     def rate(self, *at: Any) -> int:

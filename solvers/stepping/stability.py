@@ -26,13 +26,14 @@ from solvers.problem.run_arguments import check_maps
 if TYPE_CHECKING:
     from solvers.stepping.constant_step import ConstantStep
 
-Radius = Callable[[float, float, float], float]
-"""ρ(h, k, c): factor by which one step of size h multiplies a mode p'' + c p' + k p = 0."""
+Radius = Callable[[Any, Any, Any], Any]
+"""ρ(h, k, c): factor by which one step of size h multiplies a mode p'' + c p' + k p = 0; arrays as numbers."""
 
 EXPECTED_SPEED = 1.0  # m/s; a Hertz stop's frequency goes with its fifth root, so a guess serves
 _SLACK = 1e-10  # rounding of ρ
 _GROWTH = 0.1  # allowed logarithm of a mode's amplification in a run
 _SMALLEST, _LARGEST, _PER_DECADE = 1e-2, 1e2, 60  # range of hω searched; below it a method counts as never stable
+_AT_ONCE = 100  # modes whose steps are searched in one array
 
 
 class Limit(NamedTuple):
@@ -54,26 +55,28 @@ def taylor_radius(order: int) -> Radius:
     """ρ of an explicit Runge–Kutta method with as many stages as its order: |Σ (hλ)^j/j!| over both eigenvalues λ."""
     coefficients = [1.0 / math.factorial(j) for j in range(order, -1, -1)]
 
-    def radius(h: float, k: float, c: float) -> float:
-        root = np.sqrt(complex(0.25 * c * c - k))
-        return float(np.abs(np.polyval(coefficients, h * (-0.5 * c + np.array([root, -root])))).max())
+    def radius(h: Any, k: Any, c: Any) -> Any:
+        root = np.sqrt(0.25 * c * c - k + 0j)
+        roots = np.array([h * (-0.5 * c + root), h * (-0.5 * c - root)])
+        return np.abs(np.polyval(coefficients, roots)).max(axis=0)
 
     return radius
 
 
 def alpha_radius(alpha_m: float, alpha_f: float, beta: float, gamma: float) -> Radius:
     """ρ of the generalised-α family, see `newmark`, from its matrix on (p, h p', h² p'')."""
+    predicted = np.array([[1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma]])
+    kept = 1.0 - alpha_f
 
-    def radius(h: float, k: float, c: float) -> float:
-        x, y, kept = h * h * k, h * c, 1.0 - alpha_f
-        predicted = np.array([[1.0, 1.0, 0.5 - beta], [0.0, 1.0, 1.0 - gamma]])
+    def radius(h: Any, k: Any, c: Any) -> Any:
+        x, y = (np.asarray(each)[..., None] for each in (h * h * k, h * c))
         effective = (1.0 - alpha_m) + kept * (y * gamma + x * beta)
-        old = np.array([-alpha_f * x, -alpha_f * y, -alpha_m])
+        old = np.concatenate([-alpha_f * x, -alpha_f * y, np.full_like(x, -alpha_m)], axis=-1)
         a = (old - kept * (x * predicted[0] + y * predicted[1])) / effective
-        step = np.array([predicted[0] + beta * a, predicted[1] + gamma * a, a])
+        step = np.stack([predicted[0] + beta * a, predicted[1] + gamma * a, a], axis=-2)
         if alpha_m == 0.0 and alpha_f == 0.0:  # the equation holds at every step: p'' is no unknown of its own
-            step = step[:2, :2] - np.outer(step[:2, 2], [x, y])
-        return float(np.abs(np.linalg.eigvals(step)).max())
+            step = step[..., :2, :2] - step[..., :2, 2:] * np.concatenate([x, y], axis=-1)[..., None, :]
+        return np.abs(np.linalg.eigvals(step)).max(axis=-1)
 
     return radius
 
@@ -81,36 +84,40 @@ def alpha_radius(alpha_m: float, alpha_f: float, beta: float, gamma: float) -> R
 # --- limits ----------------------------------------------------------------------------------------------------------
 
 
-def largest_step(radius: Radius, k: float, c: float, duration: float = math.inf) -> float:
-    """Largest h up to which a mode is not amplified by a tenth within ``duration`` seconds; 0 if there is none."""
-    fastest = max(math.sqrt(abs(k)), abs(c))
-    if fastest == 0.0:
-        return math.inf
+def largest_steps(radius: Radius, k: Array, c: Array, duration: float = math.inf) -> Array:
+    """Largest h (j,) up to which modes (j,) are not amplified by a tenth within ``duration`` s; 0 if there is none."""
 
-    def stable(h: float) -> bool:
-        growth = radius(h, k, c) - 1.0
-        return growth <= _SLACK or math.log1p(growth) * max(duration / h, 1.0) <= _GROWTH
+    def stable(h: Array, mode: Any) -> Any:
+        growth = radius(h, k[mode], c[mode]) - 1.0
+        amplified = np.log1p(np.maximum(growth, _SLACK)) * np.maximum(duration / h, 1.0)
+        return (growth <= _SLACK) | (amplified <= _GROWTH)
 
-    grid = np.geomspace(_SMALLEST, _LARGEST, round(_PER_DECADE * math.log10(_LARGEST / _SMALLEST)) + 1) / fastest
-    first = next((i for i, h in enumerate(grid) if not stable(h)), None)
-    if first is None:
-        return math.inf
-    if first == 0:
-        return 0.0 if duration == math.inf else _below(stable, float(grid[0]))
-    low, high = float(grid[first - 1]), float(grid[first])
-    while high - low > 1e-9 * high:
+    found, fastest = np.full(k.shape, math.inf), np.maximum(np.sqrt(np.abs(k)), np.abs(c))
+    moving = np.flatnonzero(fastest > 0.0)
+    for start in range(0, moving.size, _AT_ONCE):
+        part = moving[start : start + _AT_ONCE]
+        found[part] = _first_border(stable, part, fastest[part], duration)
+    return found
+
+
+def _first_border(stable: Callable[[Array, Any], Any], modes: Any, fastest: Array, duration: float) -> Array:
+    """Where the first stretch of stable steps ends, by a search on a grid and bisection, for modes (j,)."""
+    grid = np.geomspace(_SMALLEST, _LARGEST, round(_PER_DECADE * math.log10(_LARGEST / _SMALLEST)) + 1)
+    steps = grid / fastest[:, None]
+    good = stable(steps, modes[:, None])
+    border, first = np.full(len(modes), math.inf), np.argmin(good, axis=1)
+    inside = np.flatnonzero(first > 0)
+    low, high = steps[inside, first[inside] - 1], steps[inside, first[inside]]
+    while np.any(high - low > 1e-9 * high):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if stable(middle) else (low, middle)
-    return low
-
-
-def _below(stable: Callable[[float], bool], h: float) -> float:
-    """A stable step below the range searched, by halving."""
-    for _ in range(40):
-        h *= 0.5
-        if stable(h):
-            return h
-    return 0.0
+        holds = stable(middle, modes[inside])
+        low, high = np.where(holds, middle, low), np.where(holds, high, middle)
+    border[inside] = low
+    for mode in np.flatnonzero(~good[:, 0]):
+        smaller = steps[mode, 0] * 0.5 ** np.arange(1, 41)
+        holds = stable(smaller, modes[mode]) & (duration < math.inf)
+        border[mode] = smaller[np.argmax(holds)] if holds.any() else 0.0
+    return border
 
 
 def limit(method: ConstantStep, system: System, indentation: float | None, duration: float) -> Limit:
@@ -129,8 +136,8 @@ def limit(method: ConstantStep, system: System, indentation: float | None, durat
 
 def _shortest(method: ConstantStep, system: System, k: Array, c: Array, duration: float) -> tuple[float, int]:
     """Smallest of the oscillators' limits, and whose it is; -1 where they are not the modes."""
-    steps = [largest_step(method.radius, *pair, duration) for pair in zip(k, c, strict=True)]
-    return min(steps), int(np.argmin(steps)) if len(steps) == system.size else -1
+    steps = largest_steps(method.radius, k, c, duration)
+    return float(steps.min()), int(np.argmin(steps)) if len(steps) == system.size else -1
 
 
 def with_tangents(system: System, indentation: float | None) -> tuple[Any, Any, float]:
