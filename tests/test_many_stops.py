@@ -121,7 +121,7 @@ def size_of(stops):
     return sum(array.nbytes for array in tables if isinstance(array, np.ndarray))
 
 
-@pytest.mark.parametrize("springs", [6, 24])  # by pairs of rows, and through the blocks
+@pytest.mark.parametrize("springs", [6, 30])  # by pairs of rows, and through the blocks
 def test_many_springs_that_always_act_are_part_of_the_structure(springs):
     number, rng = np.arange(1, MODES + 1), np.random.default_rng(4)
     plain = tube(0)

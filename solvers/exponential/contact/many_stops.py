@@ -20,6 +20,7 @@ from solvers.exponential.contact.nodes import S
 from solvers.exponential.responses import fill_pair
 
 SIGNALS, CONTINUING, ENTERING = range(3)  # groups of inputs: signals, forces without and with the weight σ^λ
+FEW_AT_ONCE = 24  # rows in contact whose pairs on some step lengths all have room in the pool
 POOL = 4093  # pairs of rows and step lengths, a kilobyte each; prime, so that few of one step share a place
 
 
@@ -138,7 +139,7 @@ def prefers_blocks(problem, tables, state):
         return False
     for r in range(problem.gap.size):
         active += 1 if acts(problem, state, r) else 0
-    return S * active * active > 3 * n * (active + S)
+    return active > FEW_AT_ONCE and S * active * active > 3 * n * (active + S)
 
 
 @inner
