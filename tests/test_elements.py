@@ -326,11 +326,12 @@ def test_bad_places_are_refused():
         (lambda: fb.Element(0.5, spring, of="slope"), "of must be 'displacement' or 'rotation', got 'slope'"),
         (lambda: fb.Stop(0.5, spring, of="slope"), "of must be 'displacement' or 'rotation', got 'slope'"),
         (lambda: fb.Element(0.5, spring, to=(1, 2, 3)), r"to must be a place z, \(body, z\) or None"),
-        (lambda: fb.Element(0.5, spring, to="tip"), r"to must be a place z, \(body, z\) or None"),
+        (lambda: fb.Element(0.5, spring, to=""), r"to must be a place z, \(body, z\) or None"),
         (lambda: fb.Element(0.5, spring, gap=np.nan), "gap must be finite"),
         (lambda: fb.Element(0.5, softened), "law must not be a bare function|law must offer force"),
         (lambda: beam(clamp, elements=[fb.Element(1.5, spring)]), r"z must lie on the beam, 0 to 1.0 m, got 1.5"),
         (lambda: beam(clamp, elements=[fb.Element(0.5, spring, to=1.5)]), "z of to must lie on the beam, 0 to 1.0 m"),
+        (lambda: beam(clamp, elements=[fb.Element(0.5, spring, to="tip")]), "0 to 1.0 m, got 'tip' .* name the part"),
         (lambda: beam(clamp, elements=[fb.Element(0.5, spring, to=0.5)]), "z of to must be another place"),
         (
             lambda: beam(clamp, elements=[fb.Element(0.5, spring, to=(1, 0.5))]),
@@ -514,7 +515,8 @@ def test_scene_files(tmp_path):
     assert "elements: with their stiffness at u = 0 the lowest frequencies are" in said
     for change, message in (
         ('elements[1].of="slope"', r"\[\[elements\]\] number 2: of must be 'displacement' or 'rotation', got 'slope'"),
-        ('elements[0].to="tip"', "to must be a number or a list of 2 numbers, got 'tip'"),
+        ('elements[0].to="tip"', "z of to must lie on the beam, 0 to 1.0 m, got 'tip'"),
+        ("elements[0].to=true", "to must be a number or a list of 2 numbers or text, got true"),
         ("elements[0].law.kind=hertz", "unknown key 'coefficients'"),
         ("elements[0].at=1", r"unknown key 'at'.*valid: z, law, of, to, gap"),
     ):

@@ -93,9 +93,10 @@ class PlacedShapes:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Places that are told by a name alone."""
+        """Names of places, and of members."""
         own = [one[1] if is_pair(one) and is_whole(one[0]) else one for one in self.known]
-        return tuple(name for name in own if isinstance(name, str))
+        first = (one[0] if is_pair(one) else one for one in own)
+        return tuple(dict.fromkeys(name for name in first if isinstance(name, str)))
 
     def motion(self, place: Any) -> Vector:
         """All components (c, n) of a place; ValueError for one that does not exist."""

@@ -159,8 +159,9 @@ def _driving(model: Model, driven: Any) -> tuple[Vector, int, str, str]:
     motions = [name for name in names if ".motion." in name]  # of supports come first, with three loads each
     inputs = [name.removesuffix(".signal") for name in names if name not in motions]
     known = isinstance(driven, str) and driven.removesuffix(".signal") in inputs
-    require(known, f"input must be a place z in m, or one of {', '.join(['base', *motions, *inputs])}", driven,
-            WHERE, "use one")  # fmt: skip
+    place = "a place and its direction" if model.scene.named else "a place z in m"
+    require(known, f"input must be {place}, or one of {', '.join(['base', *motions, *inputs])}", driven, WHERE,
+            "use one")  # fmt: skip
     said = str(driven).removesuffix(".signal")
     vector = np.asarray(model.system.loads[3 * len(motions) + inputs.index(said)][0], dtype=float)
     return vector, 0, said, "m/m" if said.endswith("foot") else "m per unit"

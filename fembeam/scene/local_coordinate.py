@@ -105,7 +105,8 @@ def local_coordinate(z: Any, of: str, to: Any, where: str, key: str, direction: 
     """The coordinate that `of` or a direction and a second place (or pair, None) name; ValueError for others."""
     require(of in KINDS, "of must be 'displacement' or 'rotation'", of, where, "choose one")
     pair = to if to is None or (is_pair(to) and is_whole(to[0])) else (0, to)
-    is_end = pair is None or (is_place(pair[1]) and not (direction is None and is_directed(pair)))
+    planar = direction is None and pair is not None and (is_pair(pair[1]) or is_directed(pair))  # not of a beam
+    is_end = pair is None or (is_place(pair[1]) and not planar)
     require(is_end, f"{key} must be a place z, (body, z) or None", to, where,
             "give z on the same beam, or name a beam of bodies, 1 the first, and a place")  # fmt: skip
     second = None if pair is None else (pair[0], pair[1])

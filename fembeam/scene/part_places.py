@@ -125,6 +125,11 @@ def _at(place: Any, known: tuple[Mapping[str, Any], Any], where: str) -> Any:
     parts, body = known
     if not isinstance(place, str) or has_place(body, place):
         return place
+    return at_parts(place, parts, names_of(body), where)
+
+
+def names_of(body: Any) -> list[str]:
+    """Names that a body has, of members too; what is wrong with these it says itself."""
     offered: Any = getattr(body, "places", ())
-    names = [one for one in (offered() if callable(offered) else offered) if isinstance(one, str)]
-    return at_parts(place, parts, names, where)
+    members = [one.name for one in getattr(body, "members", ())]
+    return [*(one for one in (offered() if callable(offered) else offered) if isinstance(one, str)), *members]

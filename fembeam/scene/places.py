@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     Second: TypeAlias = Any
 else:  # as a scene file on a beam gives them
     Place = float | str
-    Second = float | str | tuple[int, float]
+    Second = float | tuple[int, float] | str
 At: TypeAlias = tuple[Any, Any]  # (place, direction)
 
 
@@ -127,8 +127,8 @@ def split(at: Any, components: Sequence[str] = COMPONENTS) -> tuple[Any, Six]:
     pair = isinstance(at, (tuple, list)) and len(at) == 2 and not is_finite(at[1])
     if not pair and len(components) == 1:
         return at, direction_of(components[0], "a place")
-    require(pair, f"a place of a structure needs a direction of {', '.join(components)}", at, "a place",
-            "write ('lever', 'x'), or displacement('lever', 'x')")  # fmt: skip
+    require(pair, f"a place of a frame or structure needs a direction of {', '.join(components)}", at, "a place",
+            f"write ({at!r}, {components[0]!r})")  # fmt: skip
     return at[0], direction_of(at[1], f"the place {told(at[0])}")
 
 

@@ -20,7 +20,7 @@ from fembeam.scene.element import Element
 from fembeam.scene.impactor import Impactor
 from fembeam.scene.joined_scene import merged
 from fembeam.scene.local_coordinate import LocalCoordinate
-from fembeam.scene.part_places import at_parts, part_places, placed_parts
+from fembeam.scene.part_places import at_parts, names_of, part_places, placed_parts
 from fembeam.scene.parts import (
     Dashpot,
     LumpedMass,
@@ -34,7 +34,7 @@ from fembeam.scene.rigid_motions import drifting, rigid_body_modes
 from fembeam.scene.rotors import Disk, Unbalance, driven
 from fembeam.scene.signals import support_motion
 from fembeam.structures import COMPONENTS, Joint
-from fembeam.support import is_finite, require, require_finite, require_non_negative, require_positive
+from fembeam.support import in_mm, is_finite, require, require_finite, require_non_negative, require_positive
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -332,9 +332,7 @@ class Scene:
 
     def at(self, places: Any, where: str = "Scene") -> Any:
         """Places of the scene's own body, with or without directions, with places for names of parts."""
-        offered: Any = getattr(self.beam, "places", ()) if self.named else ()
-        names = [one for one in (offered() if callable(offered) else offered) if isinstance(one, str)]
-        return at_parts(places, self.part_places, names, where)
+        return at_parts(places, self.part_places, names_of(self.beam), where)
 
     @property
     def named_parts(self) -> dict[str, Any]:
@@ -365,7 +363,7 @@ class Scene:
                 continue
             check_plain(feature, name, where)
             require(0 <= feature.z <= self.beam.length, f"z must lie on the beam, 0 to {self.beam.length} m",
-                    feature.z, where, "move it, or lengthen the beam")  # fmt: skip
+                    feature.z, where, "move it, or lengthen the beam" + in_mm(feature.z, self.beam.length))  # fmt: skip
 
     def _check_base(self) -> None:
         """Raise TypeError for a base motion without derivatives, ValueError where its second one does not exist."""
@@ -464,7 +462,8 @@ class Scene:
         length = self.bodies[number - 1].beam.length if number else self.beam.length
         named = f"body {number}" if number else "the beam"
         inside = is_finite(z) and 0 <= z <= length
-        require(inside, f"z of {key} must lie on {named}, 0 to {length} m", z, where, "move it")
+        advice = "give m, or name the part there" if isinstance(z, str) else "move it"
+        require(inside, f"z of {key} must lie on {named}, 0 to {length} m", z, where, advice)
         apart = number > 0 or abs(z - first) > 1e-9 * length
         require(apart, f"z of {key} must be another place", z, where, "leave it out for an end on the frame")
 

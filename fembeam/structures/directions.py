@@ -97,11 +97,16 @@ def nearest(name: object, known: Sequence[object]) -> str:
     --------
     >>> nearest("leverr", ["lever", "flange"]), nearest(21, [5, 20, 40])
     ("'lever' is the nearest there is", '20 is the nearest there is')
+    >>> nearest(33, ["33", "34"])
+    "there is '33', text in quotes"
     """
+    texts = {str(one): one for one in known}
+    if str(name) in texts:  # 33 for "33", or "33" for 33
+        there = texts[str(name)]
+        return f"there is {there!r}, {'text in quotes' if isinstance(there, str) else 'a number without quotes'}"
     if isinstance(name, (int, np.integer)) and (
         numbers := [one for one in known if isinstance(one, (int, np.integer))]
     ):
         return f"{min(numbers, key=lambda one: abs(one - name))!r} is the nearest there is"
-    texts = {str(one): one for one in known}
     close = get_close_matches(str(name), list(texts), n=1, cutoff=0.0)
     return f"{texts[close[0]]!r} is the nearest there is" if close else "there is none"

@@ -16,7 +16,7 @@ from fembeam.beams import SAME_PLACE, Section
 from fembeam.structures.assembled import COMPONENTS
 from fembeam.structures.directions import nearest
 from fembeam.structures.members import Member, axes_of
-from fembeam.support import is_finite, require, require_finite, require_positive
+from fembeam.support import in_mm, is_finite, is_whole, require, require_finite, require_positive
 
 if TYPE_CHECKING:
     from fembeam.structures.frame_mesh import FrameMatrices
@@ -219,7 +219,7 @@ class Frame:
             return self._inside(place[0], place[1], where)
         require(is_finite(place), "a place must be the name of a node, or (member, distance in m)", place, where,
                 f"write {next(iter(self.nodes))!r}, or ({self.members[0].name!r}, 0.0)")  # fmt: skip
-        return self._on_axis(float(place), where)
+        return self._on_axis(place, where)
 
     def _inside(self, name: str, s: Any, where: str) -> Site:
         """A place along a member."""
@@ -230,15 +230,16 @@ class Frame:
         close = SAME_PLACE * length
         inside = is_finite(s) and -close <= s <= length + close
         require(inside, f"the distance along member {name!r} must lie within 0 to {length:g} m", s, where,
-                "move it")  # fmt: skip
+                "move it" + in_mm(s, length))  # fmt: skip
         return index, float(np.clip(s, 0.0, length))
 
     def _on_axis(self, z: float, where: str) -> Site:
         """A place along a straight frame."""
         first, axis = next(iter(self.nodes)), self.axis
         if axis is None:
-            raise ValueError(f"a place must be a name, or (member, distance), for the frame is not straight, got {z} "
-                             f"in {where}; write {first!r}, or ({self.members[0].name!r}, 0.0)")  # fmt: skip
+            near = f"; {nearest(z, list(self.nodes))}" if is_whole(z) else ""
+            rule = f"a place must be a name, or (member, distance), for the frame is not straight{near}"
+            raise ValueError(f"{rule}, got {z} in {where}; write {first!r}, or ({self.members[0].name!r}, 0.0)")
         at = {name: float((point - self.points[first]) @ axis) for name, point in self.points.items()}
         for name, other in at.items():
             if abs(z - other) <= SAME_PLACE * self.size:
@@ -248,7 +249,8 @@ class Frame:
             if 0 <= s <= self.lengths[index]:
                 return index, float(s)
         least, most = min(at.values()), max(at.values())
-        raise ValueError(f"z must lie on the frame, {least:g} to {most:g} m, got {z} in {where}; move it")
+        named = f", or write {str(z)!r}, the node" if str(z) in self.nodes else in_mm(z, most)
+        raise ValueError(f"z must lie on the frame, {least:g} to {most:g} m, got {z} in {where}; move it{named}")
 
     def check_held(self, held: Mapping[str, Collection[str]], where: str) -> None:
         """Raise ValueError where releases free a node: `held` are its components that supports or inertia hold."""

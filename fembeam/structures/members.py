@@ -66,7 +66,8 @@ class Member:
 
     def __post_init__(self) -> None:
         for end in (self.a, self.b):
-            require(isinstance(end, str) and bool(end), "a and b must be names of nodes", end, "Member", "write 'A'")
+            write = "write 'A'" if isinstance(end, str) else f"names are text: write {str(end)!r}"
+            require(isinstance(end, str) and bool(end), "a and b must be names of nodes", end, "Member", write)
         require(isinstance(self.name, str), "name must be text", self.name, "Member", "write 'A-B'")
         object.__setattr__(self, "name", self.name or f"{self.a}-{self.b}")
         where = f"Member {self.name!r}"

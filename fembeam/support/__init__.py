@@ -5,6 +5,7 @@ Imports nothing of ours.
 
 from fembeam.support.checks import (
     frozen,
+    in_mm,
     is_finite,
     is_name,
     is_whole,

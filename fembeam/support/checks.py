@@ -8,6 +8,8 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+LONG = 5.0  # lengths of a body, from where on a place off it looks like one in mm
+
 
 def is_number(value: object) -> TypeGuard[float]:
     """Whether value is a real number of Python or NumPy, finite or not (booleans are not numbers here)."""
@@ -50,8 +52,22 @@ def require_non_negative(name: str, value: Any, where: str, advice: str) -> None
     require_finite(name, value, where, advice, " and not negative", is_finite(value) and value >= 0)
 
 
+def in_mm(value: Any, most: float) -> str:
+    """For messages: a length in m that lies beyond the largest one, and would not in mm.
+
+    Examples
+    --------
+    >>> "move it" + in_mm(300, 1.5), "move it" + in_mm(2.0, 1.5)
+    ('move it, or is it in mm?', 'move it')
+    """
+    meant = is_finite(value) and value > LONG * most and 1e-3 * value <= most
+    return ", or is it in mm?" if meant else ""
+
+
 def is_name(value: object) -> TypeGuard[str]:
-    """Whether value is text that names something: neither empty nor a number in quotes."""
+    """Whether value is text that names something: neither empty nor a decimal number in quotes; "33" may be a node."""
+    if isinstance(value, str) and value.isdecimal():
+        return True
     try:
         float(value)  # type: ignore[arg-type]
     except ValueError:

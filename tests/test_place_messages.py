@@ -1,0 +1,73 @@
+"""What is said of places that are written wrongly: numbers for names, names for numbers, mm for m, no direction."""
+
+import re
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+from contacts import KelvinVoigt
+
+LAW = KelvinVoigt(1e5, 10.0)
+STEEL = fb.Section.tube(2.0e11, 7900.0, 0.0603, 0.0525)
+BENT = fb.Frame.polyline({"33": (0, 0, 0), "34": (2, 0, 0), "N35": (2, 0, 1.5)}, STEEL)
+STRAIGHT = fb.Frame.polyline({"3": (0, 0, 0), "4": (0, 0, 2)}, STEEL)
+BODY = fb.Structure(1e4 * np.eye(2), np.eye(2), labels=[(33, "x"), (34, "x")], points={"35": 34})
+BEAM = fb.Beam(0.5, STEEL)
+
+
+def stop(body, place, direction="x"):
+    return fb.Scene(body, stops=[fb.Stop(place, LAW, direction=direction)])
+
+
+@pytest.fixture(scope="module")
+def run():
+    scene = fb.Scene(BENT, [fb.Clamped("33")], stops=[fb.Stop("N35", LAW, direction="z")])
+    return scene.reduce(1).simulate(0.01, 1e-3)
+
+
+def test_names_of_digits_are_names():
+    assert fb.Scene(BENT, [fb.Clamped("33")]).supports[0].z == "33"
+    assert stop(BODY, "35").stops[0].z == "35"
+    assert stop(BODY, 33).stops[0].z == 33
+
+
+@pytest.mark.parametrize(("make", "message"), [
+    (lambda: fb.Scene(BENT, [fb.Clamped(33)]),
+     "the frame is not straight; there is '33', text in quotes, got 33 in supports[0] (Clamped) of Scene"),
+    (lambda: fb.Scene(BENT, [fb.Clamped(35)]), "the frame is not straight; 'N35' is the nearest there is, got 35"),
+    (lambda: fb.Scene(STRAIGHT, [fb.Clamped(4)]), "z must lie on the frame, 0 to 2 m, got 4 in supports[0] (Clamped) "
+     "of Scene; move it, or write '4', the node"),
+    (lambda: fb.Scene(STRAIGHT, [fb.Clamped(1500.0)]),
+     "got 1500.0 in supports[0] (Clamped) of Scene; move it, or is it in mm?"),
+    (lambda: stop(BENT, ("34-N35", 700)),
+     "within 0 to 1.5 m, got 700 in stops[0] (Stop) of Scene; move it, or is it in mm?"),
+    (lambda: stop(BODY, "33"), "there is 33, a number without quotes, got '33' in stops[0]"),
+    (lambda: stop(BODY, 35), "there is '35', text in quotes, got 35 in stops[0]"),
+    (lambda: fb.Member(33, "34", STEEL), "must be names of nodes, got 33 in Member; names are text: write '33'"),
+    (lambda: fb.Scene(BEAM, [fb.Clamped("33")]), "z must be a number on a Beam, which has no names, got '33'"),
+    (lambda: fb.Scene(BEAM, [fb.Clamped(400.0)]), "move it, or lengthen the beam, or is it in mm?"),
+])  # fmt: skip
+def test_of_parts(make, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        make()
+
+
+@pytest.mark.parametrize(("ask", "message"), [
+    (lambda r: r.displacement("34"), "a direction of x, y, z, rx, ry, rz, got '34' in a place; write ('34', 'x')"),
+    (lambda r: r.floor_spectrum(("34-N35", 0.5), periods=[0.1]), "write (('34-N35', 0.5), 'x')"),
+    (lambda r: r.displacement("34-N35", "x"), "write ('34-N35', s) for a place s along the member"),
+    (lambda r: r.displacement(33, "x"), "there is '33', text in quotes, got 33"),
+    (lambda r: r.model.frequency_response([1.0], "34", ("34", "z")), "input must be a place and its direction, or one"),
+])  # fmt: skip
+def test_of_runs(run, ask, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
+        ask(run)
+
+
+def test_a_member_is_no_place_where_parts_have_names_either():
+    scene = fb.Scene(BENT, [fb.Clamped("33")], [fb.LumpedMass("34", 1.0, name="valve")])
+    with pytest.raises(ValueError, match=re.escape("write ('34-N35', s) for a place s along the member")):
+        scene.reduce(1).phi(("34-N35", "x"))
+    with pytest.raises(ValueError, match=re.escape("write ('34-N35', s) for a place s along the member")):
+        fb.Scene(BENT, scene.supports, scene.masses, stops=[fb.Stop("34-N35", LAW, direction="x")])
