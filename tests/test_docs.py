@@ -235,6 +235,7 @@ def test_a_line_of_equations_breaks_between_them(formulas):
     assert parts(aligned) == [aligned]
 
 
+@pytest.mark.example
 @WITH_SPHINX
 def test_site(tmp_path):
     """Without running the examples, which have a test of their own; links within the site hold."""
