@@ -17,7 +17,7 @@ import fembeam as fb
 from solvers import DormandPrince, Exponential, Newmark, System, integrate
 
 STEPS = (1e-5, 1e-6, 1e-7)  # of differences, in units of the largest motion
-SURE = 1e-4  # doubt of a difference, in units of its row, from which on a shorter step is tried
+SURE = 1e-5  # doubt of a difference, in units of its row, from which on a shorter step is tried
 SLOWEST = 2.5  # 1/(√2 - 1): error of a difference over what two steps differ by, where it falls like √step
 EVERY = 10  # of so many systems one is checked
 COUNTS = (1877, 1931, 1979, 2027, 2081, 2131, 2179)  # long steps of `Newmark` in a run

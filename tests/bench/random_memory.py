@@ -119,6 +119,7 @@ def still(rows: Any, shown: Any, begin: Any, least: Any) -> list[int]:
 def without_pairs(rows: Any, shown: Any, least: Any) -> Any:
     """The transitions but for pairs between which δ or δ̇ goes beyond a border by less than ``least`` (elements, 2).
 
+    Beyond a border of δ̇ the element may be for so short that δ moves by less: what it latches then is no other.
     Of three in a row the first two are left out; if they are given in the order of falling time, the last two.
     """
     kept: list[int] = []
@@ -126,11 +127,13 @@ def without_pairs(rows: Any, shown: Any, least: Any) -> Any:
         if kept and rows.contact[kept[-1]] == rows.contact[i] and rows.border[kept[-1]] == rows.border[i]:
             j, k = sorted((kept[-1], i), key=lambda one: rows.t[one])
             by_rate = int(rows.event[j] in BY_RATE)
-            apart = abs(rows.delta[k] - rows.delta[j])
+            apart, way = abs(rows.delta[k] - rows.delta[j]), np.inf
             if by_rate:  # the mean of a parabola between two zeros is 2/3 of its vertex
+                fast = max(abs(rows.delta_dot[j]), abs(rows.delta_dot[k]))
+                way = max(apart, 0.5 * (rows.t[k] - rows.t[j]) * fast)
                 mean = (rows.delta[k] - rows.delta[j]) / max(rows.t[k] - rows.t[j], 1e-300)
                 apart = max(1.5 * abs(mean - rows.delta_dot[j]), abs(rows.delta_dot[k] - rows.delta_dot[j]))
-            if apart <= least[rows.contact[i], by_rate]:
+            if apart <= least[rows.contact[i], by_rate] or way <= least[rows.contact[i], 0]:
                 kept.pop()
                 continue
         kept.append(i)

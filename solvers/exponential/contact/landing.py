@@ -29,6 +29,7 @@ from solvers.compiled.kernels import (
     copy,
     element_of,
     indentation,
+    indentation_and_rate,
     indentation_rate,
     inlined,
     inner,
@@ -123,8 +124,8 @@ def _error_of_work_in_time(problem, state, scratch, s, span):
     """The same of the force of an element with memory, the rate of its impulse, as a mean over the step."""
     work, impulse, largest = scratch.stages, 2 * problem.k.size + 3 + 2 * s, 1e-300
     deltas, rates, slope = scratch.clipped[0:2], scratch.trial[0:2], scratch.slope[s, :, 0:2]
-    deltas[0], rates[0] = indentation(problem, s, work[START]), indentation_rate(problem, s, work[START])
-    deltas[1], rates[1] = indentation(problem, s, work[LANDED]), indentation_rate(problem, s, work[LANDED])
+    deltas[0], rates[0] = indentation_and_rate(problem, s, work[START])
+    deltas[1], rates[1] = indentation_and_rate(problem, s, work[LANDED])
     contact_gradient(problem, s, deltas, rates, state.entry_rate[s], slope[0], slope[1], slope[2])
     by_delta, by_rate = max(abs(slope[0, 0]), abs(slope[0, 1])), max(abs(slope[1, 0]), abs(slope[1, 1]))
     bent = abs(slope[0, 0] - slope[0, 1]) > STRAIGHT * by_delta or abs(slope[1, 0] - slope[1, 1]) > STRAIGHT * by_rate
