@@ -1,11 +1,13 @@
 """Code run in processes of their own that begin with numba loaded: to load it takes longer than most of such code does.
 
-One process that has loaded it forks another for every task; nothing of `contacts` or `solvers` is known there.
+One process that has loaded it forks another for every task; nothing of `contacts` or `solvers` is known there. Scripts
+that users write begin with these and `fembeam` loaded too.
 """
 
 import atexit
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -13,16 +15,31 @@ import traceback
 from functools import cache
 from pathlib import Path
 
+LONGEST = 300  # s
+PACKAGES = """
+import os
+os.environ["MPLBACKEND"] = "Agg"
+import matplotlib.pyplot, scipy.optimize, scipy.signal, scipy.stats, skfem
+import solvers, fembeam.plot, fembeam.scene_file, fembeam.study
+from contacts import Hertz
+ball = solvers.System([[2.0]], [[0.0]], [[4.0]], [solvers.Contact([1.0], Hertz(1e6))])
+for options in {"dt": 0.01}, {"tangent": True}:
+    solvers.integrate(ball, [1e-3], [-0.5], 0.1, **options)
+"""
 
-def run(code, folder, environment):
-    """What code in a folder prints, and its warnings: like `python -c`, and by it where nothing can be forked."""
+
+def run(code, folder, environment, packages=""):
+    """What code in a folder prints, and its warnings: like `python -c`, and by it where nothing can be forked.
+
+    ``packages`` is code that the process which is forked has run.
+    """
     if not hasattr(os, "fork"):
         command = [sys.executable, "-c", code]
         done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         return done.stdout, done.stderr
     with tempfile.TemporaryDirectory() as place:
-        server, printed = _server(), [Path(place, name) for name in ("stdout", "stderr")]
+        server, printed = _server(packages), [Path(place, name) for name in ("stdout", "stderr")]
         task = {"code": code, "folder": str(folder), "environment": environment, "printed": [*map(str, printed)]}
         server.stdin.write(json.dumps(task) + "\n")
         server.stdin.flush()
@@ -32,10 +49,19 @@ def run(code, folder, environment):
         return said, warned
 
 
+def run_script(folder, path, *arguments):
+    """The same of ``python path arguments``, with the packages loaded and figures that no window shows."""
+    command, home = [str(path), *arguments], str(Path(folder, path).parent)
+    code = f"import runpy, sys\nsys.argv, sys.path[0] = {command!r}, {home!r}\n"
+    code += f"runpy.run_path({command[0]!r}, run_name='__main__')"
+    return run(code, folder, {**os.environ, "MPLBACKEND": "Agg"}, PACKAGES)
+
+
 @cache
-def _server():
+def _server(packages):
     """The process that forks others."""
-    started = subprocess.Popen([sys.executable, __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    command = [sys.executable, __file__, packages]
+    started = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     atexit.register(started.stdin.close)
     return started
 
@@ -45,6 +71,7 @@ def _serve():
     import numba
 
     numba.njit(lambda x: x)(1.0)  # which loads what numba compiles with
+    exec(sys.argv[1], {})
     for line in sys.stdin:
         child = os.fork()
         if not child:
@@ -63,6 +90,7 @@ def _work(code, folder, environment, printed):
     os.chdir(folder)
     sys.path[0], tempfile.tempdir = str(folder), None
     config.reload_config()
+    signal.alarm(LONGEST)
     try:
         exec(code, {"__name__": "__main__"})
     except BaseException:

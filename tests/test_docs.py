@@ -8,6 +8,7 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
+import fresh_process
 import pytest
 from test_imports import arrows
 
@@ -60,9 +61,9 @@ def test_code_of_a_page(page, tmp_path):
         if name:
             (tmp_path / name[1]).write_text(block, encoding="utf-8")
     (tmp_path / "page.py").write_text("\n".join(together), encoding="utf-8")
-    run(tmp_path, "page.py")
+    fresh_process.run_script(tmp_path, "page.py")
     for block in files:
-        run(tmp_path, re.match(r"# (\w+\.py)\n", block)[1])
+        fresh_process.run_script(tmp_path, re.match(r"# (\w+\.py)\n", block)[1])
 
 
 def test_the_front_page_leads_to_every_task():
