@@ -57,7 +57,7 @@ def response_spectrum(
             label = f"{name}, ζ = {zeta:g}".removeprefix(", ")
             (line,) = upper.loglog(period, one.acceleration[i, order], label=label)
             colour = line.get_color()
-            upper.loglog(period, one.pseudo_acceleration[i, order], color=colour, linestyle="--", alpha=0.6)
+            upper.loglog(period, one.pseudo_acceleration[i, order], "k--", linewidth=0.7)  # seen where they coincide
             lower.loglog(period, 1e3 * one.displacement[i, order], color=colour)
     upper.set(ylabel="largest acceleration / m s⁻²", title="Response spectrum; dashed: pseudo-acceleration ω² max |x|")
     lower.set(xlabel="period / s", ylabel="largest displacement / mm")
