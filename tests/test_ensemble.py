@@ -123,18 +123,27 @@ def test_a_model_that_was_run_can_be_sent_to_another_process():
         assert np.array_equal(pool.submit(displaced, model, here).result(), here.displacement(0.5))
 
 
-def test_other_signals_leave_the_rest_of_a_model_as_it_is():
-    model = small_model(forces=[fb.PointForce(0.3, fb.BandNoise(1.0, (0.0, 300.0), seed=2))])
-    for base, forces in (
-        (fb.BandNoise(2e-4, (0.0, 500.0), seed=8), model.scene.forces),
-        (None, [fb.PointForce(0.3, fb.Harmonic(2.0, 50.0))]),
-        (fb.Harmonic(1e-4, 200.0), []),
+def test_other_signals_gaps_and_laws_leave_the_rest_of_a_model_as_it_is():
+    foot = fb.Spring(0.4, 2e3, foot=fb.Harmonic(1e-4, 90.0))
+    held = [fb.Clamped(0.0, motion={"y": fb.Harmonic(1e-4, 70.0)})]
+    noise = fb.PointForce(0.3, fb.BandNoise(1.0, (0.0, 300.0), seed=2))
+    scene = replace(small_model(forces=[noise]).scene, springs=[foot], supports=held)
+    model = scene.reduce(modes=1)
+    rows, stop = model.contact_rows, model.scene.stops[0]
+    for change, same in (
+        ({"base": fb.BandNoise(2e-4, (0.0, 500.0), seed=8)}, True),
+        ({"base": None, "forces": [fb.PointForce(0.3, fb.Harmonic(2.0, 50.0))]}, True),
+        ({"base": fb.Harmonic(1e-4, 200.0), "forces": []}, True),
+        ({"forces": [fb.PointForce(0.35, noise.signal)]}, True),
+        ({"springs": [replace(foot, foot=fb.Harmonic(2e-4, 40.0))]}, True),
+        ({"supports": [replace(held[0], motion={"y": fb.Harmonic(2e-4, 40.0)})]}, True),
+        ({"stops": [replace(stop, law=Hertz(1e6), gap=1e-5)]}, False),
     ):
-        scene = replace(model.scene, base=base, forces=forces)
+        scene = replace(model.scene, **change)
         quick, anew = (other.simulate(0.4, 0.01) for other in (model.under(scene), replace(model, scene=scene)))
         assert np.array_equal(quick.q, anew.q)
         assert np.array_equal(quick.contacts.t_in, anew.contacts.t_in)
-    assert model.under(model.scene).contact_rows is model.contact_rows
+        assert (model.under(scene).contact_rows is rows) == same
 
 
 def test_a_model_under_loads_that_come_or_go_is_that_made_anew():

@@ -40,7 +40,7 @@ class Family:
     def at(self, parameter: float) -> Model:
         """The model at a value of the parameter."""
         scene = replaced(self.model.scene, self.name, parameter)
-        return self.model.again(scene) if changes_structure(self.name) else replace(self.model, scene=scene)
+        return self.model.again(scene) if changes_structure(self.name) else self.model.under(scene)
 
     def __call__(self, parameter: float) -> tuple[solvers.System, float]:
         """The system and its period, s; the latest are kept, because Newton's method asks for them again."""

@@ -20,7 +20,17 @@ import solvers
 from fembeam.model import initial_states
 from fembeam.response import Site, site
 from fembeam.response.shapes import Vector
-from fembeam.scene import contact_rows, loads, signals_of, static_rows, support_loads, tangent, weight
+from fembeam.scene import (
+    contact_rows,
+    load_signals,
+    loads,
+    signals_of,
+    static_rows,
+    support_loads,
+    support_motion,
+    tangent,
+    weight,
+)
 from fembeam.scene.contact_rows import ContactRow
 from fembeam.support import require
 
@@ -29,18 +39,16 @@ if TYPE_CHECKING:
     from fembeam.scene import Matrices, Scene
     from fembeam.structures import FrameForces, JoinedForces
 
-SEEN = (
-    "supports",
-    "forces",
-    "springs",
-    "bodies",
-    "impactors",
-)  # parts of a scene besides those with laws that make a system
+VARIED = "law", "gap", "clearance", "signal", "foot", "motion"  # fields of parts without which loads and contacts stay
 
 
-def _placed(part: Any) -> tuple[Any, ...]:
-    """Where and how a stop or element acts: all of it but its law and gap."""
-    return tuple(getattr(part, f.name) for f in fields(part) if f.name not in ("law", "gap", "clearance"))
+def _places(scene: Scene) -> list[Any]:
+    """What tells along which vectors contacts and loads act: parts but for their laws, gaps and signals."""
+    parts = *scene.acting, *scene.supports, *scene.forces, *scene.springs
+    kept = [[getattr(part, f.name) for f in fields(part) if f.name not in VARIED] for part in parts]
+    moved = [(type(one), [*support_motion(one)]) for one in scene.supports]
+    feet = [spring.foot is None for spring in scene.springs]
+    return [kept, moved, feet, scene.impactors, scene.bodies, [*scene.motions], [*scene.pulls]]
 
 
 def _contact(directions: Vector, one: ContactRow) -> solvers.Contact:
@@ -241,22 +249,17 @@ class ModalEquations:
         return moved + [(-self.participation_along(one), g) for one, g in weight(scene).items()]
 
     def system_like(self, scene: Scene) -> solvers.System:
-        """The same as `system_of`, quicker where only base motion, gaps and laws of its stops and elements differ."""
-        own, frame = self.system, self._frame_loads(scene)
-        parts, known = scene.acting, self.scene.acting
-        if (
-            any(_placed(new) != _placed(old) for new, old in zip(parts, known, strict=True))
-            or any(getattr(scene, name) != getattr(self.scene, name) for name in SEEN)
-            or ([*scene.motions], [*scene.pulls]) != ([*self.scene.motions], [*self.scene.pulls])
-        ):
+        """The same as `system_of`, quicker where only signals, gaps and laws of its own parts differ."""
+        if _places(scene) != _places(self.scene):
             return self.system_of(scene)
+        own, parts, known = self.system, scene.acting, self.scene.acting
         contacts = [
             contact if new is old else replace(contact, law=new.law, gap=new.gap)
             for contact, new, old in zip(own.contacts, parts, known, strict=False)
         ]
-        kept = own.loads[: len(own.loads) - len(frame)]
-        moved = [(vector, signal) for (vector, _), (_, signal) in zip(own.loads[len(kept) :], frame, strict=True)]
-        return own.like([*contacts, *own.contacts[len(known) :]], [*kept, *moved])
+        signals = [*load_signals(scene), *(signal for _, signal in self._frame_loads(scene))]
+        moved = [(vector, signal) for (vector, _), signal in zip(own.loads, signals, strict=True)]
+        return own.like([*contacts, *own.contacts[len(known) :]], moved)
 
     @cached_property
     def linear_elements(self) -> tuple[Vector, Vector]:

@@ -47,7 +47,12 @@ UNDRIVEN = (
     "directions",
     "rows_of",
     "turning",
-)
+)  # of what is computed once of a model: what no signal changes, and but for the rows of contacts no gap or law
+
+
+def _with_laws(scene: Scene) -> list[Any]:
+    """All parts of a scene and of its bodies that have a law."""
+    return [part for one in (scene, *scene.bodies) for part in (*one.acting, *one.impactors)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,9 +124,11 @@ class Model(Printed, ModalEquations):
         return PlacedLog.of(solvers.integrate(system, *start, np.pi / slowest).contacts, self.sites[stop : stop + 1])
 
     def under(self, scene: Scene) -> Model:
-        """The same model of a scene that differs in its signals only; what does not depend on them is kept."""
+        """The same model of a scene that differs in signals, gaps and laws only; what depends on none is kept."""
         other = replace(self, scene=scene)
         kept = {name: self.__dict__[name] for name in UNDRIVEN if name in self.__dict__}
+        if any(new is not old for new, old in zip(_with_laws(scene), _with_laws(self.scene), strict=True)):
+            kept.pop("contact_rows", None)
         other.__dict__.update(kept, system=self.system_like(scene))
         return other
 
@@ -344,7 +351,7 @@ class Model(Printed, ModalEquations):
         """
         from fembeam.model.orbit import attractors
 
-        model = self if omega is None else replace(self, scene=with_value(self.scene, "omega", omega))
+        model = self if omega is None else self.under(with_value(self.scene, "omega", omega))
         return attractors(model, starts, longest, seed)
 
     def branch(

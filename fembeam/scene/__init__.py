@@ -14,6 +14,7 @@ from fembeam.scene.contact_rows import (
     carried_on,
     contact_rows,
     heights,
+    load_signals,
     loaded,
     loads,
     static_rows,

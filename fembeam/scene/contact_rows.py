@@ -188,15 +188,25 @@ def _distinct(rows: list[ContactRow]) -> list[str]:
 
 def loads(scene: Scene, matrices: Matrices) -> list[tuple[sparse.csr_matrix, Any]]:
     """(row (1, N), signal) of supports that move, three for each dof, then every point force, moment, moving foot."""
-    rows = support_loads(scene, matrices)
+    rows = [row for row, _ in support_loads(scene, matrices)]
     for body, part in enumerate((scene, *scene.bodies)):
-        for force in part.forces:
-            rows.append((force.coordinate.row(matrices, body), force.signal))
+        rows += [force.coordinate.row(matrices, body) for force in part.forces]
         for spring in part.springs:
             if spring.foot is not None:
                 at = LocalCoordinate(spring.z, direction=spring.along)
-                rows.append((spring.stiffness * at.row(matrices, body), spring.foot))
-    return rows
+                rows.append(spring.stiffness * at.row(matrices, body))
+    return list(zip(rows, load_signals(scene), strict=True))
+
+
+def load_signals(scene: Scene) -> list[Any]:
+    """The signals of `loads`, in their order."""
+    parts = scene, *scene.bodies
+    motions = [motion for part in parts for support in part.supports for motion in support_motion(support).values()]
+    found = [signal for motion in motions for signal in (motion, motion.derivative(1), motion.derivative(2))]
+    for part in parts:
+        found += [force.signal for force in part.forces]
+        found += [spring.foot for spring in part.springs if spring.foot is not None]
+    return found
 
 
 def support_loads(scene: Scene, matrices: Matrices) -> list[tuple[sparse.csr_matrix, Any]]:

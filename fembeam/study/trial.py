@@ -140,7 +140,7 @@ class Trial:
         """(k, q) independent values of every quantity, or why the run failed."""
         scene = self.at(point)
         try:
-            model = scene.reduce(**self.reduction) if self.model is None else replace(self.model, scene=scene)
+            model = scene.reduce(**self.reduction) if self.model is None else self.model.under(scene)
             return values_of(self.asked, runs(model, self.plan, self.asked, self.method), self.told(point))
         except (solvers.SolverError, AccuracyError) as error:
             return f"{type(error).__name__}: {error}"
