@@ -1,8 +1,6 @@
 """SIMD vectors, sums and packed arguments against numpy and the tuples they stand for."""
 
-import ast
 import re
-from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -10,12 +8,11 @@ import pytest
 from numba import njit, types
 from scipy.integrate import DOP853
 from scipy.special import eval_jacobi, roots_jacobi
-from test_imports import tree_of
 
 from contacts import Hertz, KelvinVoigt, Viscoelastic
 from fembeam import Harmonic
 from solvers import Contact, Exponential, System
-from solvers.compiled import decorators, dop853_tableau
+from solvers.compiled import dop853_tableau
 from solvers.compiled.fields import dimensions_of, packed_type, shapes_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned, unpacker
 from solvers.compiled.simd import bit_pattern, load8, positive8, splat8, sqrt8, store8, sum8
@@ -333,46 +330,6 @@ def test_nodes_and_coefficients_of_jacobi_are_those_of_scipy(beta):
     np.testing.assert_allclose(weights, areas / 2.0 ** (beta + 1.0), rtol=1e-13)
     polynomials = np.array([eval_jacobi(k, 0.0, beta, x) for k in range(S)])
     np.testing.assert_allclose(spectrum @ polynomials.T, np.eye(S), atol=1e-13)
-
-
-PRIVATE = "numba.core", "numba.np", "llvmlite"
-USERS = {  # the files that stand on what numba does not promise, and why
-    "solvers/compiled/decorators.py",  # options of njit, described there; when it compiles
-    "solvers/compiled/cache.py",  # llvmlite's version; numba's cache
-    "solvers/compiled/packed.py",  # a type of its own, and loads through a pointer
-    "solvers/compiled/simd.py",  # a type of its own, and vector instructions
-    "solvers/compiled/kernels.py",  # calls of C functions at an address
-    "solvers/compiled/parts.py",  # the same
-    "contacts/kernels.py",  # the same; numba's cache
-    "contacts/sum_kernels.py",  # the same
-    "contacts/memory/custom_kernels.py",  # parameters as a tuple
-    "contacts/custom_kernels.py",  # parameters as a tuple; the compiler's errors; functions without wrappers
-}
-OPTION_NAMES = {"_nrt", "forceinline", "no_cpython_wrapper", "no_cfunc_wrapper", "inline"}
-
-
-def leans_on(path):
-    """What a file uses of numba that is not promised: modules imported, options of decorators."""
-    for node in ast.walk(tree_of(path)):
-        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-        names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
-        yield from (name for name in names if name.startswith(PRIVATE))
-        if isinstance(node, ast.keyword) and node.arg in OPTION_NAMES:
-            yield node.arg
-        if isinstance(node, ast.Constant) and node.value in OPTION_NAMES - {"inline"}:
-            yield node.value
-
-
-def test_only_named_files_stand_on_what_numba_does_not_promise():
-    home = Path(decorators.__file__).parent.parent.parent
-    files = [
-        path for package in ("fembeam", "contacts", "reduction", "solvers") for path in home.glob(package + "/**/*.py")
-    ]
-    found = {str(path.relative_to(home).as_posix()): {*leans_on(path)} for path in files}
-    assert {name for name, used in found.items() if used} == USERS
-    options = {name: used & OPTION_NAMES for name, used in found.items() if used & OPTION_NAMES}
-    wrappers = {"no_cpython_wrapper", "no_cfunc_wrapper"}
-    assert options == {"solvers/compiled/decorators.py": OPTION_NAMES, "contacts/custom_kernels.py": wrappers}
 
 
 class Declared(NamedTuple):

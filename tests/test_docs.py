@@ -10,7 +10,6 @@ from pathlib import Path
 
 import fresh_process
 import pytest
-from test_imports import arrows
 
 import contacts
 import fembeam
@@ -98,29 +97,6 @@ def test_files_named_in_the_architecture_exist():
     assert [name for name in named if not (HOME / name).is_file()] == []
     way = text[text.index("### The way of one run") : text.index("A method of constant step replaces")]
     assert 18 <= len(set(re.findall(r"`[\w/]+\.py`", way))) <= 25
-
-
-def listed_imports():
-    """By folder: those that CONTRIBUTING lets it import, directly or through others."""
-    lines = re.findall(
-        r"^((?:contacts|reduction|solvers|fembeam)[.\w]*) .*?(?:<- (.*))?$", text_of("CONTRIBUTING.md"), re.M
-    )
-    found = {room: set() for room, _ in lines}
-    for room, named in lines:
-        for one in re.findall(r"\w+", named):
-            beside = f"{room.split('.')[0]}.{one}"
-            found[room].add(beside if beside in found else one)
-    for _ in lines:
-        found = {room: named.union(*(found[one] for one in named)) for room, named in found.items()}
-    return found
-
-
-def test_folders_import_what_is_listed():
-    listed = listed_imports()
-    for room, read in arrows().items():
-        package = room.split(".")[0]
-        names = {one if one.startswith(package) else one.split(".")[0] for one in read} - {"fembeam"}
-        assert names <= listed[room], f"CONTRIBUTING does not list that {room} imports {names - listed[room]}"
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -1,8 +1,6 @@
 """Scenes: the paper's beam, features on the mesh, damping, and what is refused."""
 
 import math
-import subprocess
-import sys
 from fractions import Fraction
 
 import numpy as np
@@ -411,11 +409,6 @@ def test_independent_formulation_of_the_free_beam():
     matrices, basis = basis_of(scene, 6, elements=12)
     reference = linalg.eigh(matrices.K.toarray(), matrices.M.toarray(), eigvals_only=True)
     np.testing.assert_allclose(basis.omega[2:] ** 2, reference[2:6], rtol=1e-8)
-
-
-def test_import_is_light():
-    code = "import sys, fembeam.scene.scene; print({'skfem', 'matplotlib', 'numba'} & set(sys.modules))"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout == "set()\n"
 
 
 STEEL = fb.Section.circle(2.1e11, 7800.0, 0.01)

@@ -2,7 +2,6 @@
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
-from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -38,8 +37,7 @@ def shifted(x):
 @pytest.mark.parametrize("pool", [None, ThreadPoolExecutor, ProcessPoolExecutor])
 def test_spread_keeps_the_order(pool):
     items = range(20, 9, -1)
-    options = {"mp_context": get_context("forkserver")} if pool is ProcessPoolExecutor else {}
-    executor = pool(2, **options) if pool else None
+    executor = pool(2) if pool else None
     try:
         assert spread(shifted, iter(range(5, -1, -1)), executor) == [6, 5, 4, 3, 2, 1]
         with pytest.raises(ValueError, match="thirteen") as error:
