@@ -128,13 +128,14 @@ def _pieces(law: Law, row: Vector, at: float, goal: float, rate: float, tiny: fl
 
 def _first_fallen(borders: Callable[[Vector], Vector], low: float, high: float, floor: Vector) -> float:
     """Where the first border falls below its floor between two points, to rounding: at ``high`` it has."""
+    least = abs(high - low) * 2.0**-60  # whose rounding will do at δ = 0, where numbers have no least spacing
     while True:
         points = low + (high - low) * SAMPLES
         points[-1] = high
         k = int(np.argmax(np.any(borders(points[1:]) < floor, axis=0)))
         if points[k] == low and points[k + 1] == high:
             return high
-        if abs(high - low) <= 2.0 * np.spacing(max(abs(high), abs(low))):
+        if abs(high - low) <= 2.0 * np.spacing(max(abs(high), abs(low), least)):
             return high
         low, high = float(points[k]), float(points[k + 1])
 

@@ -46,7 +46,7 @@ OWN, JENKINS = friction(stiffness=2e4, limit=10.0), Jenkins(2e4, 10.0)
 
 
 def test_it_is_the_built_in_law():
-    path = 2e-3 * np.random.default_rng(1).uniform(-1.0, 1.0, 300)
+    path = 2e-3 * np.random.default_rng(1).uniform(-1.0, 1.0, 100)
     np.testing.assert_allclose(OWN.along(path), JENKINS.along(path), rtol=1e-13, atol=1e-13)
     assert (OWN.memory, OWN.borders, OWN.events) == ((0, 1, 2), 1, ("stick", "slip"))
     assert not OWN.one_sided
@@ -172,7 +172,7 @@ def test_segments_may_be_passed_at_one_place():
 
 
 def test_sliders_that_slip_and_stick_together_are_not_refused():
-    path = 2e-3 * np.random.default_rng(3).uniform(-1.0, 1.0, 200)
+    path = 2e-3 * np.random.default_rng(3).uniform(-1.0, 1.0, 60)
     all_at_once = Iwan([2e4] * 30, [10.0 + 1e-13 * j for j in range(30)])
     np.testing.assert_allclose(all_at_once.along(path), 30.0 * JENKINS.along(path), rtol=1e-10, atol=1e-9)
 
