@@ -54,13 +54,27 @@ def pytest_collection_modifyitems(config, items):
     items[:] = [item for item in items if not item.get_closest_marker("example")]
 
 
-@pytest.fixture
-def dots(monkeypatch):
-    """Figures are saved as dots, for tests that do not look at them: to draw takes most of the time of what writes."""
+@pytest.fixture(scope="session", autouse=True)
+def dots():
+    """Figures of result folders are saved as dots: to draw takes most of the time of what writes. The plain method."""
     from matplotlib.figure import Figure
 
     plain = Figure.savefig
-    monkeypatch.setattr(Figure, "savefig", lambda _, place, **options: plain(Figure((0.1, 0.1)), place, **options))
+
+    def save(figure, place, **options):  # with metadata: from `write_figure`
+        plain(Figure((0.1, 0.1)) if "metadata" in options else figure, place, **options)
+
+    Figure.savefig = save
+    yield plain
+    Figure.savefig = plain
+
+
+@pytest.fixture
+def whole_figures(dots, monkeypatch):
+    """Figures are saved as they are."""
+    from matplotlib.figure import Figure
+
+    monkeypatch.setattr(Figure, "savefig", dots)
 
 
 @pytest.hookimpl(wrapper=True)

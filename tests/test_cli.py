@@ -26,7 +26,6 @@ from fembeam.scene import Source
 from fembeam.scene_file import built, kinds, read, template
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "beam_stop.toml"
-pytestmark = pytest.mark.usefixtures("dots")
 FIGURES = ["rig.png", "time_history.png", "psd.png", "densities.png", "contacts.png", "modes.png"]
 
 
@@ -49,8 +48,7 @@ def refused(capsys, *arguments):
     return said.err
 
 
-def test_run_writes_run_summary_and_figures(tmp_path, capsys, monkeypatch):
-    monkeypatch.undo()  # whole figures
+def test_run_writes_run_summary_and_figures(tmp_path, capsys, whole_figures):
     out = tmp_path / "results" / "new"
     assert main(["run", str(scene(tmp_path)), "--out", str(out), "--quiet"]) == 0
     said = capsys.readouterr()

@@ -57,7 +57,7 @@ def mirrored(scene):
     return fb.Scene(scene.beam, scene.supports, scene.masses, stops=stops, damping=scene.damping, base=drive)
 
 
-@settings(max_examples=15, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
+@settings(max_examples=8, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 @given(scene=scenes(), modes=st.integers(1, 4))
 def test_random_scenes_keep_energy_and_symmetry(scene, modes):
     model = scene.reduce(modes)
