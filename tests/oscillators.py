@@ -105,6 +105,7 @@ class Bilinear:
                 return x, self.march(x, duration)[1], switches
         raise ArithmeticError(f"no orbit: the last step was {step}")
 
+    @cache  # noqa: B019 (a few values)
     def settled(self, periods=200):
         """State after a run from rest."""
         return self.march(np.zeros(2), periods * self.period)[0]

@@ -8,7 +8,7 @@ from oscillators import Tone, random_family, random_stops_family
 
 from contacts import Hysteretic, PiecewiseLinear
 from solvers import Contact, DormandPrince, OrbitError, System, branch, integrate, orbit
-from solvers.branches import BranchStatus, merging, walk
+from solvers.branches import BranchStatus, walk
 from solvers.branches.bifurcations import between
 from solvers.branches.grazing import signature
 from solvers.branches.nonsmooth import nonsmooth_near
@@ -194,11 +194,14 @@ def test_two_mergings_at_once_are_crossed(merged):
     assert [one.parameter for one in twice] == pytest.approx([one.parameter for one in once], rel=1e-7)
 
 
-def test_a_jump_without_a_way_over_is_said(monkeypatch):
-    """Fewer and coarser searches for a way than a branch makes tell it as well."""
-    monkeypatch.setattr(walk, "_SMALLEST", 1e-6)
-    monkeypatch.setattr(walk, "_AGAIN", 1e-9)
-    monkeypatch.setattr(merging, "_FACTORS", (1.3, 1.5, 4.0))
-    make, span, _ = random_stops_family(np.random.default_rng(124), "gap", 2)
-    found = branch(make, span, orbit(*make(span[0])), at=span[0], step=0.3).run()
+def test_a_jump_without_a_way_over_is_said(monkeypatch, pairs):
+    """Where the orbits that would lead over it are lost."""
+
+    def lost(*_):
+        raise OrbitError("lost")
+
+    monkeypatch.setattr(walk, "behind", lost)
+    found = branch(family(LATCHED), (TWO[0], 330.5), TWO[1], at=TWO[0]).run()
     assert found.status == (BranchStatus.JUMP,)
+    _, one = pairs[1]
+    assert found.orbits[-1].parameter == pytest.approx(one.parameter, abs=1e-5)

@@ -162,8 +162,9 @@ def test_subharmonic_and_the_same_orbit_over_two_periods():
     twice = orbit(UNSTABLE.system(), 2 * period, once.state)
     np.testing.assert_allclose(twice.state, once.state, rtol=0.0, atol=1e-10)
     np.testing.assert_allclose(twice.monodromy, once.monodromy @ once.monodromy, rtol=0.0, atol=1e-9)
-    sub = orbit(UNSTABLE.system(), 2 * period, UNSTABLE.settled(200))
-    x, monodromy, switches = UNSTABLE.orbit(UNSTABLE.settled(200), periods=2)
+    settled = UNSTABLE.settled()
+    sub = orbit(UNSTABLE.system(), 2 * period, settled)
+    x, monodromy, switches = UNSTABLE.orbit(settled, periods=2)
     assert sub.stable
     assert np.abs(x - once.state).max() > 0.1
     np.testing.assert_allclose(sub.state, x, rtol=0.0, atol=1e-10)
