@@ -46,29 +46,6 @@ def run():
     return ran(whirling())
 
 
-def test_a_planar_motion_meets_two_one_sided_stops():
-    drive = [pushed(60.0, 210.0)]
-    one = ran(held([fb.AnnularStop(0.4, LAW, 2e-4)], drive), 0.1)
-    two = ran(held([fb.Stop(0.4, LAW, 2e-4, direction=n) for n in ("x", "-x")], drive), 0.1)
-    assert len(one.contacts.t_in) == len(two.contacts.t_in) > 4
-    np.testing.assert_allclose(one.contacts.t_in, two.contacts.t_in, rtol=0.0, atol=1e-10)
-    np.testing.assert_allclose(one.q, two.q, rtol=0.0, atol=1e-8 * np.abs(two.q).max())
-    sideways = two.force(1) - two.force(0)  # on the place along x: the one at -x pushes it up
-    np.testing.assert_allclose(one.force(0)[:, 0], sideways, rtol=0.0, atol=1e-5 * np.abs(sideways).max())
-    assert np.abs(one.force(0)[:, 1]).max() < 1e-9 * np.abs(sideways).max()
-
-
-def test_turning_the_loads_and_the_directions_turns_the_motion(run):
-    c, s = np.cos(0.7), np.sin(0.7)
-    ways = (c, s, 0.0), (-s, c, 0.0)
-    forces = [pushed(60.0, 210.0, 0.0, ways[0]), pushed(30.0, 130.0, 1.0, ways[1])]
-    other = ran(held([fb.AnnularStop(0.4, LAW, 2e-4, directions=ways)], forces))
-    assert len(run.contacts) > 5
-    np.testing.assert_allclose(other.contacts.t_in, run.contacts.t_in, rtol=0.0, atol=1e-8)
-    np.testing.assert_allclose(other.force(0), run.force(0), rtol=0.0, atol=1e-5 * np.abs(run.force(0)).max())
-    np.testing.assert_allclose(other.displacement(0.7, ways[1]), run.displacement(0.7, "y"), rtol=0.0, atol=1e-9)
-
-
 def test_the_matrix_level_gives_the_same_motion():
     """EI = ρA = L = 1, clamped and free, by the exact roots of cos β cosh β = -1; a hole at the tip."""
     roots = np.array([1.8751040687119611, 4.694091132974175])

