@@ -8,7 +8,7 @@ import pytest
 from contacts import Hertz
 from solvers import Contact, Exponential, Status, System, integrate
 
-FLIGHTS = 350  # 50 of every number of modes
+FLIGHTS = 140  # 20 of every number of modes
 SOFT = Hertz(1e-3)  # hardly disturbs the motion: the first entry is that of the flight
 
 

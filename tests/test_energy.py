@@ -95,9 +95,7 @@ def at_ends(s, h):
     return np.concatenate((s[:3], after))
 
 
-@pytest.mark.parametrize(
-    "signals", [[], [Nodes()], [fb.Harmonic(2.0, 13.0)], [fb.Harmonic(2.0, 13.0), Nodes()]], ids=len
-)
+@pytest.mark.parametrize("signals", [[], [Nodes()], [fb.Harmonic(2.0, 13.0), Nodes()]], ids=len)
 def test_forms_of_flight_steps_are_their_quadrature(signals):
     """Long and short steps and the step of its own length, for rigid, critical, over- and hardly damped blocks."""
     problem, tables, energy_tables = prepared(blocks(signals))
@@ -113,8 +111,10 @@ def test_forms_of_flight_steps_are_their_quadrature(signals):
         np.testing.assert_array_less(abs(by_forms(energy_tables, level, x, s) - exact), 1e-12 * parts + 1e-300)
 
 
-@pytest.mark.parametrize(("power", "lead"), [(1.0, 0.0), (2.0, 3.0), (4.0, 1.0)])
-@pytest.mark.parametrize(("k", "c"), [(0.0, 0.0), (4.0, 4.0), (30.0, 40.0), (900.0, 0.6)])
+@pytest.mark.parametrize(
+    ("power", "lead", "k", "c"),
+    [(1.0, 0.0, 900.0, 0.6), (2.0, 3.0, 0.0, 0.0), (2.0, 3.0, 30.0, 40.0), (4.0, 1.0, 4.0, 4.0)],
+)
 def test_tables_of_contact_steps_are_their_quadrature(power, lead, k, c):
     """∫ L_i v dt and ∫ v² dt of a block under forces given at the nodes, all of one integration of the equation."""
     from scipy.special import roots_jacobi
@@ -158,7 +158,7 @@ def by_sums(problem, tables, energy_tables, node_set, place, x, heads):
 
 
 @pytest.mark.parametrize("node_set", [0, 1, 2])
-@pytest.mark.parametrize("signals", [[Nodes()], [fb.Harmonic(2.0, 13.0)], [fb.Harmonic(2.0, 13.0), Nodes()]], ids=len)
+@pytest.mark.parametrize("signals", [[Nodes()], [fb.Harmonic(2.0, 13.0), Nodes()]], ids=len)
 def test_sums_over_blocks_are_their_quadrature(signals, node_set):
     """Blocks of all kinds under two stops' forces, a signal and a tone: one integration of motion and powers."""
     stops = [*FREE, Contact([-0.8, 0.3, 1.2, -0.6], Hertz(1e6), gap=1e9)]

@@ -222,8 +222,8 @@ def at_random_times(band, order):
     return t, BandNoise(1e-3, band, seed=11).derivative(order)(t)
 
 
-@pytest.mark.parametrize("rtol", [1e-2, 1e-4, 1e-6, 1e-9])
-@pytest.mark.parametrize(("band", "order"), [(BROAD, 0), (BROAD, 2), (NARROW, 2)])
+@pytest.mark.parametrize("rtol", [1e-2, 1e-6, 1e-9])
+@pytest.mark.parametrize(("band", "order"), [(BROAD, 0), (NARROW, 2)])
 def test_nodes_keep_their_promise(band, order, rtol):
     noise = BandNoise(1e-3, band, seed=11).derivative(order)
     dt, values = noise.nodes(3.0, rtol)
@@ -235,7 +235,7 @@ def test_nodes_keep_their_promise(band, order, rtol):
     assert error > 0.4 * rtol * noise.rms or rtol >= 1e-4  # no finer than need be, unless to hold the highest line
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(
     ratio=st.floats(0.0, 3.0),
     width=st.floats(1.0, 2000.0),
@@ -505,7 +505,7 @@ def test_record_band_tames_the_noise_of_the_second_derivative():
 
 
 @pytest.mark.drawn
-@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-9])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-9])
 @pytest.mark.parametrize("order", [0, 2])
 def test_record_nodes_keep_their_promise(order, rtol):
     signal, _ = tones_below(0.3)

@@ -65,7 +65,7 @@ def test_zeros_are_found():
 def test_intervals_hold_the_truth_as_often_as_they_say(kind):
     # tests/bench/collisions.py does more experiments and kinds; here what 95 % rejects once in a million
     made, options = KINDS[kind]
-    count = 50
+    count = 25
     shares, widths = coverage(count, made, options, seed=11)
     fewest = binom.ppf(1e-6, count, 0.95)
     assert np.all(count * shares[[0, 2, 3]] >= fewest), shares
@@ -195,7 +195,7 @@ def test_a_force_that_pulls_is_refused(timed, exponent):
         identify(**second, exponent=exponent)
 
 
-@pytest.mark.parametrize("factor", [0.05, 5.0, 50.0, 1e3])
+@pytest.mark.parametrize("factor", [0.05, 1e3])
 def test_a_force_that_is_mostly_damping_is_no_force_that_pulls(factor):
     found = identify(**loops_of(Hysteretic(2.1e8, factor)))
     assert found.damping_factor.value == pytest.approx(factor, rel=1e-2)
@@ -205,7 +205,7 @@ def test_a_force_that_is_mostly_damping_is_no_force_that_pulls(factor):
 
 
 @pytest.mark.parametrize("timed", [False, True])
-@pytest.mark.parametrize("size", [1e300, 1e150, 1e-150, 1e-300])
+@pytest.mark.parametrize("size", [1e300, 1e-150])
 @pytest.mark.parametrize("what", ["delta", "force", "motion"])
 def test_sizes_that_no_record_has_are_refused(timed, size, what):
     data = loops_of(Hysteretic(2.1e8, 0.5625), timed=timed)

@@ -180,7 +180,7 @@ def test_any_parameters_give_a_law_that_works_or_a_refusal(name):
     """Text, restitution and forces are finite, the restitution lies in [0, 1]; nothing warns."""
     made = []
 
-    @settings(fast, max_examples=40)
+    @settings(fast, max_examples=20)
     @given(MADE[name], POSITIVE, POSITIVE)
     def tried(one_of, speed, mass):
         make, arguments, *options = one_of

@@ -47,7 +47,7 @@ LAWS = {
 
 
 @pytest.mark.drawn
-@pytest.mark.parametrize("name", ["jenkins", "bouc_wen"])
+@pytest.mark.parametrize("name", ["jenkins", "coulomb"])
 def test_white_noise_gives_the_same_power_whatever_the_law(name):
     r"""A force of one-sided level G (per rad/s) up to ω_c gives, on average, G φ² (π/2 - c/ω_c): all of it is taken.
 

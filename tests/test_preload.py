@@ -51,7 +51,7 @@ def wedge(ratio, width_ratio=1.0):
 # --- tapers -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("taper", [wedge(0.5), wedge(0.2), wedge(0.1, 0.1), wedge(1.0, 0.3)])
+@pytest.mark.parametrize("taper", [wedge(0.2), wedge(0.1, 0.1)])
 def test_tapered_cantilever_against_its_differential_equation(taper):
     beam = fb.Beam(1.0, taper)
     for omega in omegas(fb.Scene(beam, CLAMPED), 3):
@@ -95,9 +95,8 @@ def test_root_squares_to_the_stiffness_whatever_the_beam(beam):
 # --- elastic supports and foundations -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("k", [0.1, 1e3])
-def test_elastic_tip_support(k):
-    beam = fb.Beam(1.0, UNIT)
+def test_elastic_tip_support():
+    beam, k = fb.Beam(1.0, UNIT), 1e3
     for omega in omegas(fb.Scene(beam, CLAMPED, springs=[fb.Spring(1.0, k)]), 3):
         assert exact_near(omega, beam, tip_stiffness=k) == pytest.approx(omega, rel=1e-6)
 
@@ -170,7 +169,7 @@ def test_pinned_beam_under_axial_force(share):
     np.testing.assert_allclose(omegas(scene, 3), np.sqrt(n**4 + force * n**2), rtol=1e-6)
 
 
-@pytest.mark.parametrize("force", [-2.0, -0.5, 3.0, 100.0])
+@pytest.mark.parametrize("force", [-2.0, 100.0])
 def test_cantilever_under_a_dead_axial_load(force):
     beam = fb.Beam(1.0, UNIT, axial_force=force)
     for omega in omegas(fb.Scene(beam, CLAMPED), 3):

@@ -57,8 +57,7 @@ def test_rigid_and_flexible_limits():
     assert flexible.velocity[0, 0] == pytest.approx(np.abs(velocity).max(), rel=1e-5)
 
 
-@pytest.mark.parametrize("omega", [2.0, 40.0, 300.0])
-@pytest.mark.parametrize("zeta", [0.0, 0.05, 0.7])
+@pytest.mark.parametrize(("omega", "zeta"), [(2.0, 0.7), (40.0, 0.05), (40.0, 0.7), (300.0, 0.0)])
 def test_against_scipy_on_a_grid_of_its_own(omega, zeta):
     """`lsim` is exact for straight lines, too; its largest sample of 200 a step is below the maximum by (ω h)²/8."""
     t, a = record(samples=200)

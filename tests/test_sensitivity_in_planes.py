@@ -156,10 +156,8 @@ def run():
 @pytest.mark.parametrize(
     ("path", "share"),
     [
-        ("stops[0].clearance", 2e-4),
         ("stops[0].centre[1]", 2e-3),
         ("stops[0].friction.mu", 2e-3),
-        ("stops[0].friction.stiffness", 2e-3),
         ("forces[0].signal.amplitude", 1e-4),
         ("damping.zeta[0]", 1e-3),
     ],

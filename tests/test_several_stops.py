@@ -258,17 +258,17 @@ def test_a_run_without_samples_that_gains_energy_is_refused(monkeypatch):
 
 
 def test_random_scenes(monkeypatch):
-    """Motion, and every number of every contact, of 15 scenes of all kinds against the reference.
+    """Motion, and every number of every contact, of 8 scenes of all kinds against the reference.
 
     Two more begin at rest on the surface of a preloaded stop, with dashpots: what δ̇ is rounded to must not open it.
     """
     monkeypatch.syspath_prepend(str(Path(__file__).parent / "bench"))
     from random_scenes import judge
 
-    kinds = {seed: judge(seed)[1].kind for seed in (*range(2000, 2015), 931476, 930422)}
+    kinds = {seed: judge(seed)[1].kind for seed in (*range(2000, 2008), 931476, 930422)}
     allowed = "fine", "ill-conditioned", "the reference failed"
     assert {seed: kind for seed, kind in kinds.items() if kind not in allowed} == {}
-    assert list(kinds.values()).count("fine") > 12
+    assert list(kinds.values()).count("fine") > 7
 
 
 @pytest.mark.parametrize("size", [1e-15, 1e-9, 1e75, 1e150])
@@ -288,10 +288,10 @@ def test_motions_of_any_size_are_those_of_size_one(size):
 
 
 def test_a_stop_beyond_the_turning_point_is_not_landed_on():
-    """One stiff linear stop, a second 1 to 30 times as deep as the first lets the mass come: 600 gaps."""
+    """One stiff linear stop, a second 1 to 30 times as deep as the first lets the mass come: 200 gaps."""
     stiffness, start, speed = 1.4e10, 7.84e-6, 2.0
     deepest = math.hypot(start, speed / math.sqrt(stiffness))
-    for ratio in np.geomspace(1.0001, 30.0, 600):
+    for ratio in np.geomspace(1.0001, 30.0, 200):
         contacts = [Contact([1.0], Hertz(stiffness, 1.0), 0.0), Contact([1.0], Hertz(1e9), ratio * deepest)]
         system = System.modal([0.0], 0.0, contacts)
         contacts = integrate(system, [-start], [-speed], 2e-5, method=Exponential(1e-3)).contacts

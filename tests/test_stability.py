@@ -55,7 +55,7 @@ def measured(method, system, q0, q_dot0, low, high, rest=None):
 
 
 @pytest.mark.parametrize("method", [heun, RK4, CentralDifference, linear_acceleration, damped_newmark])
-@pytest.mark.parametrize("zeta", [1e-3, 0.01, 0.1])
+@pytest.mark.parametrize("zeta", [1e-3, 0.1])
 def test_predicted_limit_is_the_measured_one(method, zeta):
     system = System.modal([2.0, 50.0], [0.02, zeta])
     predicted = method(1.0).stable_dt(system).flight
@@ -162,7 +162,7 @@ def exact_limit(method, M, C, K, around):
 
 
 DASHPOTS = [
-    *(partial(chain, seed) for seed in range(10)),
+    *(partial(chain, seed) for seed in range(4)),
     partial(damped_beam, 12, 3.0),
     partial(damped_beam, 31, 300.0),
 ]
@@ -208,8 +208,11 @@ def pressed(depth, law=None, zeta=0.02):
     return System.modal(omega, zeta, [Contact(w, law, float(-w @ rest - depth))]), rest
 
 
-@pytest.mark.parametrize("method", [heun, RK4, CentralDifference, linear_acceleration])
-@pytest.mark.parametrize("law", [Hertz(1e6), PiecewiseLinear([5e4])], ids=["hertz", "linear"])
+@pytest.mark.parametrize(
+    ("method", "law"),
+    [(heun, Hertz(1e6)), (RK4, PiecewiseLinear([5e4])), (CentralDifference, Hertz(1e6)),
+     (linear_acceleration, PiecewiseLinear([5e4]))],
+)  # fmt: skip
 def test_limit_in_a_lasting_contact(method, law):
     depth = 1e-3
     system, rest = pressed(depth, law)

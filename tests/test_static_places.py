@@ -17,7 +17,7 @@ FLAT = Section.rectangle(2.1e11, 7850.0, 0.02, 0.005)
 # --- floating structures ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("modes", [8, 9, 10, 11, 12, 13])
+@pytest.mark.parametrize("modes", [8, 11, 13])
 @pytest.mark.parametrize("ends", ["free", "guided", "guided on both sides"])
 @pytest.mark.filterwarnings("ignore:.*rigid-body")
 def test_default_meshes_serve_floating_beams(ends, modes):
@@ -42,7 +42,7 @@ def pair(apart, supports, z=0.31):
 
 
 @pytest.mark.parametrize("way", ["residual", "interface"])
-@pytest.mark.parametrize("apart", [0.0, 1e-12, 1e-8, 1e-7, 3e-6, 1e-5, 1e-4, 10**-3.5, 1e-3, 1e-2])
+@pytest.mark.parametrize("apart", [0.0, 1e-12, 1e-7, 3e-6, 10**-3.5, 1e-2])
 @pytest.mark.parametrize("supports", [[Clamped(0.0)], [Pinned(0.0), Pinned(0.5)], [Guided(0.0)]])
 @pytest.mark.filterwarnings("ignore:.*rigid-body")
 def test_stops_close_together(supports, apart, way):

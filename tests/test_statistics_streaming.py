@@ -299,16 +299,15 @@ def test_linear_beam_under_band_limited_base_motion():
 
 
 @pytest.mark.chaotic
-@pytest.mark.parametrize("modes", [1, 2])
-def test_hertz_stop_under_wide_band_noise_has_the_exact_density(modes):
+def test_hertz_stop_under_wide_band_noise_has_the_exact_density():
     """One dashpot c and one noise force at the tip: white noise of S = 2cθ/π gives the density exp(-(T + V)/θ).
 
     V = Σ ω²q²/2 + 2/5 K δ^2.5, so δ is Gaussian times exp(-2/5 K δ^2.5/θ), its rate Gaussian with variance θ Σφ². The
     band ends at Ω: what lies beyond would carry the share 2c Σφ²/(πΩ) of the rate's variance, 0.4 % here with two
     modes, which lowers the contact rate by 0.2 %; of the displacement's it is (ω/Ω)² times less.
     """
-    theta, c, top, K = 1e-3, 2.0, 8000.0, 1e7
-    noise = fb.BandNoise(math.sqrt(2 * c * theta / math.pi * top), (0.0, top), seed=40 + modes)
+    modes, theta, c, top, K = 2, 1e-3, 2.0, 8000.0, 1e7
+    noise = fb.BandNoise(math.sqrt(2 * c * theta / math.pi * top), (0.0, top), seed=42)
     model = cantilever(
         modes,
         damping=0.0,
@@ -346,18 +345,18 @@ def test_tones_go_on_through_the_segments(monkeypatch):
 def test_errors_are_those_between_seeds():
     """The lines carry the same power whatever the seed, so that parts of one realisation scatter several times as much.
 
-    Over 40 runs the mean of the squared errors is known to √(2/7/40) = 0.08 and the variance between the runs to
-    √(2/39) = 0.23 of itself, together 0.24; their ratio lies within exp(±4 * 0.24).
+    Over 20 runs the mean of the squared errors is known to √(2/7/20) = 0.12 and the variance between the runs to
+    √(2/19) = 0.32 of itself, together 0.35; their ratio lies within exp(±4 * 0.35).
     """
     model = cantilever(1, base=fb.BandNoise(1e-4, (0.0, 1500.0), period=15.0))
     found = []
-    for seed in range(40):
+    for seed in range(20):
         noise = replace(model.scene.base, seed=seed)
         response = stationary(model.under(replace(model.scene, base=noise)), 60.0, 2e-3, solver=QUICK)
         found.append(response["tip u"].variance)
     between = np.var([e.value for e in found], ddof=1)
     claimed = np.mean([e.standard_error**2 for e in found])
-    assert abs(math.log(claimed / between)) < 4 * 0.24
+    assert abs(math.log(claimed / between)) < 4 * 0.35
 
 
 def test_a_batch_is_a_realisation_of_its_own():

@@ -264,9 +264,7 @@ TWO_STOPS = fb.Scene(
 CASES = {
     "amplitude, periodic": (SCENE, Amplitude(z=0.13), 0.05, {"residual": False}),
     "contact time, chaotic": (replace(SCENE, base=fb.Harmonic(1e-3, 100.0)), "contact_time", 0.5, {"residual": True}),
-    "amplitude, no stops": (FREE, Amplitude(z=0.2), 0.001, {}),
     "energy, two stops": (TWO_STOPS, "energy", 0.05, {"duration": 0.1, "dt": 1e-4}),
-    "peak force, struck": (STIFF, "peak_force", 0.1, {"duration": 0.05, "start": swing}),
 }
 
 

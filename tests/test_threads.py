@@ -83,7 +83,7 @@ def test_runs_at_once_on_one_system_are_those_one_after_the_other():
         vectors = [vector for vector, _ in one.loads]
         return end(one.like(loads=list(zip(vectors, (*OTHERS[kind], shake), strict=True))), duration)
 
-    asked = [(duration, kind) for duration in (0.02, 0.03, 0.041) for kind in ("own", "tones", "own", "noise")] * 8
+    asked = [(duration, kind) for duration in (0.02, 0.03, 0.041) for kind in ("own", "tones", "own", "noise")] * 4
     wanted = {key: work(system(), *key) for key in set(asked)}
     shared = system()
     found = at_once(lambda *key: work(shared, *key), asked)
@@ -94,7 +94,7 @@ def test_runs_at_once_on_one_system_are_those_one_after_the_other():
 def test_no_thread_gets_the_tables_of_anothers_grid():
     shared = system(loads=[shake])
     forcings = [forcing_of([shake], duration, 1e-8) for duration in (0.02, 0.03)]
-    asked = [(i % 3 % 2,) for i in range(1600)]
+    asked = [(i % 3 % 2,) for i in range(800)]
     found = at_once(lambda i: float(prepare_system(shared, forcings[i]).problem.value.table_dt[0]), asked)
     assert [i for i, (key,) in enumerate(asked) if found[i] != forcings[key].table_dt[0]] == []
 
@@ -104,7 +104,7 @@ def test_tables_let_go_by_other_threads_are_made_again(monkeypatch):
         return end(system(omega, loads=[]), 0.01)
 
     monkeypatch.setattr(block_tables, "_CACHE", Memo(1))
-    asked = [(100.0 + i % 5,) for i in range(30)]
+    asked = [(100.0 + i % 5,) for i in range(15)]
     wanted = {key: work(*key) for key in set(asked)}
     assert at_once(work, asked) == [wanted[key] for key in asked]
 
