@@ -5,6 +5,7 @@ Imports: `support`. Begin with `beam`.
 
 from fembeam.beams.beam import (
     Beam,
+    bare_beam,
     bending_matrices,
     bending_root,
     element_matrices,

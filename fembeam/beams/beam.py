@@ -15,6 +15,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -185,6 +186,18 @@ def bending_matrices(beam: Beam, nodes: Vector) -> tuple[sparse.csr_matrix, spar
     K, M, dofs = element_matrices(beam, nodes)
     join = joining(np.diff(nodes), dofs)
     return (join.T @ K @ join).tocsr(), (join.T @ M @ join).tocsr()
+
+
+@lru_cache(maxsize=16)  # scenes that differ in what stands on a beam, one after the other, have it in common
+def bare_beam(beam: Beam, at: bytes) -> tuple[sparse.csr_matrix, sparse.csr_matrix, sparse.csr_matrix | None]:
+    """K, M and R of `bending_matrices` and `bending_root` on nodes given as bytes; not to be written to."""
+    nodes = np.frombuffer(at)
+    found = (*bending_matrices(beam, nodes), bending_root(beam, nodes))
+    for matrix in found:
+        if matrix is not None:
+            matrix.sort_indices()
+            matrix.data.setflags(write=False)
+    return found
 
 
 def element_matrices(beam: Beam, nodes: Vector) -> tuple[sparse.csr_matrix, sparse.csr_matrix, NDArray[np.int64]]:

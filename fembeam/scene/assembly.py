@@ -27,8 +27,7 @@ from fembeam.beams import (
     SHORTEST,
     WAVE_STEP,
     Beam,
-    bending_matrices,
-    bending_root,
+    bare_beam,
     divided,
     geometric_stiffness,
     hermite_rows,
@@ -359,14 +358,13 @@ def _on_nodes(scene: Scene, nodes: Vector, modes: int | None) -> Matrices:
     dofs = np.full(fixed.shape, -1)
     dofs.ravel()[free] = np.arange(len(free))
 
-    K, M = bending_matrices(scene.beam, nodes)
+    K, M, root = bare_beam(scene.beam, nodes.tobytes())
     arms = _lumped(nodes, [(m.z, m.mass, m.inertia, m.offset) for m in scene.masses])
     springs = _lumped(nodes, [(s.z, s.stiffness, s.rotational, 0.0) for s in scene.springs])
     dashpots = _lumped(nodes, [(d.z, d.damping, d.rotational, 0.0) for d in scene.dashpots])
-    M_all, K_all, C_all = M + arms.T @ arms, K + springs.T @ springs, dashpots.T @ dashpots
-    root = bending_root(scene.beam, nodes)
+    M_all, K_all, C_all = _with(M, arms), _with(K, springs), _with(sparse.csr_matrix(M.shape), dashpots)
     if root is not None:
-        root = sparse.vstack([root, springs], format="csr")[:, free]
+        root = (sparse.vstack([root, springs], format="csr") if springs.shape[0] else root)[:, free]
 
     r = np.tile([1.0, 0.0], len(nodes))
     M, K, C = (A.tocsr()[free][:, free] for A in (M_all, K_all, C_all))
@@ -403,8 +401,15 @@ def unsupported(scene: Scene, matrices: Matrices) -> Matrices:
     return _joined(tuple(beams), matrices.impactors)
 
 
+def _with(matrix: sparse.csr_matrix, rows: sparse.csr_matrix) -> sparse.csr_matrix:
+    """A matrix and the square of rows on it."""
+    return matrix + rows.T @ rows if rows.shape[0] else matrix
+
+
 def _lumped(nodes: Vector, items: Sequence[tuple[Any, ...]]) -> sparse.csr_matrix:
     """Rows √a (u + e u_z) and √b u_z for items (z, a, b, e): their square is the quadratic form."""
+    if not items:
+        return sparse.csr_matrix((0, 2 * len(nodes)))
     z, a, b, e = np.array(items, dtype=float).reshape(-1, 4).T
     u, slope = hermite_rows(nodes, z, 0), hermite_rows(nodes, z, 1)
     arm = sparse.diags(np.sqrt(a)) @ (u + sparse.diags(e) @ slope)
