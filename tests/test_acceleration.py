@@ -1,7 +1,6 @@
 """Accelerations of runs: against closed forms, differences of exact velocities, and the equation of motion."""
 
 import numpy as np
-import pytest
 from problems import PAPER_BEAM
 
 import fembeam as fb
@@ -47,11 +46,10 @@ def test_absolute_acceleration_of_a_shaken_oscillator():
     np.testing.assert_allclose(run.acceleration(z, absolute=True)[late], exact[late], atol=1e-7 * np.abs(exact).max())
 
 
-@pytest.mark.parametrize("law", [Hertz(1e7), KelvinVoigt(1e5, 20.0)])
-def test_it_is_the_slope_of_the_velocity_through_contacts_dashpots_and_forces(law):
+def test_it_is_the_slope_of_the_velocity_through_contacts_dashpots_and_forces():
     """Central differences err by h²/6 of the third derivative; samples beside entries and exits are left out."""
     rig = scene(
-        stops=[fb.Stop(0.24, law)],
+        stops=[fb.Stop(0.24, KelvinVoigt(1e5, 20.0))],
         dashpots=[fb.Dashpot(0.1, 0.5)],
         forces=[fb.PointForce(0.15, fb.Harmonic(2.0, 80.0))],
         gravity=9.81,

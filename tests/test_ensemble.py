@@ -104,12 +104,11 @@ def test_threads_and_processes_give_the_same_bits(alone):
         assert same(ensemble(small_model(), 12, slow_peaks, pool), alone)
 
 
-@pytest.mark.parametrize("threads", [2])
-def test_statistics_by_threads_are_those_computed_here(threads, tmp_path):
+def test_statistics_by_threads_are_those_computed_here(tmp_path):
     """Moments, spectra and contacts of long runs, whose noise, motion and sums are computed at the same time."""
     model, quantity = small_model(), partial(characteristics, duration=12.0, dt=2e-3)
     here = ensemble(model, 6, quantity)
-    with ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(2) as pool:
         first = ensemble(model, 2, quantity, pool, tmp_path / "kept.npz")
         assert same(ensemble(model, 6, quantity, pool, tmp_path / "kept.npz"), here)
     assert np.array_equal(first.values["δ psd"], here.values["δ psd"][:2])

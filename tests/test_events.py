@@ -155,7 +155,7 @@ def dip(depth, phase, rtol):
     return integrate(swing(depth), *start, 0.1 * (3.7 - phase), method=DormandPrince(rtol), check=False)
 
 
-PHASES = np.linspace(0.05, 2.5, 151)
+PHASES = np.linspace(0.05, 2.5, 61)
 
 
 @pytest.mark.parametrize("rtol", [1e-8, 1e-12])
@@ -180,7 +180,7 @@ def test_grazing_within_the_tolerance_ends_no_run(rtol):
     assert {run.status for run in runs} == {Status.DONE}
 
 
-GRAZES = np.geomspace(1e-15, 1e-9, 13)
+GRAZES = np.geomspace(1e-15, 1e-9, 7)
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-10])

@@ -235,7 +235,7 @@ def test_nodes_keep_their_promise(band, order, rtol):
     assert error > 0.4 * rtol * noise.rms or rtol >= 1e-4  # no finer than need be, unless to hold the highest line
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 @given(
     ratio=st.floats(0.0, 3.0),
     width=st.floats(1.0, 2000.0),

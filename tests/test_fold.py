@@ -114,7 +114,7 @@ zeta = {ZETA}
 modes = 1
 [fold]
 over = "forces[0].signal.amplitude"
-values = [0.29, 0.3]
+values = [0.298, 0.3]
 span = [175.0, 210.0]
 """)
     file = scene_file.read(path)

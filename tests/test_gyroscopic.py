@@ -353,10 +353,11 @@ def test_an_impacting_orbit_has_the_multipliers_of_differences():
 # --- every method -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("as_matrices", [np.asarray, sparse.csc_array], ids=["dense", "sparse"])
 @pytest.mark.parametrize(
-    ("method", "order"), [(RK4, 4), (CentralDifference, 2), (Newmark, 2), (GeneralizedAlpha, 2), (HenonRK2, 2)]
-)
+    ("method", "order", "as_matrices"),
+    [(RK4, 4, np.asarray), (CentralDifference, 2, sparse.csc_array), (Newmark, 2, sparse.csc_array),
+     (GeneralizedAlpha, 2, np.asarray), (HenonRK2, 2, np.asarray)],
+)  # fmt: skip
 def test_constant_steps_converge_to_the_exact_flight(method, order, as_matrices):
     M, C, K, G = drawn(7, 3, 1.0, 2.0)
     system = System(*map(as_matrices, (M, C, K)), gyroscopic=as_matrices(G))

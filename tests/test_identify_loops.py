@@ -37,8 +37,8 @@ def noisy(law, path, level, rng):
 
 @pytest.mark.parametrize(
     ("law", "first"),
-    [(DAMPER, 0), (WEN, 0), (JOINT, 40), (DAMPER, 137), (JOINT, 137), (WEN, 137), (SHARP, 137)],
-    ids=["jenkins", "wen", "iwan 40", "jenkins 137", "iwan 137", "wen 137", "sharp 137"],
+    [(WEN, 0), (JOINT, 40), (DAMPER, 137), (SHARP, 137)],
+    ids=["wen", "iwan 40", "jenkins 137", "sharp 137"],
 )
 def test_clean_loops_give_the_law_back(law, first):
     """From a fresh start, from the first turn on, and from the middle of what went before."""

@@ -341,15 +341,6 @@ def test_starts_that_never_touch_a_stop_come_to_the_linear_motion():
     assert (found.label.ravel()[known] == linear[0]).all()
 
 
-def test_mirrored_starts_under_the_mirrored_load_come_to_mirrored_orbits():
-    """A beam between equal stops: (q, load) -> (-q, -load) is a symmetry."""
-    span = {"x_span": (-2e-3, 2e-3), "y_span": (-0.4, 0.4), "points": 14}
-    one, other = (fb.study.basins(gapped(phase), **span) for phase in (0.3, 0.3 + math.pi))
-    names = [np.array([*(a.name for a in found.attractors), "failed", "left"])[found.label] for found in (one, other)]
-    # rounding decides at the edges of a basin only
-    assert np.mean(names[0] != names[1][::-1, ::-1]) < 0.05
-
-
 def test_resumed_rows_are_not_computed_again(tmp_path, monkeypatch, map_of_both):
     path, calls, real = tmp_path / "kept.npz", [], solvers.integrate_many
 

@@ -293,8 +293,7 @@ def test_branch_against_runs():
         assert one.residual < 1e-9
 
 
-@pytest.mark.parametrize(("at", "moved"), [(1.3, 0.02), (1.57, 0.04)])
-def test_a_branch_goes_on_where_a_stuck_slider_begins_to_slip(at, moved):
+def test_a_branch_goes_on_where_a_stuck_slider_begins_to_slip():
     """One of a family, met on one side, pushes its slider on until both sides slip; it does not lead back.
 
     Where the slider slips the motion forgets where it began.
@@ -303,8 +302,9 @@ def test_a_branch_goes_on_where_a_stuck_slider_begins_to_slip(at, moved):
     def family(omega):
         return oscillator(JENKINS, omega, force=0.3)
 
+    at = 1.3
     first = orbit(*family(at)).whole
-    first[-1] += moved
+    first[-1] += 0.02
     found = branch(family, (at - 0.05, 1.8), orbit(*family(at), first), at=at).run()
     assert (found.orbits[0].parameter, found.orbits[-1].parameter) == (at - 0.05, 1.8)
     assert found.endings == ("reached the end of the span",) * 2

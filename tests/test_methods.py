@@ -109,8 +109,10 @@ def contact_errors(law, method, locate, count):
     return steps, np.median([np.abs([run.q[-1, 0] for run in row] - exact) for row in runs], axis=1)
 
 
-@methods
-@pytest.mark.parametrize("law", [LINEAR, KelvinVoigt(1e4, 10.0)], ids=["linear", "force jumps"])
+@pytest.mark.parametrize(
+    ("method", "law"),
+    [*((method, LINEAR) for method in METHODS), *((m, KelvinVoigt(1e4, 10.0)) for m in (RK4, Newmark))],
+)
 def test_located_events_keep_the_order_where_the_law_is_smooth_between_them(method, law):
     assert abs(slope(*contact_errors(law, method, True, 4)) - ORDER[method]) < 0.25
 

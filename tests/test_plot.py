@@ -263,17 +263,6 @@ def apart(labels):
     return not any(one.overlaps(other) for i, one in enumerate(boxes) for other in boxes[:i])
 
 
-def test_labels_of_a_periodic_motion_do_not_overlap(run):
-    scene = dataclasses.replace(run.model.scene, base=fb.Harmonic(1e-3, 60.0))
-    driven = scene.reduce(6).simulate(6.0, 1e-3)
-    figure = plot.spectrum(driven, discard=1.0, omega_max=2500.0)
-    figure.draw_without_rendering()
-    assert apart(figure.axes[0].texts)
-    figure = plot.spectrum(dataclasses.replace(driven, t=driven.t / 10), omega_max=2e4)  # all six frequencies in view
-    figure.draw_without_rendering()
-    assert apart([text for text in figure.axes[0].texts if "omega" in text.get_text()])
-
-
 @pytest.mark.parametrize("highest", [1.0, 1.7, 300.0])
 def test_ticks_of_entry_speeds_do_not_overlap(run, highest):
     speeds = np.geomspace(1.0, highest, len(run.contacts))

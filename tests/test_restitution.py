@@ -208,7 +208,7 @@ def test_ledger_of_a_bounce(one):
 
 # --- what every law really does -----------------------------------------------------------------------------------
 
-NOMINAL = [0.1, 0.4, 0.7, 0.9]
+NOMINAL = [0.1, 0.5, 0.9]
 MAKERS = {
     **{name: getattr(Hysteretic, name) for name in PUBLISHED},
     "anagnostopoulos": partial(KelvinVoigt.anagnostopoulos, mass=0.3),

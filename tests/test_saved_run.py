@@ -77,7 +77,14 @@ def readings(run):
     return found
 
 
-@pytest.mark.parametrize("suffix", [".npz", HDF5])
+@pytest.mark.parametrize(
+    ("run", "suffix"),
+    [
+        pytest.param(DASHPOTS, ".npz", id="dashpot"),
+        pytest.param(IMPACTORS, *HDF5.values, marks=HDF5.marks, id="impactor"),
+    ],
+    indirect=["run"],
+)
 def test_all_is_read_from_the_file(run, tmp_path, suffix):
     path = run.save(tmp_path / f"run{suffix}")
     assert [entry.name for entry in tmp_path.iterdir()] == [f"run{suffix}"]

@@ -363,9 +363,8 @@ def _silent():
     return context
 
 
-@pytest.mark.parametrize("elements", [5000, 10_000])
-def test_the_finest_meshes_keep_their_digits(elements):
-    omega = paper().reduce(2, elements=elements).omega
+def test_the_finest_meshes_keep_their_digits():
+    omega = paper().reduce(2, elements=10_000).omega
     assert omega == pytest.approx([109.1299120547, 790.6100943811], rel=1e-9)
 
 

@@ -287,10 +287,8 @@ def simulated(one, duration=0.06):
     ("path", "share"),
     [
         ("stops[valve].gap", 1e-3),
-        ("base.amplitude", 1e-4),
         ("omega", 1e-5),
         ("damping.zeta[0]", 1e-3),
-        ("masses[0].mass", 1e-4),
         ("beam.length", 1e-5),
     ],
 )

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bench.tolerance import STOPS, amplification, end, errors, normalised, scene
+from bench.tolerance import STOPS, amplification, end, errors, normalised, scene, slope
 
 from solvers import DormandPrince, Exponential
 
@@ -45,8 +45,10 @@ def test_tail_and_cost_of_jittered_starts(stop, n, steps, calls):
     """Two or three contacts: no chaos, rounding decides at most whether single steps are taken.
 
     Of 240 000 such runs the largest error was 0.65 in these units, in 20 000 of one case it is above 1 less than once.
+    The worst of six starts lies within a factor of 30 below its curve: over four decades that is 0.37 of the slope.
     Ceilings of cost are a tenth above what was measured.
     """
     found, work = errors(STOPS[stop], n, RTOLS, 12)
     assert normalised(found, amplification(STOPS[stop], n, 12), RTOLS).max() < 1.0
+    assert 0.6 < slope(RTOLS, np.median(found, axis=0)) < 1.4
     assert np.all(work <= 1.1 * np.transpose([steps, calls]))

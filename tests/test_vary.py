@@ -266,18 +266,6 @@ def test_failed_points_are_told_and_the_rest_survives(monkeypatch):
 # --- minima -----------------------------------------------------------------------------------------------------------
 
 
-def test_the_damping_that_isolates_a_blow_best():
-    """∫ (ω² q + 2ζω q̇)² dt = ω (1 + 4ζ²)/(4ζ) for unit velocity: least at ζ = 1/2."""
-    found = fb.study.minimise(rod(damping=fb.ModalDamping([0.1])), {"zeta[0]": (0.05, 0.95)}, kick, **BLOW)
-    omega = rod().reduce(modes=1, elements=4).omega[0]
-    assert found.at["damping.zeta[0]"] == pytest.approx(0.5, abs=3e-3)
-    assert found.value == pytest.approx(omega, rel=2e-4)
-    assert (found.active, found.converged) == ((), True)
-    assert 9 < found.evaluations < 40
-    assert found.value == found.tried["kick"].min()
-    assert f"{found.evaluations} evaluations, converged" in str(found)
-
-
 def test_the_same_with_a_bound_on_the_reach():
     """max |q| ω = exp(-ζ/√(1-ζ²) arccos ζ) for unit velocity: the bound is active, at its root ζ > 1/2."""
     omega, zeta = rod().reduce(modes=1, elements=4).omega[0], 0.7
