@@ -1,11 +1,16 @@
 """SIMD vectors, sums and packed arguments against numpy and the tuples they stand for."""
 
+import contextlib
+import operator
 import re
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import pytest
 from numba import njit, types
+from numba.core.inline_closurecall import InlineWorker
+from numba.core.registry import cpu_target
+from numba.core.types.functions import BaseFunction
 from scipy.integrate import DOP853
 from scipy.special import eval_jacobi, roots_jacobi
 
@@ -15,6 +20,7 @@ from solvers import Contact, Exponential, System
 from solvers.compiled import dop853_tableau
 from solvers.compiled.fields import dimensions_of, packed_type, shapes_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned, unpacker
+from solvers.compiled.shortcuts import Shortcuts
 from solvers.compiled.simd import bit_pattern, load8, positive8, splat8, sqrt8, store8, sum8
 from solvers.compiled.sums import combine, padded
 from solvers.exponential.contact.nodes import LOCAL, S, gauss_jacobi, node_sets_of, series_of
@@ -369,3 +375,21 @@ def test_arrays_have_the_shapes_they_are_declared_with(stops, tones):
 
 def tuple_of(dimension):
     return NamedTuple("tuple_of", [("field", Annotated[Any, dimension])])
+
+
+def test_shortcuts_of_the_compiler_end_with_it():
+    """Within, a builtin has the signature that numba finds, and one only; after that, and after a failure, numba's."""
+    own, context = (BaseFunction.get_call_type, InlineWorker.inline_function), cpu_target.typing_context
+    context.refresh()
+    times, numbers = context.resolve_value_type(operator.mul), (types.float64, types.int64)
+    expected, shortcuts = times.get_call_type(context, numbers, {}), Shortcuts(lambda _: True)
+    with contextlib.suppress(ZeroDivisionError), shortcuts.taken():
+        found = [times.get_call_type(context, numbers, {}) for _ in range(2)]
+        assert found[0] is found[1]
+        assert found[0] == expected
+        assert times.get_impl_key(found[0]) is operator.mul
+        with shortcuts.taken():
+            pass
+        assert BaseFunction.get_call_type is not own[0]
+        raise ZeroDivisionError
+    assert (BaseFunction.get_call_type, InlineWorker.inline_function) == own

@@ -111,16 +111,22 @@ def test_collisions_that_disagree_are_told():
 
 @pytest.mark.drawn
 def test_a_filtered_channel_is_told_and_widens():
+    """Of 300 draws one is less than twice as wide, and one in 300 is widened by chance: three of five once in 3e5."""
     rng = np.random.default_rng(6)
-    data = collisions(rng, samples=200)
-    white = rng.standard_normal((3, 219))
-    smooth = np.array([np.convolve(row, np.full(20, 20**-0.5), "valid") for row in white])
-    rough = {**data, "force": [f + 0.5 * w[:200] for f, w in zip(data["force"], white, strict=True)]}
-    filtered = {**data, "force": [f + 0.5 * s for f, s in zip(data["force"], smooth, strict=True)]}
-    with pytest.warns(UserWarning, match="neighbouring residuals are correlated"):
-        wide = identify(**filtered).stiffness
-    narrow = identify(**rough).stiffness
-    assert wide.high - wide.low > 2.0 * (narrow.high - narrow.low)
+    ratios = []
+    for _ in range(5):
+        data = collisions(rng, samples=200)
+        white = rng.standard_normal((3, 219))
+        smooth = np.array([np.convolve(row, np.full(20, 20**-0.5), "valid") for row in white])
+        rough = {**data, "force": [f + 0.5 * w[:200] for f, w in zip(data["force"], white, strict=True)]}
+        filtered = {**data, "force": [f + 0.5 * s for f, s in zip(data["force"], smooth, strict=True)]}
+        with pytest.warns(UserWarning, match="neighbouring residuals are correlated"):
+            wide = identify(**filtered).stiffness
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # collisions that disagree by chance
+            narrow = identify(**rough).stiffness
+        ratios.append((wide.high - wide.low) / (narrow.high - narrow.low))
+    assert np.median(ratios) > 2.0
 
 
 def test_files(tmp_path):

@@ -128,6 +128,7 @@ def test_rooms_have_no_circle():
 PRIVATE = "numba.core", "numba.np", "llvmlite"
 USERS = {  # the files that stand on what numba does not promise, and why
     "solvers/compiled/decorators.py",  # options of njit, described there; when it compiles
+    "solvers/compiled/shortcuts.py",  # what its compiler does more than once
     "solvers/compiled/cache.py",  # llvmlite's version; numba's cache
     "solvers/compiled/packed.py",  # a type of its own, and loads through a pointer
     "solvers/compiled/simd.py",  # a type of its own, and vector instructions

@@ -136,6 +136,18 @@ def test_tangent_by_the_slider():
     assert abs(found[:3, 7] - wanted).max() < 1e-7 * abs(wanted).max()
 
 
+@pytest.mark.parametrize("method", [Exponential(1e-10), DormandPrince(1e-12, 1e-14)], ids=["main", "stepping"])
+def test_a_slider_at_its_limit_that_still_moves_back_slips_once(method):
+    """It returns after 2 v/a; the mass goes on as if it had slipped from the start: 5 + (q₀ - 5) cos t - v sin t."""
+    slider, load = element(Jenkins(1e4, 1.0), -1.0), ([1.0], Harmonic(6.0, 0.0))
+    system, t = System([[1.0]], [[0.0]], [[1.0]], [slider], [load]), 0.01
+    for back in (0.0, *10.0 ** np.arange(-16.0, -5.0)):
+        run = integrate(system, [1e-4], [-back], t, method=method)
+        assert run.transitions.event.tolist() == ["slip"]
+        assert run.transitions.t[0] == pytest.approx(0.4 * back, rel=0.01, abs=1e-9)
+        assert abs(run.q[-1, 0] - 5.0 - (1e-4 - 5.0) * np.cos(t) + back * np.sin(t)) < 1e-14 + 1e-3 * back**2
+
+
 @pytest.mark.parametrize("rtol", [1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
 def test_a_landing_off_by_rounding_is_not_passed_again(rtol):
     """A slow mass held by large forces turns every half period: their rounding once made three reversals of one."""

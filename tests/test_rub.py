@@ -120,6 +120,18 @@ def test_without_friction_the_orbit_has_its_multipliers():
         assert np.abs(orbit.multipliers - value).min() < 1e-7
 
 
+def test_a_branch_over_the_spin_follows_the_rub():
+    """Its orbits, in slip all the way, have the size of the equilibrium and the multipliers exp(2πλ/Ω)."""
+    model = overhung().reduce(modes=2)
+    branch = model.branch("beam.spin", (195.0, 215.0), start=model.rub(200.0).state, at=200.0, step=0.9).run()
+    assert branch.parameter[[0, -1]].tolist() == [195.0, 215.0]
+    for orbit in branch.orbits:
+        found = model.rub(orbit.parameter)
+        np.testing.assert_allclose(np.linalg.norm(orbit.state[:2]), np.linalg.norm(found.state[:2]), rtol=1e-9)
+        for value in np.exp(2.0 * np.pi / orbit.parameter * found.eigenvalues):
+            assert np.abs(orbit.multipliers - value).min() < 1e-7
+
+
 def test_small_disturbances_grow_as_the_eigenvalues_say():
     """Unstable with much friction: the whirl leaves its circle as exp(growth t), beside what dies away."""
     model = as_scene(220.0, 0.3, 1e9).reduce(modes=2)  # a slider that is soon drawn

@@ -152,6 +152,34 @@ def _zero_between(known, a, b):
 
 
 @inner
+def _later(known, time):
+    """A margin so long after the start of the step, or before it, by the rates there."""
+    problem, state, space, _, s, j = known
+    if rubs(problem, s):
+        point_of(problem, s, state.now[T], state.x, state.rate, space.point[0])
+        move_point(space.point[0], time, space.point[1])
+        slider_margins(problem, s, state.segment[s], state.entry_rate[s], space.point[1], space.one)
+    else:
+        delta, rate = indentation_and_rate(problem, s, state.x)
+        margins_before(problem, state, s, delta, rate, -time, space.trial, space.one)
+    return space.one[j]
+
+
+@inner
+def _falls_from_zero(known, theta):
+    """Where a margin that begins at zero falls below it: at once, or, if it rises first by less than rounding, later.
+
+    A slider at its limit may still move back a little. Whether the margin rises, and where its parabola comes down, at
+    most at the θ at which it is below zero, is told by the rates at the start, carried on for a step and back.
+    """
+    now, after, before = _later(known, 0.0), _later(known, known[3]), _later(known, -known[3])
+    rise, fall = after - before, 2.0 * now - after - before
+    if rise <= 0.0:
+        return 0.0
+    return min(rise / fall, theta) if fall > 0.0 else theta
+
+
+@inner
 def _lowest(known, values, i, rounding):
     """Place of the lowest margin around node i if it is below zero, else NONE; node i is not above its neighbours."""
     before, after = values[i - 1], values[min(i + 1, _NODES.size - 1)]
@@ -176,10 +204,10 @@ def _crossing(problem, state, space, h, s, j):
     missed = state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0 and values[0] > -_MISSED * largest
     for i in range(1, n):
         if values[i] < -rounding and not (missed and values[i] > values[i - 1]):
-            return _zero_between(known, _NODES[i - 1], _NODES[i]) if inside else 0.0
+            return _zero_between(known, _NODES[i - 1], _NODES[i]) if inside else _falls_from_zero(known, _NODES[i])
         lowest = _lowest(known, values, i, rounding)
         if lowest < NONE:
-            return _zero_between(known, _NODES[i - 1], lowest) if inside else 0.0
+            return _zero_between(known, _NODES[i - 1], lowest) if inside else _falls_from_zero(known, lowest)
         inside |= values[i] > rounding
     return NONE
 

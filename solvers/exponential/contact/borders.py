@@ -46,6 +46,7 @@ _TOGETHER = 1e-9  # part of its way at which a border counts as reached when ano
 _MISSED = 1e-3  # margin, in units of the largest of the step, by which a landing may have missed its border
 _BEFORE = 1e-3  # part of a landing before its end
 _EARLY, _EARLIER, _LOOKS = 0.1, 1e-2, 6  # part of the time to the first node, next to it, and how often it is shortened
+_FURTHER = 8.0  # times as far is looked where the rates do not yet tell whether a margin rises
 _ILLINOIS = 6  # evaluations of a polynomial to its root
 _REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
 _NEAR = 0.2  # lowest node, in units of the largest margin, below which the motion between nodes is looked at
@@ -129,11 +130,23 @@ def _soon(problem, state, scratch, s, j, time):
 
 
 @inlined
-def _falls_at_once(problem, state, scratch, s, j, time):
+def _rises(problem, tables, state, scratch, s, j, time):
+    """Whether a margin rises at the start of the step: by the rates there, carried on and back until it is told."""
+    noise, rise = scratch.noise[s, j], 0.0
+    while abs(rise) <= noise and time < tables.contact_step[0]:
+        rise = _soon(problem, state, scratch, s, j, time) - _soon(problem, state, scratch, s, j, -time)
+        time *= _FURTHER
+    return rise > 0.0
+
+
+@inlined
+def _falls_at_once(problem, tables, state, scratch, s, j, time):
     """Whether a margin that begins at zero, and is below it after a time, has not been above it before.
 
     The start is extrapolated over shorter and shorter times until the margin cannot be told from zero: a slider with a
-    strong dashpot slips one way, sticks, and slips the other way within a small part of a step.
+    strong dashpot slips one way, sticks, and slips the other way within a small part of a step. One that rises by less
+    than its noise and then falls, as where a slider at its limit still moves back a little, falls later: what is as
+    long before the start shows that it rises.
     """
     noise, share = scratch.noise[s, j], _EARLY
     for _ in range(_LOOKS):
@@ -141,7 +154,7 @@ def _falls_at_once(problem, state, scratch, s, j, time):
         if value > noise:
             return False
         if value >= -noise:
-            break
+            return not _rises(problem, tables, state, scratch, s, j, time)
         share *= _EARLIER
     return True
 
@@ -213,7 +226,7 @@ def _crossing(problem, tables, state, scratch, s, j, node_set, h):
         value = scratch.margin[S * j + i] if i < S else scratch.ends[ENDS * j + 1]
         after = h * tables.times[node_set, i] if i < S else h
         if value < -noise and not (missed and before < -noise and value > before):
-            if i == 0 and before <= noise and _falls_at_once(problem, state, scratch, s, j, after):
+            if i == 0 and before <= noise and _falls_at_once(problem, tables, state, scratch, s, j, after):
                 return 0.0
             if on and i == 0:
                 return 0.5 * after
