@@ -505,3 +505,12 @@ def test_a_slider_where_damping_of_the_approach_ends(method, law, mu, k_t, v_t, 
     if "stick" in events:  # just where the mass is deepest
         deepest = integrate(system, [-1e-3, 0.0], [0.8, v_t], run.transitions.t[1], method=method)
         assert abs(deepest.q_dot[-1, 0]) < 1e-9
+
+
+@pytest.mark.parametrize("v_t", [0.2, 0.22, 0.5, 0.58])
+def test_borders_are_met_where_dashpots_couple_rigid_motions(v_t):
+    """Blocks of such motions read δ of p and of v, which cancel: rounding of v is no error of δ."""
+    coupled = replace(wall(mu=0.5, k_t=1e6), C=np.array([[1.0, -0.9], [-0.9, 0.9]]))
+    exact, run = (bounce(coupled, v_t, method).transitions for method in METHODS)
+    assert run.event.tolist() == exact.event.tolist() == ["stick", "slip"]
+    np.testing.assert_allclose(run.t, exact.t, rtol=0.0, atol=1e-11)

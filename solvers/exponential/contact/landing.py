@@ -27,6 +27,7 @@ from solvers.compiled.kernels import (
     abs_dot,
     contact_gradient,
     copy,
+    dot,
     element_of,
     indentation,
     indentation_and_rate,
@@ -108,9 +109,13 @@ def _error(problem, scratch, part):
 
 @inlined
 def _difference(problem, r, d, span):
-    """An embedded difference of rate and displacement of a row, as a rate, m/s."""
+    """An embedded difference of rate and displacement of a row, as a rate, m/s.
+
+    The changes of the displacement are summed with their signs: where dashpots couple the modes it reads rates v of the
+    blocks, which a force changes at once, while their sum stays.
+    """
     size = 2 * problem.k.size
-    return abs_dot(problem.read_rate[r], d, size) + abs_dot(problem.read[r], d, size) / span
+    return abs_dot(problem.read_rate[r], d, size) + abs(dot(problem.read[r], d, size)) / span
 
 
 @inlined
