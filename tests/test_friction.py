@@ -493,3 +493,31 @@ def test_many_starts_are_single_runs_bit_for_bit():
         one = integrate(system, [-1e-3, 0.0], speed, 0.006)
         assert many.q[i].tolist() == one.q[-1].tolist()
         assert many.q_dot[i].tolist() == one.q_dot[-1].tolist()
+
+
+@every_method
+@pytest.mark.parametrize(
+    ("law", "mu", "k_t", "v_t", "events"),
+    [
+        (Viscoelastic(3.6e7, 2500.0, approach_only=True), 0.9, 1.2e6, 0.33, ["slip", "stick", "slip"]),
+        (Viscoelastic(2.5e7, 18000.0, approach_only=True), 0.9, 6e4, 0.53, ["slip"]),
+    ],
+    ids=["sticks", "slips on"],
+)
+def test_a_slider_where_damping_of_the_approach_ends(method, law, mu, k_t, v_t, events):
+    """At δ̇ = 0 N_δ̇ falls to zero: the slider's own speed |ξ̇| - μṄ/k_t jumps through zero there, or stays above it."""
+    system = wall(law, mu, k_t)
+    run = bounce(system, v_t, method)
+    assert run.transitions.event.tolist() == events
+    if "stick" in events:  # just where the mass is deepest
+        deepest = integrate(system, [-1e-3, 0.0], [0.8, v_t], run.transitions.t[1], method=method)
+        assert abs(deepest.q_dot[-1, 0]) < 1e-9
+
+
+@pytest.mark.parametrize("v_t", [0.2, 0.22, 0.5, 0.58])
+def test_borders_are_met_where_dashpots_couple_rigid_motions(v_t):
+    """Blocks of such motions read δ of p and of v, which cancel: rounding of v is no error of δ."""
+    coupled = replace(wall(mu=0.5, k_t=1e6), C=np.array([[1.0, -0.9], [-0.9, 0.9]]))
+    exact, run = (bounce(coupled, v_t, method).transitions for method in METHODS)
+    assert run.event.tolist() == exact.event.tolist() == ["stick", "slip"]
+    np.testing.assert_allclose(run.t, exact.t, rtol=0.0, atol=1e-11)

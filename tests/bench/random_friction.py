@@ -31,6 +31,7 @@ from random_scenes import (
     handled,
     numbers_of,
     report,
+    rounding_of_surfaces,
     run,
     significant,
 )
@@ -116,11 +117,24 @@ def of_friction(found: dict[str, Any], solution: Any, scene: Scene, size: float,
         put(found, f"friction {name}", getattr(log, name)[i], scale)
 
 
+def at_openings(solution: Any, scene: Scene) -> Any:
+    """(transitions,) whether a contact opens within its rounding, then or just after.
+
+    A slip back under N = k δ^p, which falls at the rate Ṅ = p k δ^{p-1} δ̇, ends where μ|Ṅ| = k_t |ξ̇|: at the depth
+    δ = (k_t |ξ̇| / μ p k |δ̇|)^{1/(p-1)}, which may be any power of ten: 1e-17 m where p = 1.2 and the base is 4e-4. δ is
+    known to the rounding ε of what it is read from, and the opening to ε/|δ̇|: what is nearer to it may as well not be.
+    """
+    rows, log = solution.transitions, solution.contacts
+    spread = rounding_of_surfaces(scene)[log.stop.astype(int)] / np.maximum(np.abs(log.speed_out), TINY)
+    apart = np.abs(rows.t[:, None] - log.t_out)  # NaN of a contact that is still closed
+    return np.any((rows.contact[:, None] == log.stop) & (apart <= spread + 4e-16 * scene.duration), axis=1)
+
+
 def of_transitions(found: dict[str, Any], solution: Any, scene: Scene, unit: dict[str, Any]) -> None:
     """Put in the transitions, element by element."""
     rows = solution.transitions
     i = np.lexsort((rows.t, rows.border, rows.contact))
-    i = i[rows.t[i] > 1e-7 * scene.duration]
+    i = i[(rows.t[i] > 1e-7 * scene.duration) & ~at_openings(solution, scene)[i]]
     c = rows.contact[i].astype(int)
     found["order"] = [*found["order"], *zip(c.tolist(), rows.border[i].tolist(), rows.event[i].tolist(), strict=True)]
     along, across = turned(scene, c, rows.delta[i])

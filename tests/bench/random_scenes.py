@@ -125,7 +125,7 @@ def numbers_of(solution: Any, scene: Scene, size: float, duration: float) -> dic
         | {"stop": log.stop[i], "order": log.stop[i].tolist(), "scale": scale}
         | {name: getattr(log, name)[i] for name in NUMBERS}
     )
-    begun = found["t_in"] * found["speed_in"] <= _rounding_of_surfaces(scene)[part]
+    begun = found["t_in"] * found["speed_in"] <= rounding_of_surfaces(scene)[part]
     for name in ("t_in", "speed_in"):  # of a start at rest on a surface: entered at once, or within its rounding
         found[name] = np.where(begun, 0.0, found[name])
     return found
@@ -145,7 +145,7 @@ def _viscous_forces(scene: Scene, part: Any, depth: Any, entry: Any, fast: Any) 
     return np.where(entry < 1e-4 * fast, np.nan_to_num(np.array(found, dtype=float)), 0.0)
 
 
-def _rounding_of_surfaces(scene: Scene) -> Any:
+def rounding_of_surfaces(scene: Scene) -> Any:
     """Way, m, of every stop from its start that is rounding of its gap and of what is read."""
     contacts = scene.system.contacts
     sizes = [abs(c.gap) + (np.abs(c.direction) @ np.abs(scene.q0)).sum() for c in contacts]

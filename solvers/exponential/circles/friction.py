@@ -29,7 +29,7 @@ from solvers.compiled.kernels import (
     slider_of,
 )
 from solvers.compiled.parts import RUB_FORCES, RUB_GUESS, RUB_NEWTON, RUB_WITHIN, RUB_WORK, part
-from solvers.compiled.simd import load8, positive8, splat8, store8, sum8
+from solvers.compiled.simd import largest8, least8, load8, positive8, size8, splat8, store8, sum8
 from solvers.compiled.state import CALLS, T, acts
 from solvers.compiled.sums import above, combine
 from solvers.exponential.circles.contact import radial_forces, work_in_circle
@@ -39,6 +39,7 @@ from solvers.problem.friction import ARM, CODE, MU, SPIN, STIFFNESS
 
 WAYS, SPEEDS, TANGENTIAL, SPARE = range(4)  # rows of `Scratch.slid`: ξ, ξ̇ and F_t at the nodes, and numbers of a moment
 _TINY = 1e-300  # m²
+_SMALL = 0.1  # tangent of an angle whose series to the fifteenth power is exact to rounding
 _BRIEF = 1.0  # radians of the fastest block in which nodes miss nothing of a rate
 
 
@@ -85,8 +86,41 @@ def slide_at_nodes(problem, scratch, s):
 
 
 @inlined
+def _small_angles(tangent):
+    """Arctangents up to `_SMALL` by their series, to rounding."""
+    square, total = tangent * tangent, splat8(-1.0 / 15.0)
+    total = splat8(1.0 / 13.0) + square * total
+    total = splat8(-1.0 / 11.0) + square * total
+    total = splat8(1.0 / 9.0) + square * total
+    total = splat8(-1.0 / 7.0) + square * total
+    total = splat8(1.0 / 5.0) + square * total
+    total = splat8(-1.0 / 3.0) + square * total
+    return tangent + tangent * square * total
+
+
+@inlined
+def _turns_little(problem, scratch, s):
+    """ξ at the nodes of a circle by the angles from the first node on; whether these are small enough."""
+    first, own, ways = row_of(problem, s), slider_of(problem, s), scratch.slid[s, WAYS]
+    x, y = scratch.motion[first, 0], scratch.motion[first + 1, 0]
+    u, w, u_0, w_0 = load8(x, 0), load8(y, 0), splat8(x[0]), splat8(y[0])
+    along = u_0 * u + w_0 * w
+    tangent = (u_0 * w - w_0 * u) / along
+    if not (largest8(size8(tangent)) <= _SMALL and least8(along) > 0.0):
+        return False
+    way = splat8(abs(radius_of(problem, s))) * (splat8(math.atan2(y[0], x[0])) + _small_angles(tangent))
+    way = way + splat8(own[ARM] * own[SPIN]) * load8(scratch.node_time, 0)
+    if count_of(problem, s) > 2:
+        way = way - splat8(math.copysign(1.0, own[ARM])) * load8(scratch.motion[first + 2, 0], 0)
+    store8(ways, 0, way)
+    return True
+
+
+@inlined
 def _ways_at_nodes(problem, scratch, s):
-    """ξ alone."""
+    """ξ alone; nearly always one arctangent tells the angles at all nodes."""
+    if is_circle(problem, s) and _turns_little(problem, scratch, s):
+        return
     first, own, radius = row_of(problem, s), slider_of(problem, s), radius_of(problem, s)
     u, w, ways = scratch.motion[first, 0], scratch.motion[first + 1, 0], scratch.slid[s, WAYS]
     third, before = count_of(problem, s) > 2, 0.0

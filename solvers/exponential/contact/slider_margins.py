@@ -1,7 +1,9 @@
 """Margins of a slider in a step of the main method, see `compiled.sliding`: at the nodes, at its ends, between nodes.
 
 They depend on ξ, ξ̇ and, in slip, Ṅ besides δ and δ̇. Ṅ of a law with a dashpot needs δ̈: in a state it follows from the
-equations of motion, at the nodes from the polynomial through δ̇ there and at the start of the step.
+equations of motion, at the nodes from the polynomial through δ̇ there and at the start of the step. Where a law bends at
+δ̇ = 0 its N_δ̇ jumps, and with it the margin of slip, perhaps below zero: on the bend, where δ̇ is rounding, the margin is
+that of the side on which the law is.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from solvers.compiled.parts import RUB_AROUND, RUB_IN, RUB_MARGINS, RUB_PEAK, pa
 from solvers.compiled.simd import largest8, load8, size8
 from solvers.compiled.sliding import (
     ACCELERATION,
+    RATE,
     move_point,
     normal_forces,
     normal_slopes,
@@ -48,6 +51,7 @@ _DIFFERENCED = 1e-8  # the same where it contains the slope of a polynomial
 _REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
 _TINY = 1e-300  # m
 _SHARE = 1e-6  # of δ and δ̇ at a node, by which slopes of N are differenced
+_ON_BEND = 1e-9  # δ̇, in units of the reference speed, within which a landing on a bend at δ̇ = 0 may miss it
 
 
 @inlined
@@ -62,6 +66,14 @@ def _pulls(problem, s):
     return problem.border_count[s] > PRESSES
 
 
+@inlined
+def _on_its_side(problem, scratch, s, rate):
+    """δ̇, with the sign of the side of a law's bend where it is rounding; `Scratch.side` is 0 of a law without one."""
+    side, rounding = scratch.side[s], _ON_BEND * scratch.reference_speed[s]
+    on = slider_of(problem, s)[CUT] < 0.0 and side * rate <= 0.0 and abs(rate) <= rounding
+    return side * _TINY if on and side != 0.0 else rate
+
+
 @part(RUB_IN, types.void, types.int64, types.float64, VECTOR, types.float64, VECTOR)
 def slider_margins_in(problem, state, scratch, s, t, x, later, out):
     """Margins of an element with friction in the state x at time t, or a time later by its rates, which are left."""
@@ -70,6 +82,7 @@ def slider_margins_in(problem, state, scratch, s, t, x, later, out):
         rhs(problem, t, x, state.segment, state.entry_rate, state.rate, scratch.numbers)
     point_of(problem, s, t, x, state.rate, point)
     move_point(point, later, moved)
+    moved[RATE] = _on_its_side(problem, scratch, s, moved[RATE])
     slider_margins(problem, s, state.segment[s], state.entry_rate[s], moved, out)
 
 
@@ -243,6 +256,7 @@ def slider_margins_around(problem, tables, state, scratch, s, node_set, h, place
     combine(LOCAL_SLOPES, rates, S, None, twice)
     for i in range(S):
         deltas[i] = max(deltas[i], problem.knots[s, 0])
+        rates[i] = _on_its_side(problem, scratch, s, rates[i])
         sigma = begin + 0.5 * (LOCAL_SLOPES[S, i] + 1.0) * (end - begin)
         pace = h * kappa * sigma ** (kappa - 1.0) * 0.5 * (end - begin)
         twice[i] = twice[i] / pace if pace > 0.0 else scratch.point[0, ACCELERATION]
