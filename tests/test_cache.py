@@ -38,7 +38,7 @@ def package(tmp_path):
     home = tmp_path / "solvers"
     home.mkdir()
     (home / "compiled").mkdir()
-    for name in ("cache.py", "decorators.py"):
+    for name in ("cache.py", "decorators.py", "shortcuts.py"):
         shutil.copy(cache.HOME / "compiled" / name, home / "compiled")
     for folder in (home, home / "compiled"):
         (folder / "__init__.py").touch()
