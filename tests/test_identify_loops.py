@@ -164,9 +164,9 @@ def test_slip_in_one_direction_bounds_the_limit_from_below_only():
 def test_a_first_loading_tells_the_sum_of_beta_and_gamma():
     path = np.linspace(0.0, 2e-3, 400)
     force = noisy(WEN, path, 0.001, np.random.default_rng(7))
-    with pytest.warns(UserWarning, match="trade off, correlation -0.99"):
+    with pytest.warns(UserWarning, match=r"stiffness and alpha trade off, correlation -(0\.99|1\.00)"):
         found = identify_loop(path, force, BoucWen, n=1)
-    assert found.law.beta + found.law.gamma == pytest.approx(2000.0, rel=0.05)
+    assert found.law.beta + found.law.gamma == pytest.approx(2000.0, rel=0.05)  # of 12 draws 0.6 % apart
 
 
 @pytest.mark.drawn

@@ -251,13 +251,14 @@ def test_impacts_by_batch_are_those_of_the_log():
 
 @pytest.mark.drawn
 def test_transients_are_found_and_their_absence_too():
+    """One calm record of 300 seems to go on settling, four of ten once in 1e5; of the others three of five so."""
     t = 0.02 * np.arange(100_000)
     calm = [settling(coloured(seed, t.size), 0.02, 1.0) for seed in range(10)]
-    assert all(found.died_out for found in calm)
+    assert sum(found.died_out for found in calm) >= 7
     assert np.median([found.time for found in calm]) < 0.2 * t[-1]
-    faded = settling(coloured(1, t.size) + 100.0 * np.exp(-t / 50.0), 0.02, 1.0)
-    assert faded.died_out
-    assert 100.0 < faded.time < 0.5 * t[-1]  # at 100 s four deviations are left; 161 to 434 s in 30 draws
+    faded = [settling(coloured(seed, t.size) + 100.0 * np.exp(-t / 50.0), 0.02, 1.0) for seed in range(5)]
+    assert sum(found.died_out for found in faded) >= 3
+    assert 100.0 < np.median([found.time for found in faded]) < 0.5 * t[-1]  # at 100 s four deviations are left
     assert not settling(coloured(1, t.size) * t, 0.02, 1.0).died_out
     assert not settling(coloured(1, t.size) + t / 100.0, 0.02, 1.0).died_out
     with pytest.raises(ValueError, match="settling needs 32 batches of 100 s"):
@@ -373,13 +374,17 @@ def test_a_batch_is_a_realisation_of_its_own():
 
 @pytest.mark.drawn
 def test_a_slow_start_leaves_the_number_of_batches_as_it_is():
-    model = cantilever(1, base=fb.BandNoise(1e-4, (0.0, 1500.0)))
-    calm = stationary(model, 80.0, 2e-3, solver=QUICK)
-    slow = stationary(model, 80.0, 2e-3, solver=QUICK, start=[100.0, 0.0])
-    forgotten = correlation_time(model) * math.log(100.0 / model.simulate(20.0, 2e-3, solver=QUICK).q[2500:].std())
-    assert calm.settling.time < 0.9 * forgotten < slow.settling.time < 1.3 * forgotten
-    assert slow["tip u"].variance.batches == calm["tip u"].variance.batches == 16
-    assert slow.duration == pytest.approx(80.0, abs=0.1)
+    """Of 60 draws the settling takes 0.36 to 1.85 times as long as the start is above the motion, 0.92 but for one."""
+    times = []
+    for seed in range(5):
+        model = cantilever(1, base=fb.BandNoise(1e-4, (0.0, 1500.0), seed=seed))
+        calm = stationary(model, 80.0, 2e-3, solver=QUICK)
+        slow = stationary(model, 80.0, 2e-3, solver=QUICK, start=[100.0, 0.0])
+        size = model.simulate(20.0, 2e-3, solver=QUICK).q[2500:].std()
+        times.append(slow.settling.time / (correlation_time(model) * math.log(100.0 / size)))
+        assert slow["tip u"].variance.batches == calm["tip u"].variance.batches == 16
+        assert slow.duration == pytest.approx(80.0, abs=0.1)
+    assert 0.6 < np.median(times) < 2.0
 
 
 @pytest.mark.parametrize("rest", [0.0, 0.3, 0.6, 0.9])
