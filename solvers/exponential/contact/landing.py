@@ -73,12 +73,11 @@ from solvers.exponential.contact.node_response import (
     error_of_work,
 )
 from solvers.exponential.contact.peaks import state_peaks
-from solvers.problem.friction import CODE, PEAK
+from solvers.problem.friction import PEAK
 
 _MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
 _MOST_VERTICES = 6  # of parabolas, to a maximum inside a landing
 _MOST_HALVINGS = 40  # the same on a border, whose margin may hardly change but at the start
-_ASIDE = 1e-6  # of a landing, by which a margin is differenced
 _PART = 0.1  # of the embedded difference that counts as the error
 _PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
 _OF_SLOPES, _MOST_SLOPE = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
@@ -410,17 +409,12 @@ def _apart(problem, tables, state, scratch, stop, border, x):
 
 
 @merged
-def _earlier(problem, state, scratch, s, border, time):
-    """A margin so long before the landing, by the rates there."""
+def _rises(problem, state, scratch, s, border, time):
+    """Whether a margin was lower so long before the landing, by the rates there."""
     x, size = scratch.stages[LANDED], state.x.size
+    margins_of(problem, state, scratch, s, x[size], x, scratch.margin)
     margins_later(problem, state, scratch, s, x[size], x, -time, scratch.ends)
-    return scratch.ends[border]
-
-
-@inlined
-def _follows_rates(problem, s):
-    """Whether rates tell how a margin of friction changes: that of slip would need δ⃛ if N depends on δ̇."""
-    return rubs(problem, s) and (problem.border_count[s] == 1 or slider_of(problem, s)[CODE] == 0.0)
+    return scratch.ends[border] < scratch.margin[border]
 
 
 @inlined
@@ -495,9 +489,6 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near):
         value = _apart(problem, tables, state, scratch, stop, border, x)
         if abs(value) <= enough:
             break
-        if variable == TIME and _follows_rates(problem, stop):
-            before = span - _ASIDE * span
-            apart = _earlier(problem, state, scratch, stop, border, _ASIDE * span)
         following = span - value * (span - before) / (value - apart)
         if abs(following - span) <= 1e-15 * span and border >= 0:
             break
@@ -513,7 +504,7 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near):
     time = span if variable == TIME else x[size] - w[size]
     if not (abs(value) <= 1e-6 * largest and _is_exact(problem, tables, state, scratch, variable, stop, time)):
         return False
-    if border >= 0 and _earlier(problem, state, scratch, stop, border, 1e-3 * time) < value:  # it was below zero before
+    if border >= 0 and _rises(problem, state, scratch, stop, border, 1e-3 * time):  # it has been below zero before
         return False
     if before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
         return False
