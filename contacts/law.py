@@ -238,8 +238,10 @@ class Law(ABC):
 
         Without memory the integral of the force at rest from 0 to ``delta``.
         """
-        if self.one_sided and delta <= 0.0:
-            return 0.0
+        return 0.0 if self.one_sided and delta <= 0.0 else self.work_at_rest(delta)
+
+    def work_at_rest(self, delta: float) -> float:
+        """∫F dδ from 0 to ``delta`` in J, passed slowly and without memory; below 0 of a contact that always acts."""
         from scipy.integrate import quad
 
         force = self.batch(1.0)

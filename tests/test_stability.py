@@ -10,8 +10,19 @@ from scipy import sparse
 
 import fembeam as fb
 import solvers
-from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
-from solvers import RK4, CentralDifference, Contact, GeneralizedAlpha, HenonRK2, Newmark, Status, System, integrate
+from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Polynomial, law
+from solvers import (
+    RK4,
+    CentralDifference,
+    Contact,
+    DormandPrince,
+    GeneralizedAlpha,
+    HenonRK2,
+    Newmark,
+    Status,
+    System,
+    integrate,
+)
 from solvers.stepping.stability import work_of
 
 
@@ -332,6 +343,33 @@ def test_a_run_that_ends_while_it_blows_up_is_noticed():
     dt = 0.2
     run = integrate(System.modal([100.0], 0.0), [1.0], [0.0], 6 * dt, method=heun(dt, force_unstable=True), check=False)
     assert run.status is Status.GAINED
+
+
+@pytest.mark.parametrize("spring", [PiecewiseLinear(4.0), Hertz(4.0, 1.0), PiecewiseLinear(1.0) + Hertz(3.0, 1.0)])
+def test_springs_begun_drawn_give_back_what_they_hold(spring):
+    """At q = 1, δ = -1, a law for stops that acts both ways holds 2 J: ω² = 1 + 4."""
+    system = System.modal([1.0], 0.0, [Contact([1.0], spring, always=True)])
+    end = integrate(system, [1.0], [0.0], 10.0, method=DormandPrince(1e-11))
+    assert end.q[-1, 0] == pytest.approx(math.cos(math.sqrt(5.0) * 10.0), abs=1e-8)
+    assert end.losses.stored[0] == pytest.approx(2.0 * (end.q[-1, 0] ** 2 - 1.0), rel=1e-8)
+
+
+@pytest.mark.parametrize("beside", [None, Jenkins(1e-9, 1.0)])
+def test_a_snap_through_spring_may_fall_into_its_other_well(beside):
+    """F = δ + 2.5 δ² + δ³ from its hill at δ = -½ to the well at -2, 0.7 J below: the energy is that of the start."""
+    spring = Polynomial([1.0, 2.5, 1.0])
+    system = System.modal([0.1], 0.0, [Contact([1.0], spring if beside is None else spring + beside, always=True)])
+    run = integrate(system, [0.6], [0.0], 10.0, 0.1, method=DormandPrince(1e-11))
+    assert run.q.max() > 2.0
+    held = np.polynomial.Polynomial([0.0, 0.0, 0.505, -2.5 / 3.0, 0.25])
+    np.testing.assert_allclose(0.5 * run.q_dot[:, 0] ** 2 + held(run.q[:, 0]), held(0.6), atol=1e-8)
+
+
+def test_a_constant_whose_phase_leaves_nothing_is_no_load():
+    """cos(π/2) is 6e-17: that was taken for rounding beside an amplitude of 10 N, and the motion for gained."""
+    system = System.modal([100.0, 800.0], 0.01, loads=[([1.0, 1.0], fb.Harmonic(10.0, 0.0, math.pi / 2.0))])
+    run = integrate(system, np.zeros(2), np.zeros(2), 0.1, method=DormandPrince())
+    assert np.abs(run.q).max() < 1e-18
 
 
 def test_laws_that_give_energy_on_purpose_are_let():

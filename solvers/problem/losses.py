@@ -143,8 +143,9 @@ def _stored_by(contact: Contact, delta: float, latched: Array) -> float:
     if delta <= 0.0 and not contact.always:
         return 0.0
     places = list(getattr(law, "memory", ()))
-    beyond = delta < 0.0 and getattr(law, "one_sided", True) and not places
-    if beyond or not hasattr(law, "stored"):
+    if delta < 0.0 and getattr(law, "one_sided", True) and not places:  # of a law for stops that acts both ways
+        return float(law.work_at_rest(delta)) if hasattr(law, "work_at_rest") else math.nan
+    if not hasattr(law, "stored"):
         return math.nan
     row = np.array(law.parameters, dtype=float)
     row[places] = latched

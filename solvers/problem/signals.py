@@ -50,7 +50,10 @@ def forcing_of(signals: list[Signal], duration: float, rtol: float) -> Forcing:
     for load, signal in enumerate(signals):
         if hasattr(signal, "tones"):
             omega, amplitude = signal.tones()
-            tones += [(float(w), complex(a), load) for w, a in zip(omega, amplitude, strict=True)]
+            tones += [  # of a constant the real part is all there is
+                (float(w), complex(a) if w else complex(np.real(a)), load)
+                for w, a in zip(omega, amplitude, strict=True)
+            ]
         else:
             provider = getattr(signal, "nodes", None)
             dt, rows = provider(duration, rtol) if provider else _sample(signal, duration, rtol, load)

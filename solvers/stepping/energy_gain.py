@@ -19,6 +19,7 @@ STEPS_OF_GAIN = 8  # steps in a row: one alone may be the energy balance's, as i
 
 
 _FAR, STEPS_FAR = 1e3, 3  # times the energy given, and then steps in a row
+_WAYS = np.geomspace(1e-9, 1e3, 241)  # m or rad, to either side, where a law is tried for a well of energy beside 0
 
 
 @kernel
@@ -56,12 +57,25 @@ def watched(system: System, motion: Array, least: float) -> Array:
     """What `gains` compares, J: stored now, at the start, negligible; steps that gained; most input, held by stops."""
     q, q_dot = np.split(motion, 2)
     stored = abs(float(system.energy(q, q_dot)))
-    known = system.about_laws.get("dissipative", lambda: [is_dissipative(contact.law) for contact in system.contacts])
+    known = system.about_laws.get("dissipative", lambda: [_only_takes(contact) for contact in system.contacts])
     held = [
-        _held(contact, float(contact.indentation(q))) if dissipative else math.inf
-        for contact, dissipative in zip(system.contacts, known, strict=True)
+        _held(contact, float(contact.indentation(q))) if takes else math.inf
+        for contact, takes in zip(system.contacts, known, strict=True)
     ]
     return np.array([stored, stored, least, 0.0, 0.0, *held])
+
+
+def _only_takes(contact: Contact) -> bool:
+    """Whether a contact gives back no more than it holds: of one that acts both ways, if its force leads to 0."""
+    law: Any = contact.law
+    if not is_dissipative(law):
+        return False
+    if not contact.always:
+        return True
+    parts = [part for part in getattr(law, "parts", (law,)) if not (part.memory or (law.memory and part.one_sided))]
+    delta = np.outer(_WAYS, (-1.0, 1.0)).ravel()
+    with np.errstate(all="ignore"):  # what overflows is not known to lead there
+        return all(bool(np.all(delta * part.batch(1.0)(delta, 0.0 * delta) >= 0.0)) for part in parts)
 
 
 def _held(contact: Contact, delta: float) -> float:
@@ -69,7 +83,9 @@ def _held(contact: Contact, delta: float) -> float:
     law: Any = contact.law
     if getattr(law, "opens", False) and delta > 0.0:
         return math.inf
-    return float(law.stored(delta, law.parameters)) if contact.always else work_of(law, delta)
+    if not contact.always:
+        return work_of(law, delta)
+    return float(law.stored(delta, law.parameters) if law.memory else law.work_at_rest(delta))
 
 
 def largest_loads(problem: Any) -> Array:
