@@ -145,8 +145,7 @@ def _falls_at_once(problem, tables, state, scratch, s, j, time):
 
     The start is extrapolated over shorter and shorter times until the margin cannot be told from zero: a slider with a
     strong dashpot slips one way, sticks, and slips the other way within a small part of a step. One that rises by less
-    than its noise and then falls, as where a slider at its limit still moves back a little, falls later: what is as
-    long before the start shows that it rises.
+    than its noise and then falls, as where a slider at its limit still moves back a little, falls later.
     """
     noise, share = scratch.noise[s, j], _EARLY
     for _ in range(_LOOKS):
