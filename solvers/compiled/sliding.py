@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 
-from solvers.compiled.friction import TURN, drawn, friction_force, slide, slide_acceleration
+from solvers.compiled.friction import TURN, drawn, friction_force, slide, slide_acceleration, speed_of, way_of
 from solvers.compiled.kernels import (
     abs_dot,
     acceleration_of,
@@ -70,6 +70,17 @@ def point_of(problem, s, t, x, rate, point):
     point[WAY], point[SPEED] = slide(radius, own, t, u, u_dot, w, w_dot, turned, turning)
     args = u, u_dot, u_twice, w, w_dot, w_twice, turning_rate
     point[WAY_ACCELERATION] = slide_acceleration(radius, own, *args)
+
+
+@inner
+def motion_of_slider(problem, s, t, x, point):
+    """The same without accelerations, and without the place of a slider that slips, which its margins do not need."""
+    radius, own, rows = radius_of(problem, s), slider_of(problem, s), rows_at(problem, s, x)
+    u, u_dot, w, w_dot, turned, turning = rows
+    point[DELTA], point[RATE] = delta_of(radius, rows)
+    point[WAY] = way_of(radius, own, t, u, w, turned) if own[CODE] == 0.0 else 0.0
+    point[SPEED] = speed_of(radius, own, u, u_dot, w, w_dot, turning)
+    point[ACCELERATION] = point[WAY_ACCELERATION] = 0.0
 
 
 @inlined

@@ -256,7 +256,7 @@ def _land(problem, ahead, behind, tables, past, scratch, derivatives, variation,
     _note_sides(problem, tables, past, scratch, past.x)
     while True:
         landing_step(
-            *(problem, tables, False, variable, stop, span, w, past.segment, past.entry_rate),
+            *(problem, tables, False, False, variable, stop, span, w, past.segment, past.entry_rate),
             *(scratch.unresolved, scratch.stages),
         )
         if not _note_sides(problem, tables, past, scratch, scratch.stages[LANDED]):

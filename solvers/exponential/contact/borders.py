@@ -26,6 +26,7 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.parts import PASSED, part
 from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
+from solvers.compiled.sliding import DELTA, RATE
 from solvers.compiled.state import LAST_EVENT, T, rate_tolerance, surface_tolerance
 from solvers.exponential.contact.crossings import extremum
 from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, motion_of, rate_ripple_of, ripple_of
@@ -59,7 +60,7 @@ def margins_of(problem, state, scratch, s, t, x, out):
     """Margins of element s in the state x at time t; returns δ and δ̇."""
     if rubs(problem, s):
         slider_margins_in(problem, state, scratch, s, t, x, 0.0, out)
-        return indentation_and_rate(problem, s, x)
+        return scratch.point[0, DELTA], scratch.point[0, RATE]
     return margins_in(problem, state, s, x, scratch.trial, out)
 
 
@@ -354,7 +355,7 @@ def passed(problem, state, scratch, element, border, w, x):
     worst, found, which, dips = -_TOGETHER, -1, -1, False
     for s in range(problem.law.size):
         count, size = problem.border_count[s], state.x.size
-        if _is_without(problem, state, s):
+        if _is_without(problem, state, s) or (s == element and count == 1):
             continue
         margins_of(problem, state, scratch, s, w[size], w, scratch.ends)
         margins_of(problem, state, scratch, s, x[size], x, scratch.margin)
@@ -389,17 +390,20 @@ def renew_all(problem, state, scratch, element, border):
     has risen and come back if its margin was above zero just before.
     """
     size = state.x.size
-    margins_of(problem, state, scratch, element, state.now[T], state.x, scratch.margin)
+    delta, rate = margins_of(problem, state, scratch, element, state.now[T], state.x, scratch.margin)
     missed = 2.0 * abs(scratch.margin[border]) / scratch.largest[element, border]
     time = _BEFORE * (state.now[T] - scratch.stages[START, size])
     for s in range(problem.law.size):
         count = problem.border_count[s]
         if _is_without(problem, state, s):
             continue
+        if s == element and count == 1:
+            renew(problem, state, s, border, delta, rate)
+            continue
         begun, just_before = scratch.ends[:count], scratch.ends[count : 2 * count]
         margins_of(problem, state, scratch, s, scratch.stages[START, size], scratch.stages[START], begun)
         margins_later(problem, state, scratch, s, state.now[T], state.x, -time, just_before)
-        delta, rate = margins_of(problem, state, scratch, s, state.now[T], state.x, scratch.margin)
+        depth, speed = margins_of(problem, state, scratch, s, state.now[T], state.x, scratch.margin)
         for j in range(count):
             before, near = max(begun[j], just_before[j]), max(scratch.noise[s, j], missed * scratch.largest[s, j])
             near = max(near, _TOGETHER * before)
@@ -407,5 +411,5 @@ def renew_all(problem, state, scratch, element, border):
             scratch.fired[j] = 1.0 if landed else 0.0
         for j in range(count):
             if scratch.fired[j] > 0.0:
-                renew(problem, state, s, j, delta, rate)
+                renew(problem, state, s, j, depth, speed)
     note_event(state)

@@ -23,6 +23,7 @@ import math
 import numpy as np
 
 from solvers.compiled.dop853_tableau import E3, E5, STAGES
+from solvers.compiled.friction import drawn
 from solvers.compiled.kernels import (
     abs_dot,
     contact_gradient,
@@ -37,13 +38,14 @@ from solvers.compiled.kernels import (
     is_circle,
     is_planar,
     merged,
+    radius_of,
     raised,
     row_of,
     rubs,
     slider_of,
 )
 from solvers.compiled.parts import PASSED
-from solvers.compiled.sliding import slider_force
+from solvers.compiled.sliding import WAY, slider_force, way_tolerance
 from solvers.compiled.state import (
     CALLS,
     LANDING,
@@ -70,12 +72,15 @@ from solvers.exponential.contact.node_response import (
     RTOL,
     START,
     STRAIGHT,
+    WITHIN,
     error_of_work,
 )
 from solvers.exponential.contact.peaks import state_peaks
-from solvers.problem.friction import PEAK
+from solvers.problem.friction import CODE, PEAK, STIFFNESS
 
 _MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
+_SMALL = 1e-4  # part of a landing by which its length may change without another step: the rule's error is its cube
+_STILL = 1e-10  # margin, in units of its largest, from which on trials that do not halve it have met its rounding
 _MOST_VERTICES = 6  # of parabolas, to a maximum inside a landing
 _MOST_HALVINGS = 40  # the same on a border, whose margin may hardly change but at the start
 _PART = 0.1  # of the embedded difference that counts as the error
@@ -176,7 +181,17 @@ def _goes_ahead(scratch, size):
 def _step(problem, tables, state, scratch, variable, stop, span):
     """A step from ``scratch.stages[START]`` to ``scratch.stages[LANDED]``."""
     state.count[CALLS] += landing_step(
-        *(problem, tables, scratch.control[BALANCED] > 0, variable, stop, span, scratch.stages[START]),
+        *(problem, tables, scratch.control[BALANCED] > 0, np.bool_(0), variable, stop, span, scratch.stages[START]),
+        *(state.segment, state.entry_rate, scratch.side, scratch.stages),
+    )
+
+
+@inner
+def _move(problem, tables, state, scratch, variable, stop, span):
+    """Go on from ``scratch.stages[LANDED]`` by a small part of the step that led there."""
+    copy(scratch.stages[LANDED], scratch.stages[WITHIN], scratch.stages.shape[1])
+    state.count[CALLS] += landing_step(
+        *(problem, tables, scratch.control[BALANCED] > 0, np.bool_(1), variable, stop, span, scratch.stages[WITHIN]),
         *(state.segment, state.entry_rate, scratch.side, scratch.stages),
     )
 
@@ -398,23 +413,31 @@ def land(problem, tables, state, scratch, stop, direction, near):
 
 
 @inlined
-def _apart(problem, tables, state, scratch, stop, border, x):
-    """What falls to zero where a landing in time ends: the margin of a border, or if that is -1 the side of a bend."""
+def _apart(problem, tables, state, scratch, stop, border, x, sign):
+    """What falls to zero where a landing in time ends: the margin of a border, or if that is -1 the side of a bend.
+
+    Of a slider that sticks, with a sign that is not 0, it is the margin against slip that way: it has no kink where
+    F_t turns. Where |F_t| is too large, that way is the sign of F_t. Returned with the sign.
+    """
     if border < 0:
-        value = side_at(problem, tables, state, stop, x, scratch.trial)
-    else:
-        margins_of(problem, state, scratch, stop, x[state.x.size], x, scratch.margin)
-        value = scratch.margin[border]
-    return value
+        return side_at(problem, tables, state, stop, x, scratch.trial), sign
+    margins_of(problem, state, scratch, stop, x[state.x.size], x, scratch.margin)
+    value = scratch.margin[border]
+    if is_planar(problem) and sign != 0.0:
+        own = slider_of(problem, stop)
+        force = own[STIFFNESS] * drawn(radius_of(problem, stop), own, scratch.point[1, WAY])
+        if value < 0.0:
+            sign = math.copysign(1.0, force)
+        value += abs(force) - sign * force
+    return value, sign
 
 
 @merged
-def _rises(problem, state, scratch, s, border, time):
-    """Whether a margin was lower so long before the landing, by the rates there."""
-    x, size = scratch.stages[LANDED], state.x.size
-    margins_of(problem, state, scratch, s, x[size], x, scratch.margin)
-    margins_later(problem, state, scratch, s, x[size], x, -time, scratch.ends)
-    return scratch.ends[border] < scratch.margin[border]
+def _rises(problem, state, scratch, s, border, value, time):
+    """Whether a margin of a value was lower so long before the landing, by the rates there."""
+    x = scratch.stages[LANDED]
+    margins_later(problem, state, scratch, s, x[state.x.size], x, -time, scratch.ends)
+    return scratch.ends[border] < value
 
 
 @inlined
@@ -426,16 +449,32 @@ def _opens(problem, tables, state, scratch, stop):
     return may_land(problem, tables, state, scratch, stop, np.int64(-1), delta / -rate)
 
 
+@inlined
+def _power(tables, stop):
+    """Exponent of u with which N ends where a stop opens, as a rule."""
+    return tables.time_exponent[1 + stop] + 1.0
+
+
 @merged
 def _begin_at_opening(problem, tables, state, scratch, stop, border, near):
-    """Way in u, as if δ̇ stayed, of a landing on a border before a stop opens; the scale of its margin up to there."""
-    u, delta = scratch.stages[START, state.x.size + 1], scratch.start_motion[stop, 0]
-    largest = abs(_apart(problem, tables, state, scratch, stop, border, scratch.stages[START]))
+    """Way in u of a landing on a border before a stop opens; the scale of its margin up to there is noted.
+
+    The place is guessed from margins at both ends for a slider that sticks, with the way it slips; else from the time
+    as if δ̇ stayed, with 0.
+    """
+    u, delta, own = scratch.stages[START, state.x.size + 1], scratch.start_motion[stop, 0], slider_of(problem, stop)
+    w, kappa, sticks = scratch.stages[START], tables.time_exponent[1 + stop], 1.0 if own[CODE] == 0.0 else 0.0
+    begin, _ = _apart(problem, tables, state, scratch, stop, border, w, 0.0)
     _step(problem, tables, state, scratch, np.int64(ROOT), stop, -u)
-    largest = max(largest, abs(_apart(problem, tables, state, scratch, stop, border, scratch.stages[LANDED])))
-    scratch.largest[stop, border], scratch.noise[stop, border] = largest, _OF_LARGEST * largest
+    end, sign = _apart(problem, tables, state, scratch, stop, border, scratch.stages[LANDED], sticks)
+    largest = max(abs(begin), abs(scratch.margin[border]))
+    rounding = own[STIFFNESS] * way_tolerance(problem, stop, state.now[T], state.x)[0]
+    scratch.largest[stop, border], scratch.noise[stop, border] = largest, max(_OF_LARGEST * largest, 2.0 * rounding)
+    if sticks > 0.0 and end < 0.0 < begin:
+        begin, _ = _apart(problem, tables, state, scratch, stop, border, w, sign)
+        return u * (1.0 - (end / (end - begin)) ** (1.0 / _power(tables, stop))), sign
     left = max(1.0 + near * scratch.start_motion[stop, 1] / delta, 0.0) if delta > 0.0 else 0.0
-    return u * (1.0 - left ** (1.0 / tables.time_exponent[1 + stop]))
+    return u * (1.0 - left ** (1.0 / kappa)), 0.0
 
 
 @merged
@@ -453,6 +492,53 @@ def _between(above, below):
     return math.sqrt(above * below) if above > 0.0 else 1e-3 * below
 
 
+@inlined
+def _secant(span, value, before, apart, end, power):
+    """Where a margin is zero by two trials, if it is a straight line in (end - span)^power."""
+    if power == 1.0:
+        return span - value * (span - before) / (value - apart)
+    left, more = (end - span) ** power, (end - before) ** power
+    return end - max(left - value * (left - more) / (value - apart), 0.0) ** (1.0 / power)
+
+
+@merged
+def _meet(problem, tables, state, scratch, stop, border, search):
+    """Find the bend or border by the secant rule; (span, what is left of its margin), or NaN.
+
+    A trial that differs little from the one before goes on from there.
+    """
+    variable, way, span, furthest, largest, enough, sign = search
+    x, before, power = scratch.stages[LANDED], 0.0, _power(tables, stop) if sign != 0.0 else 1.0
+    apart, sign = _apart(problem, tables, state, scratch, stop, border, scratch.stages[START], sign)
+    begins_there = (apart if border >= 0 else abs(apart)) <= 1e-6 * largest
+    least = 0.0 if border >= 0 and not begins_there else 0.1 * span
+    if begins_there:  # the secant needs another point
+        before = 0.9 * span
+        _step(problem, tables, state, scratch, variable, stop, way * before)
+        apart, sign = _apart(problem, tables, state, scratch, stop, border, x, sign)
+    above, below = before if apart > 0.0 else 0.0, furthest
+    for _ in range(_MOST_TRIES if border < 0 else _MOST_HALVINGS):
+        if abs(span - before) <= _SMALL * span:
+            _move(problem, tables, state, scratch, variable, stop, way * (span - before))
+        else:
+            _step(problem, tables, state, scratch, variable, stop, way * span)
+        value, sign = _apart(problem, tables, state, scratch, stop, border, x, sign)
+        following = _secant(span, value, before, apart, furthest, power)
+        still = abs(following - span) <= 1e-15 * span and border >= 0
+        if still or abs(value) <= enough or 0.5 * abs(apart) <= abs(value) <= _STILL * largest:
+            break
+        if border >= 0:
+            above, below = (span, below) if value > 0.0 else (above, span)
+            if (below < furthest or way < 0.0) and not above < following < below:
+                following = _between(above, below)
+                if rubs(problem, stop):  # not back to where it begins
+                    following = max(following, 2.0 * least)
+        if not least < following <= furthest or following == span:
+            return span, np.nan
+        before, apart, span = span, value, following
+    return span, value
+
+
 @merged
 def land_on_bend(problem, tables, state, scratch, stop, border, near):
     """Try to land on the bend of ``stop``, or on a border of its law, about ``near`` s ahead; whether it succeeded.
@@ -460,7 +546,7 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near):
     A border that is passed before is noted in ``scratch.landed``: -1 if none is, and less if that cannot be told.
     """
     furthest, largest = _furthest(problem, tables, scratch), scratch.bend_values[scratch.bend_values.size - 1]
-    enough = 1e-10 * largest
+    enough, sign = 1e-10 * largest, 0.0
     if border >= 0:  # one that is missed by more may seem to be passed the other way by the next step
         largest, enough = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
     scratch.landed[0] = -1
@@ -474,40 +560,16 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near):
     furthest, span = furthest**root, near**root
     if border >= 0 and variable == TIME and _opens(problem, tables, state, scratch, stop):
         variable, way, furthest = np.int64(ROOT), -1.0, w[size + 1]
-        span = _begin_at_opening(problem, tables, state, scratch, stop, border, near)
+        span, sign = _begin_at_opening(problem, tables, state, scratch, stop, border, near)
         largest, enough = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
-    before, apart = 0.0, _apart(problem, tables, state, scratch, stop, border, w)
-    begins_there = (apart if border >= 0 else abs(apart)) <= 1e-6 * largest
-    least = 0.0 if border >= 0 and not begins_there else 0.1 * span
-    if begins_there:  # the secant needs another point
-        before = 0.9 * span
-        _step(problem, tables, state, scratch, variable, stop, way * before)
-        apart = _apart(problem, tables, state, scratch, stop, border, x)
-    above, below = before if apart > 0.0 else 0.0, furthest
-    for _ in range(_MOST_TRIES if border < 0 else _MOST_HALVINGS):
-        _step(problem, tables, state, scratch, variable, stop, way * span)
-        value = _apart(problem, tables, state, scratch, stop, border, x)
-        if abs(value) <= enough:
-            break
-        following = span - value * (span - before) / (value - apart)
-        if abs(following - span) <= 1e-15 * span and border >= 0:
-            break
-        if border >= 0:
-            above, below = (span, below) if value > 0.0 else (above, span)
-            if (below < furthest or way < 0.0) and not above < following < below:
-                following = _between(above, below)
-                if rubs(problem, stop):  # not back to where it begins
-                    following = max(following, 2.0 * least)
-        if not least < following <= furthest or following == span:
-            return False
-        before, apart, span = span, value, following
+    search = variable, way, span, furthest, largest, enough, sign
+    span, value = _meet(problem, tables, state, scratch, stop, border, search)
     time = span if variable == TIME else x[size] - w[size]
     if not (abs(value) <= 1e-6 * largest and _is_exact(problem, tables, state, scratch, variable, stop, time)):
         return False
-    if border >= 0 and _rises(problem, state, scratch, stop, border, 1e-3 * time):  # it has been below zero before
-        return False
-    if before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
-        return False
+    rises = border >= 0 and _rises(problem, state, scratch, stop, border, value, 1e-3 * time)
+    if rises or before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
+        return False  # it has been below zero before, or another surface or bend is in the way
     scratch.landed[0], scratch.landed[1] = passed(problem, state, scratch, stop, border, w, x)
     if scratch.landed[0] != -1:
         return False

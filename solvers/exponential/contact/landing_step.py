@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import types
 
 from solvers.compiled.dop853_tableau import STAGES, A
@@ -41,7 +42,8 @@ from solvers.exponential.energy.quadrature import powers
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 
 INDENTATION, ROOT, TIME, SINCE = range(4)
-_CHOICE = types.boolean, types.int64, types.int64  # types of with_energy, variable, stop
+MIDPOINT = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 1.0]])
+_CHOICE = types.boolean, types.boolean, types.int64, types.int64  # types of with_energy, short, variable, stop
 
 
 @inner
@@ -69,7 +71,7 @@ def _force(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batc
 @merged
 def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, out, batch):
     """Derivative of the unknowns ``w`` = [state, t, u] by the chosen variable, times its span; number of law calls."""
-    n, calls = problem.k.size, 0
+    n, calls, pace = problem.k.size, 0, np.nan
     size, t = 2 * n, width_of(problem)
     for b in range(n):
         out[b] = w[n + b]
@@ -89,6 +91,8 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
                 delta, rate = indentation_and_rate(problem, s, w)
             force = _force(problem, tables, s, segment[s], delta, rate, side[s], entry_rate[s], batch)
             calls += 1
+            if s == stop:
+                pace = rate
             if rubs(problem, s):
                 add_friction(problem, s, w[t], rows, force, out)
             else:
@@ -102,7 +106,7 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
         kappa = tables.time_exponent[1 + stop]
         factor = factor * kappa * raised(w[t + 1], kappa - 1.0)
     if variable in (INDENTATION, ROOT):
-        factor /= indentation_rate(problem, stop, w)
+        factor /= pace if segment[stop] > 0 else indentation_rate(problem, stop, w)
     for e in range(t):
         out[e] *= factor
     out[t] = factor
@@ -111,16 +115,19 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
 
 
 @part(LANDING_STEP, types.int64, *_CHOICE, REAL, VECTOR, INTEGERS, VECTOR, VECTOR, MATRIX)
-def landing_step(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, work):
-    """One DOP853 step of the chosen variable from ``w`` to ``work[LANDED]``, stages in ``work``; count of law calls."""
-    calls = 0
-    batch, trial = work[BATCH], work[LANDED]
-    for i in range(STAGES):
-        combine(work, A[i], i, w, trial)
+def landing_step(problem, tables, with_energy, short, variable, stop, span, w, segment, entry_rate, side, work):
+    """One DOP853 step of the chosen variable from ``w`` to ``work[LANDED]``, stages in ``work``; count of law calls.
+
+    A short one is a step of the midpoint rule; it leaves the stages as they are.
+    """
+    batch, trial, calls = work[BATCH], work[LANDED], 0
+    stages, tableau, count = (work[STAGES:], MIDPOINT, 2) if short else (work, A, STAGES)
+    for i in range(count):
+        combine(stages, tableau[i], i, w, trial)
         calls += _rate(
-            problem, tables, with_energy, variable, stop, span, trial, segment, entry_rate, side, work[i], batch
+            problem, tables, with_energy, variable, stop, span, trial, segment, entry_rate, side, stages[i], batch
         )
-    combine(work, A[STAGES], STAGES, w, trial)
+    combine(stages, tableau[count], count, w, trial)
     return calls
 
 

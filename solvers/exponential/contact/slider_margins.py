@@ -28,7 +28,9 @@ from solvers.compiled.parts import RUB_AROUND, RUB_IN, RUB_MARGINS, RUB_PEAK, pa
 from solvers.compiled.simd import largest8, load8, size8
 from solvers.compiled.sliding import (
     ACCELERATION,
+    POINT,
     RATE,
+    motion_of_slider,
     move_point,
     normal_forces,
     normal_slopes,
@@ -80,8 +82,11 @@ def slider_margins_in(problem, state, scratch, s, t, x, later, out):
     point, moved = scratch.point[0], scratch.point[1]
     if later != 0.0 or (slider_of(problem, s)[CODE] != 0.0 and _pulls(problem, s)):
         rhs(problem, t, x, state.segment, state.entry_rate, state.rate, scratch.numbers)
-    point_of(problem, s, t, x, state.rate, point)
-    move_point(point, later, moved)
+        point_of(problem, s, t, x, state.rate, point)
+        move_point(point, later, moved)
+    else:
+        motion_of_slider(problem, s, t, x, point)
+        copy(point, moved, POINT)
     moved[RATE] = _on_its_side(problem, scratch, s, moved[RATE])
     slider_margins(problem, s, state.segment[s], state.entry_rate[s], moved, out)
 
