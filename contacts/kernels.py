@@ -129,8 +129,13 @@ def power_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rat
     for i in range(n):
         d, v = delta[i], delta_dot[i]
         viscosity = 0.0 if approach != 0.0 and v <= 0.0 else c
-        elastic, damping = K * d**p, viscosity * d**r
-        by_delta[i] = K * p * d ** (p - 1.0) * (1.0 + rate * v)
+        if p == 1.5:  # see `power`
+            root = math.sqrt(d)
+            elastic, slope = K * d * root, 1.5 * K * root
+        else:
+            elastic, slope = K * d**p, K * p * d ** (p - 1.0)
+        damping = viscosity * d**r if viscosity != 0.0 else 0.0
+        by_delta[i] = slope * (1.0 + rate * v)
         if viscosity * r != 0.0 and d > 0.0:  # at the surface itself the slope is infinite
             by_delta[i] += viscosity * r * d ** (r - 1.0) * v
         by_rate[i] = elastic * rate + damping
