@@ -54,6 +54,7 @@ def test_beam_of_spans():
     assert beam.borders == pytest.approx((0.0, 0.25, 0.75, 0.875))
     assert beam.bending_stiffness([0.05, 0.25, 0.74, 0.75, 0.875]) == pytest.approx([1, 2, 2, 1, 1])
     assert Beam.of_spans([(0.1, UNIT)]) == Beam(0.1, UNIT)
+    assert Beam.of_spans([(0.7, UNIT), (0.1, UNIT)]).length == 0.8  # not 0.7999999999999999, where 0.8 lies outside
     assert replace(Beam(0.1, UNIT), length=0.2) == Beam(0.2, UNIT)
     with pytest.raises(FrozenInstanceError):
         beam.length = 1.0

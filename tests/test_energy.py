@@ -259,6 +259,18 @@ class RoughNodes(Nodes):
         return 0.02, 20.0 * rows / np.array([1.0, 0.02, 0.02**2])
 
 
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e7])
+def test_coupled_damping_balances_in_any_unit_of_time(unit):
+    """Of frequencies of 1e7 rad/s its rows were known to 1e-16 of the largest, in which p and v were mixed."""
+    omega, row = np.array([1.0, 6.3, 17.5]) * unit, np.array([1.0, -1.0, 1.0])
+    stop = Contact([1.0, 0.5, 0.2], PiecewiseLinear([400.0 * unit**2]), gap=0.05)
+    C = np.diag(0.02 * omega) + 0.4 * unit * np.outer(row, row)
+    system = System(np.eye(3), C, np.diag(omega**2), [stop])
+    run = integrate(system, [0.3, 0.1, 0.0], np.zeros(3), 5.0 / unit, 0.5 / unit)
+    assert len(run.contacts)
+    assert np.abs(run.energy.residual).max() < 1e-11 * unit**2
+
+
 @pytest.mark.parametrize("stops", [[], [Contact([1.0, 0.5, -0.3], Hertz(1e6), gap=2e-5)]], ids=["flight", "impacts"])
 def test_cells_balance_without_tables(monkeypatch, stops):
     """Of many coordinates with coupled damping there are no forms of whole cells: series give the same balance."""

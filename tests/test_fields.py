@@ -165,7 +165,7 @@ def collision():
 def test_xdmf_opens_again_with_the_same_values(collision, tmp_path):
     import meshio
 
-    run, path = collision, collision.to_xdmf(tmp_path / "run", stride=2)
+    run, path = collision, collision.to_xdmf(tmp_path / "run", stride=np.int64(2))
     assert path.suffix == ".xdmf"
     assert [entry.name for entry in tmp_path.iterdir()] == [path.name]
     own, second = (len(shapes.nodes) for shapes in (run.shapes, *run.others))

@@ -46,7 +46,7 @@ def things():
         **{"attractor": model.attractors(starts=1)[0], "ensemble": study.ensemble(noisy, 3, tip)},
         "response": (response := study.stationary(noisy, 60.0, 2e-3)),
         "signal": response["tip u"],
-        "bifurcation": study.bifurcation(model, "omega", [150.0, 151.0], settle=5, keep=3),
+        "bifurcation": study.bifurcation(model, "omega", [150.0, 151.0], settle=np.int64(5), keep=3),
         "basins": study.basins(model, points=2, settle=30),
         "modes": study.mode_count(scene, [1, 2], "amplitude", duration=0.1, dt=1e-3),
         "map": study.stability_map(scene, solvers.RK4, [1e-6, 1e-5], modes=(1, 2), duration=0.01),

@@ -310,6 +310,7 @@ def test_rigid_body_modes_are_announced():
         ([Pinned(0.3)], [Spring(0.3, 1.0)], 1),
         ([Pinned(0.3)], [Spring(0.3, 0.0, 1.0)], 0),
         ([], [Spring(0.3, 1.0, 1.0)], 0),
+        ([], [Spring(0.3, *np.array([1.0, 1.0]))], 0),
     ]
     for supports, springs, count in cases:
         with pytest.warns(UserWarning, match=f"{count} rigid-body") if count else _silent():

@@ -232,6 +232,23 @@ def test_a_start_on_the_surface():
     assert found.peak_force[0] > 0.0
 
 
+@pytest.mark.parametrize("damping", [0.0, 0.3])
+def test_a_start_on_the_surface_into_the_stop(damping):
+    """By the gap it differs on both sides where the force jumps: before the surface the ball begins in flight."""
+
+    def thrown(gap):
+        return System([[1.0]], [[0.0]], [[1.0]], [Contact([-1.0], KelvinVoigt(9.0, damping), gap)])
+
+    by_gap = Nearby.of(thrown, 0.0, 1e-4)
+    if damping:
+        with pytest.raises(NoDerivativeError, match="touched at the start"):
+            sensitivity(thrown(0.0), [0.0], [1.0], 0.7, nearby=by_gap, method=FINE)
+        return
+    found = sensitivity(thrown(0.0), [0.0], [1.0], 0.7, nearby=by_gap, method=FINE).end
+    w = math.sqrt(10.0)  # q = 0.9 gap (1 - cos wt) + sin(wt)/w in contact
+    np.testing.assert_allclose(found, [0.9 * (1.0 - math.cos(0.7 * w)), 0.9 * w * math.sin(0.7 * w)], rtol=1e-9)
+
+
 def test_refusals_of_systems():
     with pytest.raises(ValueError, match="slope is infinite"):
         sensitivity(ball(law=Viscoelastic.tsuji(2e7, 0.6, 0.3)), [0.0], [SPEED], 0.5)

@@ -127,6 +127,21 @@ def test_strongly_coupled_dashpot_gives_overdamped_pairs():
     assert np.any(blocks.c**2 > 4 * blocks.k)
 
 
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+@pytest.mark.parametrize("unit", [2.0**-20, 2.0**30])
+def test_blocks_are_the_same_in_any_unit_of_time(unit, turn):
+    """Of micro-beams frequencies are some 1e7 rad/s; T went to rounding with their square, and was then refused."""
+    row, K = np.array([1.0, -1.0, 1.0]), np.diag([1.0, 40.0, 300.0])
+    C, G = np.diag([0.02, 0.1, 0.3]) + 0.4 * np.outer(row, row), turn * (np.eye(3, k=1) - np.eye(3, k=-1))
+    slow, fast = (decouple(np.eye(3), one * C, one**2 * K, one * G) for one in (1.0, unit))
+    rates = np.repeat([1.0, unit], 3)
+    np.testing.assert_allclose(fast.k / unit**2, slow.k, rtol=1e-12)
+    np.testing.assert_allclose(fast.c / unit, slow.c, rtol=1e-12)
+    np.testing.assert_allclose(fast.T * rates / rates[:, None], slow.T, atol=1e-12)
+    np.testing.assert_allclose(fast.inverse * rates / rates[:, None], slow.inverse, atol=1e-12)
+    np.testing.assert_allclose(fast.loss * np.outer(rates, rates) / unit**3, slow.loss, atol=1e-12)
+
+
 def test_several_rigid_body_modes_that_are_all_damped():
     check_decoupled(np.eye(2), np.array([[2.0, 1.0], [1.0, 2.0]]), np.zeros((2, 2)))
 

@@ -87,7 +87,9 @@ class Beam:
         for index, (length, _) in enumerate(spans):
             require_positive(f"length of span {index}", length, "Beam.of_spans", "give the length in m")
         single = spans[0][1] if len(spans) == 1 else None
-        return cls(sum(length for length, _ in spans), single, spans, foundation, axial_force)
+        total = sum(length for length, _ in spans)
+        total = max(total, float(f"{total:.15g}"))  # 0.7 + 0.1 is 0.7999999999999999, and 0.8 lies on the beam
+        return cls(total, single, spans, foundation, axial_force)
 
     @classmethod
     def from_mesh(cls, path: str | os.PathLike[str], sections: Mapping[Any, Section | Taper], **options: Any) -> Beam:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from fembeam.response import PlacedShapes, rows_of
 from fembeam.structures import FrameForces
-from fembeam.support import require
+from fembeam.support import is_whole, require
 from solvers.problem import optional
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def to_vtu(run: Run, path: str | os.PathLike[str], sample: int = -1, stride: int
 
 def _samples(run: Run, stride: int) -> range:
     """Numbers of the samples to be written."""
-    require(isinstance(stride, int) and stride >= 1, "stride must be a whole number above 0", stride, "export",
+    require(is_whole(stride) and stride >= 1, "stride must be a whole number above 0", stride, "export",
             "give 1 for every sample")  # fmt: skip
     return range(0, len(run.t), stride)
 

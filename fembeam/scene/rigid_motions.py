@@ -25,8 +25,9 @@ def rigid_body_modes(scene: Scene, turning: bool = True) -> int:
     rows = [row for s in scene.supports for row, fixed in zip(_rigid_rows(s.z), s.fixed, strict=True) if fixed]
     for spring in scene.springs:
         translation, rotation = _rigid_rows(spring.z)
-        rows += [translation] * (spring.stiffness > 0) + [rotation] * (spring.rotational > 0)
-    rows += [(1.0, 0.0), (0.0, 1.0)] * (scene.beam.foundation > 0) + [(0.0, 1.0)] * (scene.beam.axial_force != 0)
+        rows += [translation] * bool(spring.stiffness > 0) + [rotation] * bool(spring.rotational > 0)
+    rows += [(1.0, 0.0), (0.0, 1.0)] * bool(scene.beam.foundation > 0)
+    rows += [(0.0, 1.0)] * bool(scene.beam.axial_force != 0)
     rows += [] if turning else [(0.0, 1.0)]
     scaled = np.array([*rows, (0.0, 0.0)]) / (1.0, scene.beam.length)
     return 2 - int(np.linalg.matrix_rank(scaled, tol=1e-9))

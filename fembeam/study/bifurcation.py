@@ -20,7 +20,7 @@ from fembeam.model import Model, load_period, observed
 from fembeam.scene import Place, changes_structure, path_of, with_value
 from fembeam.study.execution.executors import spread
 from fembeam.study.result import Result
-from fembeam.support import Part, require
+from fembeam.support import Part, is_whole, require
 
 Vector = NDArray[np.float64]
 LOOKS = 128  # samples per period for the peaks
@@ -101,7 +101,7 @@ def bifurcation(
     require(values.size > 0 and bool(np.all(np.isfinite(values))), "values must be finite numbers", values,
             "bifurcation", "give a range such as np.linspace(60, 900, 200)")  # fmt: skip
     for name, count in (("settle", settle), ("keep", keep)):
-        require(isinstance(count, int) and count > 0, f"{name} counts periods and must be above 0", count,
+        require(is_whole(count) and count > 0, f"{name} counts periods and must be above 0", count,
                 "bifurcation", "give a whole number")  # fmt: skip
     place = observed(model) if z is None else z
     state = model.rest() if start is None else np.asarray(start, dtype=float)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from solvers.exponential.method import Exponential
+from solvers.orbits.open_times import latching_stops
 from solvers.orbits.shots import Chain, PeriodicProblem, delayed
 from solvers.orbits.whole_state import codes, counts, derivatives, memory_of, run, state_after, transitions_of
 from solvers.problem import Array, ContactLog, Solution, SolverError, System, Transitions, counted
@@ -195,5 +196,5 @@ def _doubts(orbit: Orbit) -> Iterator[str]:
         slowest = log.speed_in.argmin()
         name, t_in, speed = log.name[slowest], log.t_in[slowest], log.speed_in[slowest]
         yield f"the contact of {name} at {t_in:.6g} s grazes: it is entered at {speed:.3g} m/s"
-    elif np.any(log.entry_rate_clipped):
+    elif np.any(log.entry_rate_clipped[np.isin(log.stop, latching_stops(orbit.system))]):
         yield "an entry rate lies below its law's floor"

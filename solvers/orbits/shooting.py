@@ -135,7 +135,7 @@ def checked(system: System, period: float, method: Any, shots: int | None) -> An
     """The method; the other arguments are checked too."""
     if not 0.0 < period < math.inf:
         raise ValueError(f"period must be positive and finite (s), got {period!r}")
-    if shots is not None and not (isinstance(shots, int) and 1 <= shots <= 100):
+    if shots is not None and not (isinstance(shots, (int, np.integer)) and 1 <= shots <= 100):
         raise ValueError(f"shots must be a whole number from 1 to 100, got {shots!r}")
     method = Exponential(1e-11) if method is None else method
     if not getattr(method, "has_tangent", False):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +35,7 @@ def decouple(M: Array, C: Array, K: Array, G: Array | None = None) -> Blocks:
     damping = phi.T @ C @ phi
     if G is not None and np.any(G):
         turning = phi.T @ G @ phi
-        return _state_blocks(phi, k, damping, np.abs(C) + np.abs(G), 0.5 * (turning - turning.T))
+        return _of_states(phi, k, damping, np.abs(C) + np.abs(G), 0.5 * (turning - turning.T))
     spread = damping - np.diag(np.diag(damping))
     if np.abs(spread).max(initial=0.0) <= 1e-12 * np.abs(damping).max(initial=0.0):
         zero = np.zeros((n, n))
@@ -47,7 +48,7 @@ def decouple(M: Array, C: Array, K: Array, G: Array | None = None) -> Blocks:
             np.block([[inverse, zero], [zero, inverse]]),
             np.empty((0, 0)),
         )
-    return _state_blocks(phi, k, damping, np.abs(C))
+    return _of_states(phi, k, damping, np.abs(C))
 
 
 def _is_diagonal(matrix: Array) -> bool:
@@ -76,6 +77,20 @@ def _without_rounding(c: Array, terms: Array) -> Array:
     A dashpot on a node of a mode leaves such a c, of either sign, instead of none.
     """
     return np.where(np.abs(c) <= 4 * c.size * np.finfo(float).eps * terms, 0.0, c)
+
+
+def _of_states(phi: Array, k: Array, damping: Array, size: Array, turning: Array | None = None) -> Blocks:
+    """`_state_blocks`, found in a unit of time in which the highest frequency is about one.
+
+    In seconds the conditions of T and of its inversion would grow with the square of the frequencies.
+    """
+    fastest = max(math.sqrt(np.abs(k).max()), np.abs(damping).max(), 0.0 if turning is None else np.abs(turning).max())
+    unit = 2.0 ** round(math.log2(fastest))
+    turning = turning if turning is None else turning / unit
+    found = _state_blocks(phi, k / unit**2, damping / unit, size / unit, turning)
+    rates = np.repeat([1.0, unit], k.size)
+    T, inverse = (rates[:, None] * matrix / rates for matrix in (found.T, found.inverse))
+    return Blocks(unit**2 * found.k, unit * found.c, T, inverse, unit**3 * found.loss / np.outer(rates, rates))
 
 
 def _state_blocks(phi: Array, k: Array, damping: Array, size: Array, turning: Array | None = None) -> Blocks:

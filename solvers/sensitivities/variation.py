@@ -345,10 +345,13 @@ class _Walk:
         ]
 
     def _check_start(self) -> None:
-        """NoDerivativeError for a stop that begins on its surface without contact, if a parameter moves it."""
-        for s, span in enumerate(self.asked.span):
+        """NoDerivativeError for a stop that begins on its surface, if a parameter moves it: without contact, or where
+        the force jumps.
+        """
+        for s, (span, contact) in enumerate(zip(self.asked.span, self.asked.system.contacts, strict=True)):
             near = abs(self.flow.motion_of(0.0, s).delta[0]) <= GRAZING * span
-            if near and not self.acting.segment[s] and np.any(self.flow.change(0.0, s)[0][self.flow.own]):
+            bends = not self.acting.segment[s] or (contact.law.jump and not contact.always)
+            if near and bends and np.any(self.flow.change(0.0, s)[0][self.flow.own]):
                 raise NoDerivativeError(
                     f"no derivative: {called(self.flow.system, s)} is touched at the start, "
                     "so that it differs on both sides; begin off the surface"
