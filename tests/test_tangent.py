@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from oscillators import Tone
 from scipy.linalg import expm
 
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic, WaltonBraun, law
-from solvers import Contact, DormandPrince, Exponential, Parameter, SolverError, System, integrate, lyapunov
+from solvers import Contact, DormandPrince, Exponential, Parameter, SolverError, System, integrate, lyapunov, orbit
 
 OMEGA, ZETA = np.array([109.13, 790.6, 2303.7, 4700.0, 7800.0]), np.array([0.02, 0.01, 0.01, 0.01, 0.01])
 PHI, GAMMA = np.array([6.2, -1.9, 3.0, -2.5, 2.2]), np.array([0.16, 0.02, 0.01, 0.01, 0.005])
@@ -188,6 +189,36 @@ def test_a_start_at_rest_on_the_stop_has_a_finite_tangent():
     # the entry at t = 0 has no rate, so that its time has no derivative; what follows has
     tangent = integrate(beam(2), np.zeros(2), np.zeros(2), 0.3, tangent=True).tangent
     assert np.all(np.isfinite(tangent))
+
+
+def stiffened(system, row, law):
+    """The matrix of the first-order system of a structure with the law as an element of it."""
+    n, stiffness = system.size, np.outer(row, row)
+    K, C = system.K + law.stiffness * stiffness, system.C + law.damping * stiffness
+    return np.block([[np.zeros((n, n)), np.eye(n)], [-K, -C]])
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-11])
+@pytest.mark.parametrize("law", [KelvinVoigt(25.0, 0.3), KelvinVoigt(1e3, 0.0)], ids=["damped", "stiff"])
+def test_at_rest_in_contact_the_neighbours_are_resolved(law, rtol):
+    """A motion at rest lets steps grow beyond what the contact's stiffness makes of the structure's periods."""
+    row = np.array([1.0, 0.5])
+    system = System.modal([1.0, 3.0], [0.02, 0.01], [Contact(row, law, gap=-1.0)])
+    rest = np.linalg.solve(system.K + law.stiffness * np.outer(row, row), row * law.stiffness)
+    found = integrate(system, rest, np.zeros(2), 10.0, method=Exponential(rtol), tangent=True)
+    exact = expm(10.0 * stiffened(system, row, law))
+    assert_allclose(found.tangent, exact, rtol=0.0, atol=10.0 * rtol * np.abs(exact).max())
+
+
+def test_multipliers_under_a_slow_drive_of_a_stiff_element():
+    """The drive does not shake what the element stiffens 10⁴ times; |μ| was told as 19."""
+    row, law, omega = np.array([1.0, 0.7]), KelvinVoigt(1e4, 0.0), 1.3
+    load = [([1.0, 0.3], Tone(1.0, omega))]
+    system = System.modal([1.0, 3.0], [0.02, 0.01], [Contact(row, law, always=True)], load)
+    found = orbit(system, 2.0 * np.pi / omega)
+    exact = np.exp(np.linalg.eigvals(stiffened(system, row, law)) * found.period)
+    assert_allclose(np.sort(np.abs(found.multipliers)), np.sort(np.abs(exact)), rtol=1e-7)
+    assert (found.stable, found.doubt) == (True, "")
 
 
 def test_bad_input():

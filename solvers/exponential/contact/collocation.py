@@ -49,11 +49,12 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import largest8, least8, load8
-from solvers.compiled.state import CALLS, T, acts
+from solvers.compiled.state import CALLS, T_END, T, acts
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
 from solvers.exponential.contact.node_response import (
+    FORCES,
     RTOL,
     STRAIGHT,
     error_of_work,
@@ -70,6 +71,8 @@ from solvers.exponential.contact.node_response import (
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 from solvers.problem.friction import STIFFNESS as FRICTION_STIFFNESS
+
+_AT_END, _WITHIN = 1.5e-19, 2.7e-11  # errors of a step in ẍ = -ω² x, over (ωh)^17 and, at any point, (ωh)^9; ωh < 6
 
 
 @merged
@@ -226,8 +229,38 @@ def step_error(problem, tables, state, scratch, node_set, level):
         if not error <= worst:
             worst = error
             if error != error:
-                break
+                return worst
+    if state.event_record.shape[0]:
+        worst = max(worst, _error_of_derivative(problem, tables, state, scratch, h))
     return worst
+
+
+@merged
+def _error_of_derivative(problem, tables, state, scratch, h):
+    """Error of a derivative by a step too long for what the contacts stiffen, in units of the tolerance.
+
+    A motion at rest, or slow, lets steps grow; its neighbours are shaken. Collocation at eight nodes of Gauss takes
+    ẍ = -ω² x over a step with an error of 1.5e-19 (ωh)^17, to a point within, as where the run ends, of 2.7e-11 (ωh)^9;
+    and ẍ = -c ẋ with less than that for ω = c.
+    """
+    square, damping, out = 0.0, 0.0, scratch.local_motion[FORCES]
+    for s in range(problem.law.size):
+        if state.segment[s] == 0:
+            continue
+        motion, mobility = motion_of(problem, scratch, s), 0.0
+        copy(motion[0], scratch.clipped, S)
+        slopes = out[:S], out[S : 2 * S], out[2 * S :]
+        contact_gradient(problem, s, scratch.clipped, motion[1], state.entry_rate[s], slopes[0], slopes[1], slopes[2])
+        for r in range(row_of(problem, s), row_of(problem, s + 1)):
+            mobility += abs(tables.accelerance[r, r])
+        stiffness = largest_size(slopes[0])
+        if rubs(problem, s):
+            stiffness = max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
+        square, damping = square + stiffness * mobility, damping + largest_size(slopes[1]) * mobility
+    scratch.stiffened[0] = math.sqrt(square) + damping
+    angle = scratch.stiffened[0] * h
+    error = _WITHIN * angle**9 if state.now[T] + h >= state.now[T_END] else _AT_END * angle**17
+    return error / scratch.accuracy[RTOL]
 
 
 @merged

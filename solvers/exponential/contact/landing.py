@@ -318,9 +318,14 @@ def _accept(problem, tables, state, scratch, variable, stop, level, span):
 
 
 @inlined
-def _furthest(problem, tables, scratch):
-    """Longest landing, s: within the reach of the fastest block, and within a cell of the sampled signals."""
+def _furthest(problem, tables, state, scratch):
+    """Longest landing, s: within the reach of the fastest block, and within a cell of the sampled signals.
+
+    If a derivative is asked for, also within the reach of what the contacts stiffen.
+    """
     furthest = scratch.accuracy[REACH] / tables.fastest
+    if state.event_record.shape[0]:
+        furthest = min(furthest, scratch.accuracy[REACH] / max(scratch.stiffened[0], 1e-300))
     return min(furthest, problem.table_dt[0]) if problem.table_dt.size else furthest
 
 
@@ -351,7 +356,7 @@ def may_land(problem, tables, state, scratch, stop, direction, near):
     δ and δ̇ of the stops at the start of the step are in ``scratch.start_motion``.
     """
     delta, rate = scratch.start_motion[stop, 0], scratch.start_motion[stop, 1]
-    if near > _furthest(problem, tables, scratch) or abs(rate) <= rate_tolerance(problem, stop, state.x):
+    if near > _furthest(problem, tables, state, scratch) or abs(rate) <= rate_tolerance(problem, stop, state.x):
         return False
     if direction < 0 and state.segment[stop] == 1:
         last = _LAST
@@ -385,7 +390,7 @@ def land(problem, tables, state, scratch, stop, direction, near):
     scratch.landed[0] = -1
     if not may_land(problem, tables, state, scratch, stop, direction, near):
         return -1
-    furthest, kappa = _furthest(problem, tables, scratch), tables.time_exponent[1 + stop]
+    furthest, kappa = _furthest(problem, tables, state, scratch), tables.time_exponent[1 + stop]
     leaving = direction < 0 and state.segment[stop] == 1
     start_landing(problem, tables, state, scratch, stop, np.int64(ROOT))
     w, x = scratch.stages[START], scratch.stages[LANDED]
@@ -547,7 +552,7 @@ def land_on_bend(problem, tables, state, scratch, stop, border, near):
 
     A border that is passed before is noted in ``scratch.landed``: -1 if none is, and less if that cannot be told.
     """
-    furthest, largest = _furthest(problem, tables, scratch), scratch.bend_values[scratch.bend_values.size - 1]
+    furthest, largest = _furthest(problem, tables, state, scratch), scratch.bend_values[scratch.bend_values.size - 1]
     enough, sign = 1e-10 * largest, 0.0
     if border >= 0:  # one that is missed by more may seem to be passed the other way by the next step
         largest, enough = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]

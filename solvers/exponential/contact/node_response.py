@@ -95,6 +95,7 @@ class Scratch(NamedTuple):
     side_at_begin: Annotated[Any, "E"]  # the same at the start of the step tried
     bend_values: Annotated[Any, "S+2"]  # of one stop at the nodes and at the end, then the largest, see `crossings`
     accuracy: Annotated[Any, "2"]  # rtol; radians of the fastest block that a landing may take
+    stiffened: Annotated[Any, "1"]  # rad/s: what the contacts' slopes make of the speed of a step's neighbours
     duration: Annotated[Any, "1"]  # s: estimate for the contact begun last, as if nothing else acted on the body
     energy_sums: Annotated[Any, "2+L, numbers"]  # see `energy.flight_balance` and `contact_balance`
     energy: Annotated[Any, "3"]  # J, see `energy.check`
