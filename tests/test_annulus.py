@@ -104,6 +104,16 @@ def test_a_planar_start_meets_two_one_sided_stops(method):
     np.testing.assert_allclose(runs[0].end, runs[1].end, rtol=0.0, atol=1e-8)
 
 
+@pytest.mark.parametrize("clearance", [1e-3, 1e-14])
+def test_a_way_through_the_middle_of_a_narrow_hole_is_an_end_and_a_beginning(clearance):
+    """Every π/√(1e4 + 1) s and 2c/v in between, however narrow the hole is to the step."""
+    system = System(PLANE, NOTHING, PLANE, [hole(KelvinVoigt(1e4, 0.0), clearance)])
+    run = integrate(system, [0.0, 0.0], [1.0, 0.3], 0.315, method=DormandPrince(1e-8))
+    assert len(run.contacts) == (11 if clearance < 1e-6 else 10)
+    open_for = run.contacts.t_in[1:] - run.contacts.t_out[:-1]
+    np.testing.assert_allclose(open_for, 2.0 * clearance / np.hypot(1.0, 0.3), rtol=2e-3)
+
+
 @pytest.mark.parametrize("outer", [False, True])
 @pytest.mark.parametrize("method", [SHARP, Exponential(1e-11)], ids=["dormand", "exponential"])
 def test_turning_everything_turns_everything(method, outer):

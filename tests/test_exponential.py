@@ -274,6 +274,27 @@ def test_slow_tone_on_a_free_mass():
     assert abs(ours.q[0, 0] - theirs.q[0, 0]) < 1e-6
 
 
+@pytest.mark.parametrize("dt", [None, 100.0])
+def test_the_clock_keeps_the_phase_of_a_tone_over_many_periods(dt):
+    """The steady response Re(F/(k - Ω² + iΩc) e^{iΩt}): its phase errs by 1e-15 a step, not by a rounding of t."""
+    omega, duration = 3.0, 2e5
+    load, far = [([1.0], fb.Harmonic(1.0, omega))], [Contact([1.0], KelvinVoigt(1e4, 0.0), 1e2)]
+    system = System([[1.0]], [[0.04]], [[4.0]], far, load)
+    run = integrate(system, [0.0], [0.0], duration, dt, Exponential(ledger=False))
+    t = run.t[run.t > 5e3]
+    turned = np.exp(1j * (np.longdouble(omega) * t).astype(np.clongdouble)).astype(complex)
+    steady = turned / (4.0 - omega**2 + 0.04j * omega)
+    assert np.abs(run.q[-len(t) :, 0] - steady.real).max() < 1e-10 * abs(steady[0])
+
+
+def test_a_straight_flight_meets_its_stop_to_rounding():
+    away, speed = 0.018520297776793117, 0.10889008739605581
+    plane, nothing = 0.03984613235319847 * np.eye(2), np.zeros((2, 2))
+    system = System(plane, nothing, nothing, [Contact([-1.0, 0.0], Hertz(1e5))])
+    run = integrate(system, [-away, 0.0], [speed, 0.0], 1.5 * away / speed, method=Exponential(1e-8))
+    assert run.contacts.t_in[0] == pytest.approx(away / speed, rel=4e-16, abs=0.0)
+
+
 @pytest.mark.parametrize("length", [1e-6, 1e2])
 def test_lengths_of_any_size(length):
     """A problem in other units of length: K scales as length^-0.5."""

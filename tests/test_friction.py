@@ -327,6 +327,24 @@ def test_stick_and_slip_just_before_a_contact_opens(method, v_t, mu, k_t):
     np.testing.assert_allclose(left / first, [1.0, 0.25], rtol=0.0, atol=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("mass", "away", "v_n", "v_t", "resolved"),
+    [
+        (0.03984613235319847, 0.018520297776793117, 0.10889008739605581, -5.214269732248776e-06, True),
+        (0.016336069637335547, 0.0013169162407835494, 0.8566647772546203, 4.618849945380157e-06, False),
+    ],
+)
+def test_stick_and_slip_within_a_millionth_of_the_last_step(mass, away, v_n, v_t, resolved):
+    """The same behind a dashpot of approach: τ_1 is 3e-11 s, or 3e-14 s, where the slip after it is rounding."""
+    K, mu, k_t = 45830807.4, 0.764, 201351.7
+    system = wall(Viscoelastic(K, 6788.7, approach_only=True), mu, k_t, mass)
+    run = integrate(system, [-away, 0.0], [v_n, v_t], away / v_n + 0.01, method=SHARP)
+    assert run.transitions.event.tolist() == ["slip", "stick", "slip"][: 3 if resolved else 2]
+    first = (k_t * run.friction.speed_out[0] / (1.5 * mu * K * run.contacts.speed_out[0] ** 1.5)) ** 2
+    left = run.contacts.t_out[0] - run.transitions.t[1:]
+    np.testing.assert_allclose(left, first * np.array([1.0, 0.25])[: len(left)], rtol=0.0, atol=1e-3 * first + 1e-16)
+
+
 @every_method
 @pytest.mark.parametrize("after", [2e-10, 6e-10])
 def test_a_slip_just_after_an_entry(method, after):

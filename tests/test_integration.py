@@ -507,6 +507,7 @@ def test_run_without_anything_to_do_stays_at_rest():
         (([0.0], [0.0], -1.0), "duration must be positive and finite"),
         (([0.0], [0.0], math.nan), "duration must be positive and finite"),
         (([0.0], [0.0], math.inf), "duration must be positive and finite"),
+        (([0.0], [0.0], 1e-300), "duration must be at least 1e-50 s, got 1e-300"),
         (([0.0], [0.0], 1.0, 0.0), "dt must be positive and finite"),
         (([0.0], [0.0], 1.0, -1e-3), "dt must be positive and finite"),
         (([0.0], [0.0], 1.0, math.nan), "dt must be positive and finite"),

@@ -34,6 +34,18 @@ def force_at_end(law, run, contact=0):
     return float(law.batch(1.0, row)(run.q[-1], run.q_dot[-1])[0])
 
 
+# --- borders ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("method", [DormandPrince(10.0**-k) for k in (6, 9, 11)], ids=str)
+def test_borders_of_one_law_that_fall_together_are_passed_one_after_the_other(method):
+    """Lines so near to each other that rounding holds both: the second border is none where the first has led."""
+    stop = Contact([1.0], WaltonBraun(723206.2960604648, 726080.5763881964), 1e-18)
+    system = System([[1.0]], [[0.0]], [[34.522346590453324**2]], [stop])
+    run = integrate(system, [1.5e-18], [-1.0139691101546457e-16], 0.2317, method=method, check=False)
+    assert set(run.transitions.event) <= {"contact", "unload", "reload", "open"}
+
+
 # --- decay and rest --------------------------------------------------------------------------------------------------
 
 

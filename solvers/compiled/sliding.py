@@ -29,6 +29,7 @@ from solvers.compiled.kernels import (
     indentation_rate,
     inlined,
     inner,
+    is_circle,
     kernel,
     law_forces,
     off_knots,
@@ -218,10 +219,10 @@ def end_slider(problem, s):
 
 @inner
 def way_tolerance(problem, s, t, x):
-    """What rounding may make of ξ, m, and of ξ̇, m/s."""
+    """What rounding may make of ξ, m, and of ξ̇, m/s; on a line both are read by the second row alone."""
     own, first, size = slider_of(problem, s), problem.first[s], 2 * problem.k.size
     way, speed = TURN * abs(radius_of(problem, s)) + abs(own[ARM] * own[SPIN] * t), abs(own[ARM] * own[SPIN])
-    for r in range(first, problem.first[s + 1]):
+    for r in range(first if is_circle(problem, s) else first + 1, problem.first[s + 1]):
         way += abs(problem.gap[r]) + abs_dot(problem.read[r], x, size)
         speed += abs_dot(problem.read_rate[r], x, size)
     return 1e-15 * way + 1e-20, 1e-13 * speed

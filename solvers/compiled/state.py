@@ -40,7 +40,7 @@ DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAIN
         *[Status.CHATTER, Status.LOG_FULL, Status.LAW_NOT_FINITE, Status.GAINED],
     )
 )
-T, H_FLIGHT, H_CONTACT, LAST_EVENT, T_END = range(5)  # places in State.now
+T, H_FLIGHT, H_CONTACT, LAST_EVENT, T_END, LEFT = range(6)  # places in State.now
 STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, RECORDED = range(8)  # places in State.count
 T_IN, PEAK_DELTA, PEAK_FORCE = range(3)  # columns of State.active
 MOST_EVENTS_AT_ONCE = 100
@@ -55,7 +55,7 @@ class State(NamedTuple):
     `begin_state` fills it; from then on kernels alone write to it. Units as in `kernels.Problem`.
     """
 
-    now: Annotated[Any, "5"]  # s: time, flight step, contact step, time of the last event, end of the run
+    now: Annotated[Any, "6"]  # s: time, flight step, contact step, time of the last event, end of the run, see `summed`
     x: Annotated[Any, "X"]  # of the blocks, then the energy balance in J (impulses in N s), see `kernels`
     rate: Annotated[Any, "X"]  # of x, per s; stepping methods only
     segment: Annotated[Any, "int E"]  # of the law: 0 in flight, j > 0 between the stop's knots j-1 and j
@@ -76,6 +76,25 @@ NO_OUTPUT = {"out": np.empty((0, 0)), "due": np.array([math.inf])}  # of a run t
 def new_log(elements: int) -> Any:
     """An event list to be written."""
     return np.empty((max(256, 2 * elements), at.CODE + 1))
+
+
+@inlined
+def summed(total, left, part):
+    """A sum with one more part, and what rounding leaves of it, which the next part brings in.
+
+    Rounding of equal steps to the spacing of numbers at t is the same for long, so that a clock without this drifts by
+    up to half of it a step.
+    """
+    part += left
+    found = total + part
+    kept = found - total
+    return found, (total - (found - kept)) + (part - kept)
+
+
+@inlined
+def move_clock(now, h):
+    """Let the time h pass."""
+    now[T], now[LEFT] = summed(now[T], now[LEFT], h)
 
 
 @inner
@@ -290,7 +309,7 @@ def in_contact(state):
 
 def begin_state(state: State, z: Any) -> None:
     """Make arrays of zeros the state of a run at t = 0 from block coordinates."""
-    state.now[1:] = np.inf, np.inf, -1.0, np.inf
+    state.now[1:] = np.inf, np.inf, -1.0, np.inf, 0.0
     state.due[:] = np.inf
     state.x[: len(z)] = z
     state.entry_rate[:] = 1.0

@@ -74,7 +74,7 @@ def _bisect(coefficients, sign, b, guess):
         else:
             a = x
         following = x - (f / slope if slope != 0.0 else np.inf)
-        if not a < following < b:
+        if not a <= following <= b:
             following = 0.5 * (a + b)
         if abs(following - x) <= 1e-11 * x:
             return following

@@ -22,7 +22,7 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.compiled.kernels import copy, dot, indentation, indentation_rate, inlined, inner, is_circle, merged, row_of
-from solvers.compiled.state import SAMPLED, STEPS, T_END, T
+from solvers.compiled.state import LEFT, SAMPLED, STEPS, T_END, T, move_clock, summed
 from solvers.exponential.circles.flight import circle_is_near, span_of_circle, span_of_circle_at
 from solvers.exponential.energy.flight_balance import (
     account_output,
@@ -113,9 +113,10 @@ def _sample(problem, tables, energy_tables, state, scratch, t):
 def _fly_unsampled(problem, tables, state, scratch, most, budget):
     """Tabulated steps without signals or output, until a stop is near, or the time ``most`` or the budget is used up.
 
-    p and v of the blocks are in two arrays, eight numbers a vector. Returns (time flown, steps, safe time left).
+    p and v of the blocks are in two arrays, eight numbers a vector. Returns (time flown, what rounding
+    leaves of it, steps, safe time left).
     """
-    x, flown, count = scratch.split_state[0], 0.0, 0
+    x, flown, left, count = scratch.split_state[0], 0.0, 0.0, 0
     split(problem, state.x, x)
     while True:
         span = most - flown
@@ -132,9 +133,10 @@ def _fly_unsampled(problem, tables, state, scratch, most, budget):
             break
         level = level_within(tables, span)
         propagate_split(tables, level, x)
-        flown, count = flown + tables.flight_step[level], count + 1
+        flown, left = summed(flown, left, tables.flight_step[level])
+        count += 1
     join(problem, x, state.x)
-    return flown, count, span
+    return flown, left, count, span
 
 
 @inlined
@@ -281,8 +283,9 @@ def fly(problem, tables, energy_tables, state, scratch, budget):
             _bound_signals(problem, cell, 1, scratch.signal_bounds)
         # --- the time within which no stop can be reached
         if first == np.inf and not sampled:  # no output and no cell ends before
-            flown, steps, span = _fly_unsampled(problem, tables, state, scratch, span, budget)
-            now[T] += flown
+            flown, left, steps, span = _fly_unsampled(problem, tables, state, scratch, span, budget)
+            now[LEFT] += left
+            move_clock(now, flown)
             state.count[STEPS] += steps
             if steps >= budget:
                 return -2
@@ -294,7 +297,8 @@ def fly(problem, tables, energy_tables, state, scratch, budget):
                 split(problem, state.x, scratch.split_state[2])
             span = _safe_span(problem, tables, state, scratch, span, rest, sampled or count % _REFRESH == 0)
         h, stop = _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell, dt_cell)
-        now[T] = target if now[T] + h >= target else now[T] + h
+        move_clock(now, h)
+        now[T] = min(now[T], target)
         state.count[STEPS] += 1
         count += 1
         if first < now[T]:

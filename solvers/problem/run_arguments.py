@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from solvers.problem import Array, Contact, Parameter, System
 
 _MOST_SAMPLES = 500_000_000
+_SHORTEST = 1e-50  # s, of a run: derivatives of sampled loads are fifth powers of parts of it
 
 
 def check_tangent(tangent: Any, method: Any, system: System) -> None:
@@ -97,6 +98,11 @@ def output_times(duration: float, dt: Any) -> Array | None:
     """Output times of a sampling, or those given; None for none."""
     if not 0.0 < duration < math.inf:
         raise ValueError(f"duration must be positive and finite (s), got {duration!r}")
+    if duration < _SHORTEST:
+        raise ValueError(
+            f"duration must be at least {_SHORTEST:g} s, got {duration!r}: fifth powers of shorter times are no "
+            "numbers; give it in other units of time"
+        )
     if dt is None:
         return None
     if np.ndim(dt) > 0:

@@ -21,6 +21,7 @@ from solvers.compiled.kernels import (
     inner,
     kernel,
     rubs,
+    slider_of,
 )
 from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
 from solvers.compiled.sliding import (
@@ -33,6 +34,7 @@ from solvers.compiled.sliding import (
     way_tolerance,
 )
 from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
+from solvers.problem.friction import CODE
 from solvers.stepping.events import NONE, bisection, golden_section, motion_of, point_at, polynomial
 
 _MISSED = 1e-3  # margin, in units of the largest of the step, by which a landing may have missed its border
@@ -136,6 +138,26 @@ def _slider_beyond(known, theta):
 
 
 @inner
+def _inside(known, theta):
+    """A margin of a law at θ of the step."""
+    return -_beyond(known, theta)
+
+
+@inner
+def _slider_inside(known, theta):
+    """A margin of friction at θ of the step."""
+    return -_slider_beyond(known, theta)
+
+
+@inner
+def _highest_between(known, a, b):
+    """Place of the highest margin on [a, b], and the highest one met."""
+    if rubs(known[0], known[4]):
+        return golden_section(_slider_inside, known, a, b)
+    return golden_section(_inside, known, a, b)
+
+
+@inner
 def _lowest_between(known, a, b):
     """Place of the lowest margin on [a, b], and minus the lowest one met."""
     if rubs(known[0], known[4]):
@@ -167,11 +189,19 @@ def _later(known, time):
 
 @inner
 def _falls_from_zero(known, theta):
-    """Where a margin that begins at zero falls below it: at once, or, if it rises first by less than rounding, later.
+    """Where a margin that begins at zero, and is below it at θ, falls below it: at once, or, if it rises first, later.
 
-    A slider at its limit may still move back a little. Whether the margin rises, and where its parabola comes down, at
-    most at the θ at which it is below zero, is told by the rates at the start, carried on for a step and back.
+    A stick that begins just before a contact opens is over before the first node that would tell of it; if all of it is
+    rounding it lasts to θ, since its margin has no slope where slip has ended. A slider at its limit may move back by
+    less than rounding. Whether such a margin rises, and where its parabola comes down, at most at θ, is told by the
+    rates at the start, carried on for a step and back.
     """
+    problem, state, space, _, s, j = known
+    highest, above = _highest_between(known, 0.0, theta)
+    if above > space.rounding[s, j]:
+        return _zero_between(known, highest, theta)
+    if rubs(problem, s) and slider_of(problem, s)[CODE] == 0.0 and state.now[T] == state.now[LAST_EVENT]:
+        return theta
     now, after, before = _later(known, 0.0), _later(known, known[3]), _later(known, -known[3])
     rise, fall = after - before, 2.0 * now - after - before
     if rise <= 0.0:
@@ -265,8 +295,9 @@ def renew_border(problem, state, space, s, j):
 def renew_together(problem, state, space, h, element, border):
     """Renew the border landed on by a step of duration h, and all whose margins have fallen to zero with it.
 
-    Which ones is judged from the state alone, before any is renewed. One that began at zero, as after its own renewal,
-    has risen and come back if its margin was above zero just before.
+    Which ones is judged from the state alone, before any is renewed; of the same law the margins are read again after
+    each: another border of the same segment may be none of the next one. One that began at zero, as after its own
+    renewal, has risen and come back if its margin was above zero just before.
     """
     for s in range(problem.law.size):
         if _is_without(problem, state, s):
@@ -277,11 +308,16 @@ def renew_together(problem, state, space, h, element, border):
             slider_margins(problem, s, state.segment[s], state.entry_rate[s], space.point[1], space.one)
         else:
             margins_before(problem, state, s, delta, rate, _BEFORE * h, space.trial, space.one)
+        near = space.at_start[s]
         for j in range(problem.border_count[s]):
-            before, rounding = max(space.at_start[s, j], space.one[j]), space.rounding[s, j]
-            reached = before > rounding and space.present[s, j] <= max(8.0 * rounding, _TOGETHER * before)
-            if reached or (s == element and j == border):
+            before, rounding, present = max(near[j], space.one[j]), space.rounding[s, j], space.present[s, j]
+            reached = before > rounding and present <= max(8.0 * rounding, _TOGETHER * before)
+            near[j] = max(8.0 * rounding, present) if reached or (s == element and j == border) else -np.inf
+        for j in range(problem.border_count[s]):
+            if space.present[s, j] <= near[j]:
                 renew(problem, state, s, j, delta, rate)
+                if not rubs(problem, s):
+                    _present(problem, state, space, s, state.now[T], state.x, state.rate)
     note_event(state)
 
 

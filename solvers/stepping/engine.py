@@ -33,10 +33,10 @@ from solvers.stepping.stability import kinks_of, shortest_contact
 
 
 def absolute_tolerance(method: Any, problem: Any, z: Array, fastest: float) -> float:
-    """The method's own, or less where start and loads are so small that it would exceed rtol times the motion."""
+    """The method's own, or less where start and loads are so small or slow that it would exceed rtol times them."""
     p, v = np.abs(z).reshape(2, -1).max(axis=1)
     push = np.abs(problem.load).max(axis=1, initial=0.0) @ largest_loads(problem) / fastest
-    size = max(p, v / fastest, push / fastest)
+    size = max(p, v / fastest, push / fastest) * min(fastest, 1.0)  # it is that of rates too
     return float(min(method.atol, method.rtol * size) if size > 0.0 else method.atol)
 
 

@@ -140,10 +140,10 @@ def golden_section(value, known, a, b):
 
 
 @inner
-def _signed(known, theta):
-    """sign·δ at θ."""
+def _falling(known, theta):
+    """Rate at which sign·δ falls at θ."""
     coefficients, radius, sign = known
-    return sign * delta_at(coefficients, radius, theta)
+    return -sign * rate_at(coefficients, radius, theta)
 
 
 @merged
@@ -169,7 +169,8 @@ def _beyond(known, theta):
 def crossing(coefficients, radius, level, sign, tolerance):
     """First θ at which sign·(δ - level) becomes positive; NONE, or UNRESOLVED when it does so at once.
 
-    Between two nodes δ may rise and fall again; that it does is seen by its rate.
+    Between two nodes δ may rise and fall again; that it does is seen by its rate, whose zero is where it is highest: a
+    place that runs through the middle of a hole is told from its values only within 4e-9 of the nodes' distance.
     """
     if abs(level) == np.inf:
         return NONE
@@ -184,7 +185,7 @@ def crossing(coefficients, radius, level, sign, tolerance):
             return bisection(_beyond, (coefficients, radius, level, sign), _NODES[i - 1], _NODES[i])
         rises = sign * rate_at(coefficients, radius, _NODES[i]) > 0.0
         if rising and not rises:
-            top = golden_section(_signed, (coefficients, radius, sign), _NODES[i - 1], _NODES[i])[0]
+            top = bisection(_falling, (coefficients, radius, sign), _NODES[i - 1], _NODES[i])
             if sign * (delta_at(coefficients, radius, top) - level) > tolerance:
                 return bisection(_beyond, (coefficients, radius, level, sign), _NODES[i - 1], top)
         last, rising = value, rises

@@ -39,6 +39,7 @@ from solvers.compiled.state import (
     T,
     acting_segment,
     begins_and_ends,
+    move_clock,
     surface_tolerance,
     switch,
     switch_on_surface,
@@ -271,7 +272,8 @@ def accept(problem, state, space, h, stop, direction, at_end):
     _peaks(problem, state, space, h)
     copy(space.x_new, state.x, state.x.size)
     copy(space.rate_new, state.rate, state.x.size)
-    state.now[T] = state.now[T_END] if at_end else state.now[T] + h
+    move_clock(state.now, h)
+    state.now[T] = state.now[T_END] if at_end else state.now[T]
     state.count[STEPS] += 1
     if stop >= 0:
         switch(problem, state, stop, direction)

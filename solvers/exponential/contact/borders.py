@@ -386,8 +386,9 @@ def renew_border(problem, state, scratch, element, border):
 def renew_all(problem, state, scratch, element, border):
     """Renew the border landed on, and all whose margins fell to zero with it since ``scratch.stages[START]``.
 
-    Which ones is judged from the state alone, before any is renewed. One that began at zero, as after its own renewal,
-    has risen and come back if its margin was above zero just before.
+    Which ones is judged from the state alone, before any is renewed; of the same law the margins are read again after
+    each: another border of the same segment may be none of the next one. One that began at zero, as after its own
+    renewal, has risen and come back if its margin was above zero just before.
     """
     size = state.x.size
     delta, rate = margins_of(problem, state, scratch, element, state.now[T], state.x, scratch.margin)
@@ -408,8 +409,10 @@ def renew_all(problem, state, scratch, element, border):
             before, near = max(begun[j], just_before[j]), max(scratch.noise[s, j], missed * scratch.largest[s, j])
             near = max(near, _TOGETHER * before)
             landed = (s == element and j == border) or (before > near and scratch.margin[j] <= near)
-            scratch.fired[j] = 1.0 if landed else 0.0
+            scratch.fired[j] = max(near, scratch.margin[j]) if landed else -np.inf
         for j in range(count):
-            if scratch.fired[j] > 0.0:
+            if scratch.fired[j] >= scratch.margin[j]:
                 renew(problem, state, s, j, depth, speed)
+                if not rubs(problem, s):
+                    margins_of(problem, state, scratch, s, state.now[T], state.x, scratch.margin)
     note_event(state)

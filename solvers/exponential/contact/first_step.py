@@ -29,7 +29,7 @@ from solvers.exponential.tables import EXPONENT, STIFFNESS
 
 LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN, BALANCED = range(7)  # places in Scratch.control
 ENTRY, SEGMENT = 1, 2  # values of NEW: the first step of a contact, or of a segment of its law; 0 for other steps
-_LEAST = 1e-60  # m/s, of a reference speed
+_LEAST = 1e-60  # m/s, of a reference speed, and of an impact
 _PRESSED = 1e-3  # the least in units of the speed which the force would give: what presses at rest moves by rounding
 
 
@@ -63,7 +63,7 @@ def begin_steps(problem, tables, state, scratch, stop):
 @merged
 def _contact_time(problem, tables, scratch, s, speed):
     """Duration, s, of an impact at this speed on one stop alone, from the law's energy: T = 3.2 δ_m/v."""
-    speed = max(speed, 1e-12)
+    speed = max(speed, _LEAST)
     accelerance = max(own_accelerance(problem, tables, s), 1e-300)
     target = 0.5 * speed * speed / accelerance
     law, p = tables.power_law[s], tables.exponent[s]

@@ -17,6 +17,7 @@ from solvers.compiled.state import (
     acting_segment,
     begins_and_ends,
     is_open,
+    move_clock,
     write_event,
 )
 from solvers.compiled.sums import combine
@@ -123,4 +124,4 @@ def finish_step(problem, tables, state, scratch, node_set, level):
                 state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], largest_size(motion[0]))
                 state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], largest_size(force))
     copy(scratch.x_new, state.x, size)
-    state.now[T] += h
+    move_clock(state.now, h)
