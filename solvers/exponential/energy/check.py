@@ -25,7 +25,7 @@ import numpy as np
 
 from solvers.compiled.kernels import inner, merged, row_of, rubs, slider_of
 from solvers.compiled.state import PEAK_FORCE, T
-from solvers.problem import Array, Energy, System, dense
+from solvers.problem import Array, Energy, Record, System, dense
 from solvers.problem.friction import ARM, MU, SPIN, may_pull
 
 MULTIPLE, ROUNDING = 20.0, 1e-9
@@ -110,18 +110,14 @@ def has_gained(
     return bool(last > FACTOR * 0.5 * speed**2)
 
 
-def unbalanced(
-    system: System, powers: Array, motion: Array, begin: Array, exchanged: Array, rtol: float, rubbed: tuple[Any, Any]
-) -> bool:
-    """Whether the energy of a run, given by powers and motion at its samples, is off by more than is tolerated.
-
-    ``rubbed`` : works of friction and of spins at the samples, J, or zeros.
-    """
-    rows = np.linspace(0, len(powers) - 1, _SAMPLES).astype(int)
+def unbalanced(record: Record, rtol: float) -> bool:
+    """Whether the energy of a run, given at its samples, is off by more than is tolerated."""
+    rows, rubbed = np.linspace(0, len(record.motion) - 1, _SAMPLES).astype(int), record.works_of_friction
+    system, start = record.system, record.back @ record.begin
     sampled = tuple(part[rows] if np.ndim(part) else part for part in rubbed)
-    balance = Energy.of_run(system.M, system.K, powers[rows], motion[rows], begin, sampled)
+    balance = Energy.of_run(system.M, system.K, record.works[rows], record.motion[rows], start, sampled)
     parts = [
         balance.initial,
         *(np.abs(part).max() for part in (balance.stored, balance.input, balance.damping, *rubbed)),
     ]
-    return not np.abs(balance.residual).max() <= tolerated_energy(sum(parts), exchanged, rtol)
+    return not np.abs(balance.residual).max() <= tolerated_energy(sum(parts), record.exchanged(), rtol)
