@@ -185,7 +185,8 @@ class _Run:
     def __init__(self, system: System, engine: Any, times: Array | None, tangent: Any) -> None:
         self.system, self.engine, self.times = system, engine, times
         if times is not None:
-            due = np.append(np.minimum(times, engine.duration), math.inf)
+            due = np.full(len(times) + 1, math.inf)
+            np.minimum(times, engine.duration, out=due[:-1])
             engine.record(out=np.empty((len(times), self.state.x.size)), due=due)
         self.tangent: Any = None
         if tangent:

@@ -14,7 +14,6 @@ from solvers.compiled.kernels import Problem, type_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned
 from solvers.compiled.parts import BORDERS, CIRCLES, ENERGY, EVERY_RUN, FRICTION, MANY_STOPS, TWO_STOPS, load
 from solvers.compiled.state import (
-    NO_OUTPUT,
     NO_ROWS,
     STATE,
     T_END,
@@ -62,8 +61,8 @@ class Workspace:
         self.rest, self.settings = self.numbers.copy(), (0.0, 0.0)  # of no run
         n = rest.size // 2
         self.p, self.v = self.state.x[:blocks], self.state.x[n : n + blocks]  # of the structure's own blocks
-        self.log = new_log(len(self.state.segment))
-        self.replace(log=self.log)
+        self.replace(log=new_log(len(self.state.segment)))
+        self.first = self.state, self.block[layout.size :].copy()  # and where its arrays are
 
     def begin(self, z: Array, duration: float, rtol: float) -> None:
         """The state of a run at t = 0 from the coordinates of the structure's own blocks."""
@@ -77,8 +76,8 @@ class Workspace:
 
     def forget_outputs(self) -> None:
         """Let the next run keep its end only, and a list of events as short as at first."""
-        if self.state.log is not self.log or len(self.state.due) > 1:
-            self.replace(log=self.log, **NO_OUTPUT)
+        if self.state is not self.first[0]:
+            self.state, self.block[self.layout.size :] = self.first
 
     def replace(self, **arrays: Array) -> None:
         """Let other arrays be those of the state."""
@@ -103,9 +102,12 @@ class Prepared(NamedTuple):
 
     def energy_tables_for(self, spacing: float) -> Packed:
         """Tables of the energy balance for outputs of a spacing, s; what reads them is compiled for the first."""
-        load_parts(type_of(self.problem.value), ENERGY)
-        arrays = self.problem.value, self.tables.value
-        made: Packed = self.kept.get((spacing, self.tones), lambda: energy_tables_for(*arrays, spacing))
+
+        def make() -> Packed:
+            load_parts(type_of(self.problem.value), ENERGY)
+            return energy_tables_for(self.problem.value, self.tables.value, spacing)
+
+        made: Packed = self.kept.get((spacing, self.tones), make)
         return made
 
     @property
