@@ -10,7 +10,6 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,15 +17,12 @@ from numpy.typing import ArrayLike
 
 from solvers.compiled.sliding import slider_force
 from solvers.compiled.state import (
-    CALLS,
     EVENTS,
     LOG_FULL,
     LOGGED,
-    REJECTED,
     RUNNING,
     SAMPLED,
     STATUSES,
-    STEPS,
     State,
     T,
     event_row,
@@ -35,18 +31,13 @@ from solvers.compiled.state import (
 from solvers.exponential.energy.check import unbalanced
 from solvers.problem import (
     Array,
-    ContactLog,
-    Cost,
-    Energy,
     Forcing,
-    FrictionLog,
-    Losses,
     Parameter,
+    Record,
     Solution,
     SolverError,
     Status,
     System,
-    Transitions,
     forcing_of,
     product,
 )
@@ -149,22 +140,34 @@ def prepared_run(
     """A run ready to start, everything checked."""
     if not hasattr(method, "engine") or isinstance(method, type):
         raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
-    check_maps(system, method)
     check_tangent(tangent, method, system)
     z = checked_start(system, q0, q_dot0, method)
     check_places(system, q0)
     times = output_times(duration, dt)
-    check_laws(system)
-    forcing = kept_forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
+    prepared = prepared_once(system, method, duration)
     latched = latched_at_start(system, memory)
-    engine = method.engine(system, z, forcing, duration)
+    engine = method.engine(system, z, prepared, duration)
     for s, numbers in latched:
         law: Any = system.contacts[s].law
         engine.problem.parameters[s, list(law.memory)] = numbers
     return _Run(system, engine, times, tangent)
 
 
-def kept_forcing(system: System, duration: float, rtol: float) -> Forcing:
+def prepared_once(system: System, method: Any, duration: float) -> tuple[Forcing, Any]:
+    """What a method prepares for all starts, the system checked; kept as long as no signal can have changed."""
+    key = "prepared", method, duration
+    known: tuple[Forcing, Any] | None = system.kept.find(key)
+    if known is None:
+        check_maps(system, method)
+        check_laws(system)
+        forcing = _kept_forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
+        known = method.prepared(system, forcing, duration)
+        if known[0] is system.kept.find("forcing"):
+            system.kept.store(key, known)
+    return known
+
+
+def _kept_forcing(system: System, duration: float, rtol: float) -> Forcing:
     """Arrays of all signals; those of tones are kept, as long as no signal can have changed."""
     kept: Forcing | None = system.kept.find("forcing")
     if kept is None:
@@ -182,7 +185,8 @@ class _Run:
     def __init__(self, system: System, engine: Any, times: Array | None, tangent: Any) -> None:
         self.system, self.engine, self.times = system, engine, times
         if times is not None:
-            due = np.append(np.minimum(times, engine.duration), math.inf)
+            due = np.full(len(times) + 1, math.inf)
+            np.minimum(times, engine.duration, out=due[:-1])
             engine.record(out=np.empty((len(times), self.state.x.size)), due=due)
         self.tangent: Any = None
         if tangent:
@@ -190,7 +194,8 @@ class _Run:
 
             self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None, True)
         state = self.state
-        self.initial, self.latched = state.x[: 2 * engine.problem.k.size].copy(), self.memory
+        self.size = 2 * engine.problem.k.size
+        self.initial, self.latched = state.x[: self.size].copy(), self.memory
         if state.due[0] == 0.0:
             state.out[0] = state.x
             state.count[SAMPLED] = 1
@@ -252,45 +257,28 @@ class _Run:
 
     def solution(self, status: Status, seconds: float) -> Solution:
         """Collect outputs, log and energy balance."""
-        size, n = self.initial.size, self.system.size
-        back, state, latched = self.engine.back, self.state, self.memory
-        last = state.x.copy()
-        end = back.dot(last[:size])
+        engine, state, size, sampled = self.engine, self.engine.state, self.size, self.times is not None
+        last, work = state.x.copy(), (*state.count[: EVENTS + 1].tolist(), seconds)
         if self.times is None:
-            x, t, motion = last[None, :], state.now[T : T + 1].copy(), end[None, :]
+            t, motion, accounts = state.now[T : T + 1].copy(), engine.back.dot(last[:size])[None], last[None, size:]
         else:
             x = state.out[: self._sampled(status)]
-            t, motion = self.times[: len(x)], product(x[:, :size], back.T)
-        works = x[:, size:] if self.times is None else x[:, size:].copy()  # so that all the samples can be let go
-        own = 2 + 2 * len(self.system.contacts)
-        works, rubbed = works[:, :own], self._balanced(works[:, own:])
-        complete = self.engine.keeps_ledger(self.times is not None)
-        ledger = partial(_energy, self.system, works, complete, motion, back, self.initial, rubbed)
-        rows = self._rows()
-        names = [contact.name for contact in self.system.contacts]
-        log = partial(ContactLog.of_events, self._of_stops(rows), names)
-        transitions = partial(Transitions.of_events, rows, self.system.contacts)
-        ends = (self.initial, self.latched), (last, latched)
-        lost = partial(Losses.of_run, self.system.contacts, back, *ends, works, transitions, self._rubbed())
-        if status is Status.DONE and not self._balances(works, complete, motion, rows, rubbed):
-            status = Status.UNBALANCED
-        if status is Status.DONE and len(self.engine.problem.friction) and _overdrawn(self.system, rows):
-            status = Status.OVERDRAWN
-        count = state.count.tolist()
-        cost = Cost(count[STEPS], count[REJECTED], count[CALLS], count[EVENTS], seconds)
+            t, motion = self.times[: len(x)], product(x[:, :size], engine.back.T)
+            accounts = x[:, size:].copy()  # so that all the samples can be let go
+        record = Record(
+            self.system, engine.back, self.initial, self.latched, last, self.memory, t, motion, accounts,
+            self._rows(), engine.keeps_ledger(sampled), self._rubbed(), work,
+        )  # fmt: skip
+        if status is Status.DONE:
+            status = self._checked(record)
         known = self.tangent is not None and status is Status.DONE
-        more: dict[str, Any] = {**self._derivatives()} if known else {}
-        end = np.concatenate((end, *latched)) if self.system.latches else end.copy()
-        more |= {"borders": transitions, "lost": lost, "memory": latched, "end": end}
-        more |= {"rubbing": partial(FrictionLog.of_events, rows, names)}
-        return Solution(t, motion[:, :n], motion[:, n:], log, ledger, status, cost, **more)
+        return Solution(record, status, **self._derivatives()) if known else Solution(record, status)
 
-    def _balanced(self, rubbed: Array) -> tuple[Any, Any]:
-        """Works of friction and of spins at the samples, J; 0.0 without friction."""
-        laws: list[Any] = [contact.law for contact in self.system.contacts if contact.friction is not None]
-        if not laws:
-            return 0.0, 0.0
-        return rubbed[:, ::ACCOUNTS].sum(axis=1), rubbed[:, 1::ACCOUNTS] @ [law.arm * law.spin for law in laws]
+    def _checked(self, record: Record) -> Status:
+        """Whether what was reached can be right: the energy balances, and friction stayed within what is known."""
+        if not self._balances(record):
+            return Status.UNBALANCED
+        return Status.OVERDRAWN if record.rubbed is not None and _overdrawn(record) else Status.DONE
 
     def _rubbed(self) -> Array | None:
         """(m, 3) loss by friction and work of the spin, J, and way of the slider, m; None without friction."""
@@ -308,14 +296,13 @@ class _Run:
             found[s] = work - stored, law.arm * law.spin * impulse, way - (abs(force) / k_t if slips else 0.0)
         return found
 
-    def _balances(self, works: Array, complete: bool, motion: Array, rows: Array, rubbed: tuple[Any, Any]) -> bool:
+    def _balances(self, record: Record) -> bool:
         """Whether the energy balance closes, where it is kept; methods without `gains` are checked step by step."""
         if not hasattr(self.engine, "gains"):
             return True
-        if not complete or not len(motion):
-            return not self.engine.gains(partial(_exchanged, rows)) or self._balances_sampled()
-        start = self.engine.back @ self.initial
-        return not unbalanced(self.system, works, motion, start, _exchanged(rows), self.engine.method.rtol, rubbed)
+        if record.complete and len(record.motion):
+            return not unbalanced(record, self.engine.method.rtol)
+        return not self.engine.gains(record.exchanged) or self._balances_sampled()
 
     def _balances_sampled(self) -> bool:
         """Whether a run that exceeds the bound of its energy balances when it is made again with samples."""
@@ -324,12 +311,6 @@ class _Run:
         memory = self.latched if self.system.latches else None
         again = integrate(self.system, q, q_dot, duration, duration / _SAMPLES, method, check=False, memory=memory)
         return again.status is Status.DONE
-
-    def _of_stops(self, rows: Array) -> Array:
-        """The events of elements whose contacts begin and end."""
-        for s in self.system.about_laws.get("always", partial(_always, self.system)):
-            rows = rows[rows[:, at.ELEMENT] != s]
-        return rows
 
     def release(self) -> None:
         """Return working arrays for use by other runs."""
@@ -347,11 +328,11 @@ class _Run:
 
     def _rows(self) -> Array:
         """The event list; contacts under way end last, at no time."""
-        state = self.state
-        logged = state.log[: state.count[LOGGED]].copy()
-        under_way = [s for s, segment in enumerate(state.segment.tolist()) if segment > 0]
-        if not under_way:
+        state = self.engine.state
+        logged, segments = state.log[: state.count[LOGGED]].copy(), state.segment.tolist()
+        if not any(segments):
             return logged
+        under_way = [s for s, segment in enumerate(segments) if segment > 0]
         rows = np.empty((len(under_way), at.CODE + 1))
         for s, row in zip(under_way, rows, strict=True):
             event_row(self.engine.problem, state, s, math.nan, at.KNOT, math.nan, math.nan, row)
@@ -366,36 +347,16 @@ class _Run:
 _NEARLY = 0.95  # of half a turn
 
 
-def _overdrawn(system: System, rows: Array) -> bool:
+def _overdrawn(record: Record) -> bool:
     """Whether F_t has come to k_t π c in a circle of radius c: ξ is known up to whole turns there, and so is ξ - s."""
-    of_friction = rows[rows[:, at.GUARD] == at.FRICTION]
-    for s, contact in enumerate(system.contacts):
+    of_friction = record.rows[record.rows[:, at.GUARD] == at.FRICTION]
+    for s, contact in enumerate(record.system.contacts):
         if contact.friction is not None and contact.circle:
             largest = of_friction[of_friction[:, at.ELEMENT] == s, at.LARGEST].max(initial=0.0)
             law: Any = contact.law
             if largest > _NEARLY * law.friction.stiffness * math.pi * abs(contact.circle):
                 return True
     return False
-
-
-def _always(system: System) -> list[int]:
-    """Elements whose force acts at both signs of δ, and never ends."""
-    return [s for s, c in enumerate(system.contacts) if c.always and not getattr(c.law, "opens", False)]
-
-
-def _exchanged(rows: Array) -> Array:
-    """(k,) peak force times peak indentation of every contact of a log, J."""
-    ends = at.ends_of(rows)
-    return ends[:, at.DEEPEST] * ends[:, at.LARGEST]
-
-
-def _energy(
-    system: System, works: Array, complete: bool, motion: Array, back: Array, initial: Array, rubbed: tuple[Any, Any]
-) -> Energy:
-    """The energy balance of a run; input and damping are NaN where it was not kept."""
-    if not complete:
-        works = np.hstack((np.full((len(works), 2), math.nan), works[:, 2:]))
-    return Energy.of_run(system.M, system.K, works, motion, back @ initial, rubbed)
 
 
 def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any, memory: Any) -> Array:

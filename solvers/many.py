@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.integration import BLOCK_STEPS, kept_forcing
+from solvers.integration import BLOCK_STEPS, prepared_once
 from solvers.problem import Array, SolverError, Status, System, counted
-from solvers.problem.run_arguments import check_laws, check_maps, output_times
+from solvers.problem.run_arguments import output_times
 
 if TYPE_CHECKING:
     from solvers.exponential.many_starts import Worker
@@ -120,12 +120,10 @@ def integrate_many(
     starts = _starts(system, q0, q_dot0)
     output_times(duration, None)
     _check_threads(threads)
-    check_maps(system, method)
-    check_laws(system)
     own_gaps, scaled = _gaps(system, gaps, len(starts)), _factors(system, factors, len(starts))
     started = time.perf_counter()
-    forcing = kept_forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
-    engines = [method.engine(system, starts[0], forcing, duration) for _ in range(min(threads, len(starts)))]
+    prepared = prepared_once(system, method, duration)
+    engines = [method.engine(system, starts[0], prepared, duration) for _ in range(min(threads, len(starts)))]
     outcomes = Outcomes.of(len(starts), engines[0].back.shape[1], len(system.contacts))
     starts = whole_starts(engines[0], starts, _of_tones(scaled, engines[0]))
     _to_the_end([Worker(engine, starts, own_gaps, outcomes, BLOCK_STEPS) for engine in engines], len(starts), progress)

@@ -26,7 +26,7 @@ def system_under_noise(omega, zeta, row, gap, seed, band=300.0):
 def prepared(system, duration):
     """Problem and tables of a run, with its sampled signal."""
     forcing = forcing_of([signal for _, signal in system.loads], duration, 1e-6)
-    engine = METHOD.engine(system, np.zeros(2 * system.size), forcing, duration)
+    engine = METHOD.engine(system, np.zeros(2 * system.size), METHOD.prepared(system, forcing, duration), duration)
     return engine.problem, engine.prepared.tables.value
 
 

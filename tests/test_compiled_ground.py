@@ -26,8 +26,7 @@ from solvers.compiled.sums import combine, padded
 from solvers.exponential.contact.nodes import LOCAL, S, gauss_jacobi, node_sets_of, series_of
 from solvers.exponential.contact.peaks import local_maximum
 from solvers.exponential.flight import level_within
-from solvers.exponential.preparation import prepare_run
-from solvers.integration import kept_forcing
+from solvers.integration import prepared_once
 
 OPTIONS = {"error_model": "numpy", "_nrt": False}
 
@@ -359,7 +358,7 @@ def test_arrays_have_the_shapes_they_are_declared_with(stops, tones):
     loads = [(rows[0], Harmonic(1.0, 3.0 + i)) for i in range(tones)]
     system = System.modal([1.0, 2.0, 3.0, 5.0, 8.0], 0.01, contacts, loads)
     method = Exponential(1e-8)
-    _, prepared = prepare_run(system, kept_forcing(system, 10.0, method.rtol), 10.0, method.rtol)
+    _, prepared = prepared_once(system, method, 10.0)
     for value in (prepared.problem.value, prepared.tables.value):
         sizes = {}
         for name, shape in dimensions_of(type(value)).items():

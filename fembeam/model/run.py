@@ -159,7 +159,7 @@ class Run(Histories, Printed):
         return cls(
             *(solution.t, solution.q, solution.q_dot),
             contacts=PlacedLog.of(solution.contacts, model.sites),
-            ledger=solution.ledger,
+            ledger=solution.record.energy,
             status=status,
             cost=solution.cost,
             shapes=model.shapes,
@@ -167,8 +167,8 @@ class Run(Histories, Printed):
             directions=model.directions,
             impactor_masses=masses,
             scene=repr(model.scene),
-            borders=solution.borders,
-            lost=solution.lost,
+            borders=solution.record.transitions,
+            lost=solution.record.losses,
             model=model,
             others=model.others,
             began=began,
@@ -181,7 +181,7 @@ class Run(Histories, Printed):
             sampled=sampled,
             circles=np.array([one.circle for one in rows], dtype=float).reshape(-1, 3),
             rubs=np.array([one.rub for one in rows], dtype=float).reshape(-1, 4),
-            rubbing=solution.rubbing,
+            rubbing=solution.record.friction,
             reached=reached,
             made=made,
         )

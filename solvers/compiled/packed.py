@@ -254,6 +254,6 @@ class Layout:
 
     def replace_array(self, block: Any, i: int, j: int, array: Any) -> None:
         """Replace the j-th array of the i-th tuple by another of the same kind, which the caller must keep alive."""
-        words = _descriptor(array.shape, address_of(array))
+        words = [*_META, array.size, 8, address_of(array), *array.shape, *array.strides]
         first = self.size + self.descriptors[i][j]
         block[first : first + len(words)].view(np.int64)[:] = words

@@ -70,7 +70,6 @@ class State(NamedTuple):
 
 STATE = packed_type(State)
 NO_ROWS = {"events": 0, "row": at.CODE + 1, "samples": 0, "rows": 0, "record": 0}  # sizes of what is not written yet
-NO_OUTPUT = {"out": np.empty((0, 0)), "due": np.array([math.inf])}  # of a run that keeps its end only
 
 
 def new_log(elements: int) -> Any:

@@ -59,12 +59,11 @@ from solvers.compiled.state import (
     switch_on_surface,
 )
 from solvers.exponential.contact.first_step import BALANCED, BEGUN, NEW, begin_steps, latest_entered
-from solvers.exponential.contact.landing import landing_reach
 from solvers.exponential.contact.step import advance_contact
 from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy
 from solvers.exponential.energy.flight_balance import account_state, start_account
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, NO_ENERGY_TABLES
-from solvers.exponential.preparation import SCRATCH, TABLES, prepare_run
+from solvers.exponential.preparation import SCRATCH, TABLES, Prepared, prepare_run
 from solvers.exponential.safe_steps import fly
 from solvers.problem import Array, Forcing, System
 
@@ -168,9 +167,13 @@ class Exponential:
         if not 1e-12 <= self.rtol <= 1e-2:
             raise ValueError(f"rtol must lie in [1e-12, 1e-2], got {self.rtol!r}")
 
-    def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Engine:
-        """The method prepared for one run."""
-        return Engine(self, system, z, forcing, duration)
+    def prepared(self, system: System, forcing: Forcing, duration: float) -> tuple[Forcing, Prepared]:
+        """The forcing as it is run, and the tables: what all starts share."""
+        return prepare_run(system, forcing, duration, self.rtol)
+
+    def engine(self, system: System, z: Array, prepared: tuple[Forcing, Prepared], duration: float) -> Engine:
+        """The method made ready for one run."""
+        return Engine(self, system, z, prepared, duration)
 
 
 def _spacing(due: Array) -> float:
@@ -181,23 +184,24 @@ def _spacing(due: Array) -> float:
 class Engine:
     """One run: the problem with a block per tone, its tables, its state."""
 
-    def __init__(self, method: Exponential, system: System, z: Array, forcing: Forcing, duration: float) -> None:
+    def __init__(
+        self, method: Exponential, system: System, z: Array, prepared: tuple[Forcing, Prepared], duration: float
+    ) -> None:
         self.method, self.system, self.duration = method, system, duration
-        forcing, prepared = prepare_run(system, forcing, duration, method.rtol)
-        self.back = prepared.back
-        packed = prepared.problem
+        forcing, self.prepared = prepared
+        self.back, self.packed = self.prepared.back, self.prepared.problem
         own: dict[str, Array] = {}
         if forcing.table.size:
             own = {"table": forcing.table, "table_start": forcing.table_start}
         if system.latches:  # laws latch numbers among their parameters
-            own["parameters"] = prepared.problem.value.parameters.copy()
+            own["parameters"] = self.packed.value.parameters.copy()
         if own:
-            packed = packed.replaced(type_of(packed.value), **own)
-        self.packed, self.problem, self.prepared = packed, packed.value, prepared
-        self.advance = advance_of(isinstance(packed.value, PlanarProblem))
-        self.workspace = prepared.workspace()
-        self.workspace.begin(z, duration, method.rtol, landing_reach(method.rtol))
-        self.addresses = packed.address, prepared.tables.address, *self.workspace.addresses
+            self.packed = self.packed.replaced(type_of(self.packed.value), **own)
+        self.problem = self.packed.value
+        self.advance = advance_of(isinstance(self.problem, PlanarProblem))
+        self.workspace = self.prepared.workspace()
+        self.workspace.begin(z, duration, method.rtol)
+        self.addresses = self.packed.address, self.prepared.tables.address, *self.workspace.addresses
 
     @property
     def state(self) -> State:

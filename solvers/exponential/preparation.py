@@ -14,7 +14,6 @@ from solvers.compiled.kernels import Problem, type_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned
 from solvers.compiled.parts import BORDERS, CIRCLES, ENERGY, EVERY_RUN, FRICTION, MANY_STOPS, TWO_STOPS, load
 from solvers.compiled.state import (
-    NO_OUTPUT,
     NO_ROWS,
     STATE,
     T_END,
@@ -28,6 +27,7 @@ from solvers.compiled.state import (
     radii_of,
 )
 from solvers.compiled.sums import padded
+from solvers.exponential.contact.landing import landing_reach
 from solvers.exponential.contact.many_stops import POOL
 from solvers.exponential.contact.node_response import START, Scratch
 from solvers.exponential.contact.nodes import S, series_of
@@ -58,21 +58,26 @@ class Workspace:
         self.state = State._make(layout.arrays(self.block, 0))
         self.energy, self.accuracy = (layout.array(self.block, 1, Scratch._fields.index(name)) for name in _KNOWN)
         begin_state(self.state, rest)
-        self.rest = self.numbers.copy()
-        self.own = self.state.x[: rest.size].reshape(2, -1)[:, :blocks]
-        self.log = new_log(len(self.state.segment))
-        self.replace(log=self.log)
+        self.rest, self.settings = self.numbers.copy(), (0.0, 0.0)  # of no run
+        n = rest.size // 2
+        self.p, self.v = self.state.x[:blocks], self.state.x[n : n + blocks]  # of the structure's own blocks
+        self.replace(log=new_log(len(self.state.segment)))
+        self.first = self.state, self.block[layout.size :].copy()  # and where its arrays are
 
-    def begin(self, z: Array, duration: float, *accuracy: float) -> None:
+    def begin(self, z: Array, duration: float, rtol: float) -> None:
         """The state of a run at t = 0 from the coordinates of the structure's own blocks."""
         self.numbers[:] = self.rest
-        self.own += z.reshape(2, -1)
-        self.state.now[T_END], self.accuracy[:] = duration, accuracy
+        if self.settings != (duration, rtol):
+            self.settings = duration, rtol
+            self.state.now[T_END], self.accuracy[:] = duration, (rtol, landing_reach(rtol))
+            self.rest[:] = self.numbers
+        self.p += z[: self.p.size]
+        self.v += z[self.p.size :]
 
     def forget_outputs(self) -> None:
         """Let the next run keep its end only, and a list of events as short as at first."""
-        if self.state.log is not self.log or len(self.state.due) > 1:
-            self.replace(log=self.log, **NO_OUTPUT)
+        if self.state is not self.first[0]:
+            self.state, self.block[self.layout.size :] = self.first
 
     def replace(self, **arrays: Array) -> None:
         """Let other arrays be those of the state."""
@@ -97,9 +102,12 @@ class Prepared(NamedTuple):
 
     def energy_tables_for(self, spacing: float) -> Packed:
         """Tables of the energy balance for outputs of a spacing, s; what reads them is compiled for the first."""
-        load_parts(type_of(self.problem.value), ENERGY)
-        arrays = self.problem.value, self.tables.value
-        made: Packed = self.kept.get((spacing, self.tones), lambda: energy_tables_for(*arrays, spacing))
+
+        def make() -> Packed:
+            load_parts(type_of(self.problem.value), ENERGY)
+            return energy_tables_for(self.problem.value, self.tables.value, spacing)
+
+        made: Packed = self.kept.get((spacing, self.tones), make)
         return made
 
     @property
@@ -120,15 +128,9 @@ class Prepared(NamedTuple):
 
 
 def prepare_run(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
-    """The forcing without resonant tones and on one grid, and the tables; those of an equal earlier run are reused."""
-    last = system.kept.find(("run", duration, rtol))
-    if last and last[0] is forcing:
-        return forcing, last[1]
+    """The forcing without resonant tones and on one grid, and the tables."""
     taken = on_one_grid(without_resonance(system, forcing, duration, rtol), duration)
-    prepared = prepare_system(system, taken)
-    if taken is forcing and not forcing.table.size:
-        system.kept.store(("run", duration, rtol), (forcing, prepared))
-    return taken, prepared
+    return taken, prepare_system(system, taken)
 
 
 def prepare_system(system: System, forcing: Forcing) -> Prepared:

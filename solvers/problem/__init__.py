@@ -4,8 +4,9 @@ M q'' + C q' + K q = Σ v_l s_l(t) + Σ w_c F_c(-w_c·q - gap_c, ...)
 
 `system` holds matrices, contacts and loads and decouples them into blocks, `signals` samples loads for compiled code,
 `common_grid` puts the samples of several on one grid, `friction` is that of a contact, `memo` keeps what was computed
-once, `event_list` names the columns of what a run logs, `result` is the solution with its log of contacts and its
-energies, `losses` the energy that contacts dissipated. Imports: numpy, scipy. Begin with `system.System`.
+once, `event_list` names the columns of what a run logs, `record` is what a run leaves, `result` the solution with its
+log of contacts and its energies, `losses` the energy that contacts dissipated. Imports: numpy, scipy. Begin with
+`system.System`.
 """
 
 from solvers.problem.common_grid import on_one_grid
@@ -15,6 +16,7 @@ from solvers.problem.friction import Friction
 from solvers.problem.losses import Losses, renew
 from solvers.problem.matrices import Array, dense, product
 from solvers.problem.memo import Memo
+from solvers.problem.record import Record
 from solvers.problem.result import (
     ContactLog,
     Cost,

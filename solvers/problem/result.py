@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,10 @@ from solvers.problem.frames import Columns
 from solvers.problem.friction import SLIDES
 from solvers.problem.matrices import Array
 from solvers.problem.system import stored_energy
+
+if TYPE_CHECKING:
+    from solvers.problem.losses import Losses
+    from solvers.problem.record import Record
 
 
 def counted(count: int, noun: str) -> str:
@@ -330,8 +334,7 @@ class Solution:
     ----------
     t : (k,) s. q, q_dot : (k, n) coordinates and rates then; without output samples k = 1, the end.
     contacts : log, energy : energy balance, transitions and losses : what laws with memory met, what each contact took,
-        friction : log of what it did; made when first looked at, by calling ``log``, ``ledger``, ``borders``, ``lost``
-        and ``rubbing``.
+        friction : log of what it did; made of ``record`` when first looked at.
     status : how it ended. cost : what it took.
     tangent : (2n, 2n or 2n + 1) derivative of the final [q, q̇], and rate : (2n,) its derivative by time; None unless
         asked for.
@@ -354,47 +357,67 @@ class Solution:
     True
     """
 
-    t: Array
-    q: Array
-    q_dot: Array
-    log: Callable[[], ContactLog] = field(repr=False)
-    ledger: Callable[[], Energy] = field(repr=False)
+    record: Record = field(repr=False)  # what all but the status and the derivatives is made of
     status: Status
-    cost: Cost
     tangent: Array | None = None
     rate: Array | None = None
-    memory: tuple[Array, ...] = ()
     memory_tangent: Array | None = None
-    borders: Callable[[], Transitions] = field(default=lambda: Transitions.of_events(at.NO_EVENTS, ()), repr=False)
-    lost: Callable[[], Any] = field(default=lambda: None, repr=False)
-    end: Array | None = field(default=None, repr=False)
-    rubbing: Callable[[], FrictionLog] = field(default=lambda: FrictionLog.of_events(at.NO_EVENTS), repr=False)
 
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
         return f"<solution {reached}, {counted(len(self.contacts), 'contact')}: {self.status.value}>"
 
+    @property
+    def t(self) -> Array:
+        """Output times, s, or the end."""
+        return self.record.t
+
+    @cached_property
+    def q(self) -> Array:
+        """Coordinates."""
+        return self.record.motion[:, : self.record.system.size]
+
+    @cached_property
+    def q_dot(self) -> Array:
+        """Rates."""
+        return self.record.motion[:, self.record.system.size :]
+
+    @cached_property
+    def cost(self) -> Cost:
+        """What it took."""
+        return self.record.cost()
+
+    @property
+    def memory(self) -> tuple[Array, ...]:
+        """What the laws have latched at the end."""
+        return self.record.memory
+
+    @cached_property
+    def end(self) -> Array:
+        """[q, q̇] at the time reached, and what is latched then."""
+        return self.record.end()
+
     @cached_property
     def contacts(self) -> ContactLog:
         """The contact log."""
-        return self.log()
+        return self.record.contacts()
 
     @cached_property
     def transitions(self) -> Transitions:
         """What laws with memory have met: the times of stick, slip and yield."""
-        return self.borders()
+        return self.record.transitions()
 
     @cached_property
     def friction(self) -> FrictionLog:
         """What friction did in each contact that has it."""
-        return self.rubbing()
+        return self.record.friction()
 
     @cached_property
     def energy(self) -> Energy:
         """The energy balance."""
-        return self.ledger()
+        return self.record.energy()
 
     @cached_property
-    def losses(self) -> Any:
-        """What each contact has taken, `solvers.problem.Losses`: work, loss, path of slip."""
-        return self.lost()
+    def losses(self) -> Losses:
+        """What each contact has taken: work, loss, path of slip."""
+        return self.record.losses()

@@ -78,11 +78,12 @@ def _laws_of_stops(contact: Contact) -> list[Any]:
 def checked_start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any) -> Array:
     """Checked start in the coordinates a method steps in: decoupled blocks, or the system's own."""
     n = system.size
-    start = np.empty(2 * n)
-    for name, vector, place in (("q0", q0, start[:n]), ("q_dot0", q_dot0, start[n:])):
-        if np.shape(vector) != (n,) and (np.ndim(vector) or n != 1):
-            raise ValueError(f"{name} must have shape ({n},), got {np.shape(vector)}")
-        place[:] = vector
+    try:
+        start = np.array((q0, q_dot0), dtype=float)
+        fits = start.shape == (2, n)
+    except (TypeError, ValueError):  # also of different lengths
+        fits = False
+    start = start.ravel() if fits else _joined(n, q0, q_dot0)
     if not math.isfinite(start.dot(start)):  # or large: squares overflow
         finite = np.isfinite(start)
         if not finite.all():
@@ -92,6 +93,16 @@ def checked_start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any)
     if hasattr(method, "takes_matrices") and method.takes_matrices(system):
         return start
     return system.blocks.inverse.dot(start)
+
+
+def _joined(n: int, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
+    """A start (2n,) of one coordinate given as plain numbers, or ValueError that says which vector does not fit."""
+    start = np.empty(2 * n)
+    for name, vector, place in (("q0", q0, start[:n]), ("q_dot0", q_dot0, start[n:])):
+        if np.shape(vector) != (n,) and (np.ndim(vector) or n != 1):
+            raise ValueError(f"{name} must have shape ({n},), got {np.shape(vector)}")
+        place[:] = vector
+    return start
 
 
 def output_times(duration: float, dt: Any) -> Array | None:

@@ -378,7 +378,7 @@ class System:
             raise TypeError(f"load {i} needs a signal t -> value, got {signal!r}")
         return vector, signal
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of coordinates n."""
         return int(self.M.shape[0])

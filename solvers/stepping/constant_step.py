@@ -80,18 +80,22 @@ class ConstantStep(ABC):
             return self.critical(system.M, system.C, system.K, system.gyroscopic)
         return system.blocks.k, system.blocks.c
 
-    def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Any:
+    def prepared(self, system: System, forcing: Forcing, duration: float) -> tuple[Forcing, None]:
+        """The forcing alone: nothing is made in advance."""
+        return forcing, None
+
+    def engine(self, system: System, z: Array, prepared: tuple[Forcing, None], duration: float) -> Any:
         """The method made ready for one run; ValueError for a step that is predicted to be unstable or blind."""
         if not self.force_unstable:
             check_stability(self, system, duration)
-            check_sampling(self, forcing)
+            check_sampling(self, prepared[0])
         if self.takes_matrices(system):
             from solvers.stepping.sparse import MatrixEngine
 
-            return MatrixEngine(self, system, z, forcing, duration)
+            return MatrixEngine(self, system, z, prepared[0], duration)
         from solvers.stepping.engine import Engine  # here: the loop knows the methods' modules
 
-        return Engine(self, system, z, forcing, duration)
+        return Engine(self, system, z, prepared[0], duration)
 
 
 def check_stability(method: ConstantStep, system: System, duration: float) -> None:

@@ -129,8 +129,12 @@ class DormandPrince:
         """The compiled step."""
         return step
 
-    def engine(self, system: System, z: Array, forcing: Forcing, duration: float) -> Any:
+    def prepared(self, system: System, forcing: Forcing, duration: float) -> tuple[Forcing, None]:
+        """The forcing alone: nothing is made in advance."""
+        return forcing, None
+
+    def engine(self, system: System, z: Array, prepared: tuple[Forcing, None], duration: float) -> Any:
         """The method made ready for one run."""
         from solvers.stepping.engine import Engine  # here: the loop knows this module
 
-        return Engine(self, system, z, forcing, duration)
+        return Engine(self, system, z, prepared[0], duration)

@@ -19,14 +19,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from solvers.compiled.kernels import inner, merged, row_of, rubs, slider_of
 from solvers.compiled.state import PEAK_FORCE, T
-from solvers.problem import Array, Energy, System, dense
+from solvers.problem import Array, Energy, Record, System, dense
 from solvers.problem.friction import ARM, MU, SPIN, may_pull
+from solvers.problem.system import stored_energy
 
 MULTIPLE, ROUNDING = 20.0, 1e-9
 FACTOR = 4.0
@@ -110,18 +112,19 @@ def has_gained(
     return bool(last > FACTOR * 0.5 * speed**2)
 
 
-def unbalanced(
-    system: System, powers: Array, motion: Array, begin: Array, exchanged: Array, rtol: float, rubbed: tuple[Any, Any]
-) -> bool:
-    """Whether the energy of a run, given by powers and motion at its samples, is off by more than is tolerated.
+@lru_cache(maxsize=64)
+def _checked_places(count: int) -> Any:
+    """Indices of the samples that are checked."""
+    return np.linspace(0, count - 1, _SAMPLES).astype(int)
 
-    ``rubbed`` : works of friction and of spins at the samples, J, or zeros.
-    """
-    rows = np.linspace(0, len(powers) - 1, _SAMPLES).astype(int)
-    sampled = tuple(part[rows] if np.ndim(part) else part for part in rubbed)
-    balance = Energy.of_run(system.M, system.K, powers[rows], motion[rows], begin, sampled)
-    parts = [
-        balance.initial,
-        *(np.abs(part).max() for part in (balance.stored, balance.input, balance.damping, *rubbed)),
-    ]
-    return not np.abs(balance.residual).max() <= tolerated_energy(sum(parts), exchanged, rtol)
+
+def unbalanced(record: Record, rtol: float) -> bool:
+    """Whether the energy of a run, given at its samples, is off by more than is tolerated."""
+    rows, system, rubbed = _checked_places(len(record.motion)), record.system, record.works_of_friction
+    motion = np.concatenate(((record.back @ record.begin)[None], record.motion[rows]))
+    stored = stored_energy(system.M, system.K, motion[:, : system.size], motion[:, system.size :])
+    works, sampled = record.works[rows], (part[rows] if np.ndim(part) else part for part in rubbed)
+    balance = Energy(works[:, 0], works[:, 1], works[:, 2::2].sum(axis=1), stored[1:], stored[0], *sampled)
+    handled = balance.initial + np.abs((balance.stored, balance.input, balance.damping)).max(axis=1).sum()
+    handled += sum(np.abs(part).max() for part in rubbed)
+    return not np.abs(balance.residual).max() <= tolerated_energy(handled, record.exchanged(), rtol)
