@@ -49,7 +49,7 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import largest8, least8, load8
-from solvers.compiled.state import CALLS, T_END, T, acts
+from solvers.compiled.state import CALLS, LAST_EVENT, T_END, T, acts
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
@@ -73,6 +73,7 @@ from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 from solvers.problem.friction import STIFFNESS as FRICTION_STIFFNESS
 
 _AT_END, _WITHIN = 1.5e-19, 2.7e-11  # errors of a step in ẍ = -ω² x, over (ωh)^17 and, at any point, (ωh)^9; ωh < 6
+_FADED = 100.0  # e^-100
 
 
 @merged
@@ -241,9 +242,10 @@ def _error_of_derivative(problem, tables, state, scratch, h):
 
     A motion at rest, or slow, lets steps grow; its neighbours are shaken. Collocation at eight nodes of Gauss takes
     ẍ = -ω² x over a step with an error of 1.5e-19 (ωh)^17, to a point within, as where the run ends, of 2.7e-11 (ωh)^9;
-    and ẍ = -c ẋ with less than that for ω = c.
+    and ẍ = -c ẋ with less than that for ω = c. What a strong dashpot has damped away since the last event needs no
+    such steps: only its way back, at k/c, is left.
     """
-    square, damping, out = 0.0, 0.0, scratch.local_motion[FORCES]
+    square, out, since = 0.0, scratch.local_motion[FORCES], state.now[T] - state.now[LAST_EVENT]
     for s in range(problem.law.size):
         if state.segment[s] == 0:
             continue
@@ -256,8 +258,10 @@ def _error_of_derivative(problem, tables, state, scratch, h):
         stiffness = largest_size(slopes[0])
         if rubs(problem, s):
             stiffness = max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
-        square, damping = square + stiffness * mobility, damping + largest_size(slopes[1]) * mobility
-    scratch.stiffened[0] = math.sqrt(square) + damping
+        stiffness, damping = stiffness * mobility, largest_size(slopes[1]) * mobility
+        faded = damping**2 > 4.0 * stiffness and damping * since > _FADED
+        square += (stiffness / damping if faded else math.sqrt(stiffness) + damping) ** 2
+    scratch.stiffened[0] = math.sqrt(square)
     angle = scratch.stiffened[0] * h
     error = _WITHIN * angle**9 if state.now[T] + h >= state.now[T_END] else _AT_END * angle**17
     return error / scratch.accuracy[RTOL]
