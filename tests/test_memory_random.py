@@ -63,7 +63,7 @@ def test_white_noise_gives_the_same_power_whatever_the_law(name):
     taken = Estimate.joint(lambda power, v2: power + damping * v2, found.power(0), found["rate"].variance)
     low, high = taken.interval(0.9999)
     assert taken.batches >= 16
-    assert taken.relative < 0.01
+    assert taken.relative < 0.016  # 0.008 on average, from 16 batches: twice that is beyond 99.99 %
     assert low - 1e-3 * given < given < high + 1e-3 * given
     assert found.power(0).value > 0.5 * given  # most of it in the element
     assert not low < 1.1 * given < high
