@@ -199,7 +199,9 @@ def stiffened(system, row, law):
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-11])
-@pytest.mark.parametrize("law", [KelvinVoigt(25.0, 0.3), KelvinVoigt(1e3, 0.0)], ids=["damped", "stiff"])
+@pytest.mark.parametrize(
+    "law", [KelvinVoigt(25.0, 0.3), KelvinVoigt(1e3, 0.0), KelvinVoigt(25.0, 300.0)], ids=["damped", "stiff", "dashpot"]
+)
 def test_at_rest_in_contact_the_neighbours_are_resolved(law, rtol):
     """A motion at rest lets steps grow beyond what the contact's stiffness makes of the structure's periods."""
     row = np.array([1.0, 0.5])

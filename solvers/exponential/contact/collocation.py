@@ -73,7 +73,7 @@ from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 from solvers.problem.friction import STIFFNESS as FRICTION_STIFFNESS
 
 _AT_END, _WITHIN = 1.5e-19, 2.7e-11  # errors of a step in ẍ = -ω² x, over (ωh)^17 and, at any point, (ωh)^9; ωh < 6
-_FADED = 100.0  # e^-100
+_FADED, _MOST = 100.0, 1e5  # e^-100; radians of a run that are resolved, in some 25 000 steps
 
 
 @merged
@@ -242,10 +242,10 @@ def _error_of_derivative(problem, tables, state, scratch, h):
 
     A motion at rest, or slow, lets steps grow; its neighbours are shaken. Collocation at eight nodes of Gauss takes
     ẍ = -ω² x over a step with an error of 1.5e-19 (ωh)^17, to a point within, as where the run ends, of 2.7e-11 (ωh)^9;
-    and ẍ = -c ẋ with less than that for ω = c. What a strong dashpot has damped away since the last event needs no
-    such steps: only its way back, at k/c, is left.
+    and ẍ = -c ẋ with less than that for ω = c. What so strong a dashpot has damped away since the last event that it
+    would take too many steps is left alone: only its way back, at k/c, counts.
     """
-    square, out, since = 0.0, scratch.local_motion[FORCES], state.now[T] - state.now[LAST_EVENT]
+    square, out, since = 0.0, scratch.local_motion[FORCES], state.now[T] - max(state.now[LAST_EVENT], 0.0)
     for s in range(problem.law.size):
         if state.segment[s] == 0:
             continue
@@ -259,7 +259,7 @@ def _error_of_derivative(problem, tables, state, scratch, h):
         if rubs(problem, s):
             stiffness = max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
         stiffness, damping = stiffness * mobility, largest_size(slopes[1]) * mobility
-        faded = damping**2 > 4.0 * stiffness and damping * since > _FADED
+        faded = damping**2 > 4.0 * stiffness and damping * since > _FADED and damping * state.now[T_END] > _MOST
         square += (stiffness / damping if faded else math.sqrt(stiffness) + damping) ** 2
     scratch.stiffened[0] = math.sqrt(square)
     angle = scratch.stiffened[0] * h
