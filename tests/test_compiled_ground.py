@@ -17,7 +17,7 @@ from scipy.special import eval_jacobi, roots_jacobi
 from contacts import Hertz, KelvinVoigt, Viscoelastic
 from fembeam import Harmonic
 from solvers import Contact, Exponential, System
-from solvers.compiled import dop853_tableau
+from solvers.compiled import decorators, dop853_tableau
 from solvers.compiled.fields import dimensions_of, packed_type, shapes_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned, unpacker
 from solvers.compiled.shortcuts import Shortcuts
@@ -392,3 +392,27 @@ def test_shortcuts_of_the_compiler_end_with_it():
         assert BaseFunction.get_call_type is not own[0]
         raise ZeroDivisionError
     assert (BaseFunction.get_call_type, InlineWorker.inline_function) == own
+
+
+LINKED = """
+@njit(no_cpython_wrapper=True, no_cfunc_wrapper=True)
+def twice(x):
+    return 2.0 * x
+
+@njit
+def four_times(x):
+    return twice(twice(x))
+"""
+
+
+def test_what_is_only_linked_has_no_machine_code_of_its_own():
+    names = {"__name__": "solvers.trial", "njit": njit}
+    with decorators._SHORTCUTS.taken():
+        exec(LINKED, names)
+        assert names["four_times"](3.0) == 12.0
+        assert njit(lambda x: x + 1.0)(2.0) == 3.0  # of others
+    codes = [names[name].overloads[(types.float64,)].library for name in ("twice", "four_times")]
+    sizes = [len(code.serialize_using_object_code()[2][0]) for code in codes]
+    assert sizes[0] == 0 < sizes[1]
+    twice = names["twice"]
+    assert njit(lambda x: twice(x) - 1.0)(3.0) == 5.0  # linked again, later

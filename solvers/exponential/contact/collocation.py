@@ -197,13 +197,13 @@ def step_error(problem, tables, state, scratch, node_set, level):
         scratch.unresolved[u], s = 0.0, element_of(problem, u)
         if state.segment[s] == 0:
             continue
-        combine(tables.summary[node_set], scratch.force[u], S, None, scratch.summary[u, 0])
+        combine(tables.summary[node_set], scratch.force[u], S, None, scratch.summary[u])
         if is_circle(problem, s) and u == row_of(problem, s):
             own = place_of(problem, s)
-            combine(tables.summary[node_set], scratch.law_force[own], S, None, scratch.summary[own, 0])
+            combine(tables.summary[node_set], scratch.law_force[own], S, None, scratch.summary[own])
         largest, stiffness = _largest(problem, tables, state, scratch, s)
         if node_set == 0 or s == node_set - 1:
-            unresolved = unresolved_part(scratch.summary[u, 0], largest, S // 2)
+            unresolved = unresolved_part(scratch.summary[u], largest, S // 2)
         else:
             combine(tables.tail[node_set], scratch.force[u], S, None, scratch.trial)
             unresolved = unresolved_part(scratch.trial, largest, 1)
@@ -314,7 +314,7 @@ def _hidden_kink(problem, state, scratch, s, largest):
     delta[1] = off_knots(problem, s, state.segment[s], indentation(problem, s, state.x))
     rate[1] = indentation_rate(problem, s, state.x)
     contact_forces(problem, s, delta, rate, state.entry_rate[s], scratch.trial[2:4])
-    c = scratch.summary[place_of(problem, s), 0]
+    c = scratch.summary[place_of(problem, s)]
     apart = max(abs(scratch.trial[2] - c[5]), abs(scratch.trial[3] - c[4]))
     return apart if apart > 2.0 * max(abs(c[2]), abs(c[3])) + 1e-12 * largest else 0.0
 

@@ -77,7 +77,7 @@ class Scratch(NamedTuple):
     force: Annotated[Any, "R+L, S"]  # forces on the rows, then values of the signals
     law_force: Annotated[Any, "R+A, S"]  # forces on the rows by the laws, for the motion at hand, those of circles
     trial: Annotated[Any, "S"]  # numbers of one moment
-    summary: Annotated[Any, "R+A, 2, 8"]  # of forces and displacements, see Tables.summary
+    summary: Annotated[Any, "R+A, 8"]  # of forces, see Tables.summary
     previous: Annotated[Any, "R, S"]  # forces of the last accepted step
     slope: Annotated[Any, "E, 3, S"]  # derivatives of the laws at the nodes by δ, δ̇ and entry rate
     turned: Annotated[Any, "5*A, 2, S"]  # slopes of the components of circles' forces, see `circles.contact`

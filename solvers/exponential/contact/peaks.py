@@ -90,6 +90,8 @@ def local_maximum(values, limit, coefficients):
 @inlined
 def _highest(tables, values, node_set, limit):
     """Index of the largest node value up to σ = limit, or -1."""
+    if limit >= 1.0 and values[S - 1] >= largest8(load8(values, 0)):
+        return S - 1
     place = -1
     for i in range(S):
         if tables.nodes[node_set, i] <= limit and (place < 0 or values[i] > values[place]):
@@ -131,17 +133,19 @@ def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
     seen, motion, force = -1, motion_of(problem, scratch, s)[0], force_of(problem, scratch, s)
     if limit >= 1.0 and _below(state, s, PEAK_FORCE, force) and _below(state, s, PEAK_DELTA, motion):
         return
-    summary = scratch.summary[place_of(problem, s)]
-    combine(tables.summary[node_set], motion, S, None, summary[1])
+    summary, start = scratch.summary[place_of(problem, s)], scratch.start_motion[s]
     for column, values, d in ((PEAK_FORCE, force, 0), (PEAK_DELTA, motion, 1)):
-        known, slopes = state.active[s, column], summary[d]
+        known = state.active[s, column]
         place = _highest(tables, values, node_set, limit)
         if place >= 0:
             state.active[s, column] = max(known, values[place])
         if limit >= 1.0:
-            if values[place] < _LOWER * known or (place == S - 1 and slopes[7] >= 0.0):
-                continue  # lower, or still rising at the end, where the next step begins
-            if node_set == 0 and place == 0 and slopes[6] <= 0.0 and known >= slopes[4]:
+            if values[place] < _LOWER * known:
+                continue
+            if place == S - 1 and (summary[7] if d == 0 else indentation_rate(problem, s, scratch.x_new)) >= 0.0:
+                continue  # still rising at the end, where the next step begins
+            begin, slope = (summary[4], summary[6]) if d == 0 else (start[0], start[1])
+            if node_set == 0 and place == 0 and slope <= 0.0 and known >= begin:
                 continue  # falling from its start
         place = max(place, 0)
         if seen != place:
