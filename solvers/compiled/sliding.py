@@ -241,7 +241,7 @@ def _slide_acceleration(problem, s, x, rate_of_x):
 def renew_slider(problem, s, j, entry_rate, segment, t, x, rate_of_x, out):
     """Begin the segment behind border j in a state; ξ, ξ̇ and F_t go to ``out``. Returns the code of the event.
 
-    Where slip ends because N does, F_t is a zero with the sign of the slip.
+    F_t has the sign of the slip that begins, though it be a zero, and of one that ends because N does.
     """
     own, radius = slider_of(problem, s), radius_of(problem, s)
     way, speed = slide_of(problem, s, t, x)
@@ -266,6 +266,7 @@ def renew_slider(problem, s, j, entry_rate, segment, t, x, rate_of_x, out):
             own[CODE] = math.copysign(1.0, speed)
         else:  # at rest on the surface it goes where it is pushed
             own[CODE] = math.copysign(1.0, _slide_acceleration(problem, s, x, rate_of_x))
+        out[2] = math.copysign(force, own[CODE])
         return SLIPPED
     own[SLIDER] = way - force / own[STIFFNESS]
     own[CODE] = 0.0
