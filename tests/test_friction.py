@@ -503,6 +503,27 @@ def test_a_whirl_without_loads_is_not_periodic_and_that_is_said():
         orbit(disc(turns=False), 1.3, np.array([0.9, 0.0, 0.0, 0.0, 4.0, 0.0]))
 
 
+@every_method
+@pytest.mark.parametrize("side", [2.0, -2.0, 0.9])
+def test_a_mass_pressed_and_pushed_from_rest_on_the_surface_slips_at_once(method, side):
+    """x = F (1 - cos ωt)/k, w = (S - μF) t²/2 + μF (1 - cos ωt)/(m ω²): no speed tells the way at first."""
+    m, k, mu, F = 0.08, 4e5, 0.25, 3.0
+    omega, way = np.sqrt(k / m), np.sign(side)
+    pressed = replace(wall().contacts[0], direction=[-1.0, 0.0], friction=Friction(mu, 10.0 * k))
+    system = System(m * np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), [pressed], [([F, side], Tone(1.0, 0.0))])
+    run = integrate(system, [0.0, 0.0], [0.0, 0.0], 2.0 / omega, method=method)
+    x = F / k * (1.0 - np.cos(2.0))
+    w = (side - way * mu * F) / m * (2.0 / omega) ** 2 / 2.0 + way * mu * x
+    np.testing.assert_allclose(run.q[-1], [x, w], rtol=1e-8)
+    assert len(run.contacts) == 1
+
+
+def test_what_rests_beside_a_hole_is_an_orbit():
+    found = orbit(disc(springs=50.0), 1.3)
+    assert found.stable
+    assert not found.state.any()
+
+
 def test_many_starts_are_single_runs_bit_for_bit():
     """Also what is latched begins anew in each."""
     system, speeds = wall(Hertz(1e7)), np.array([[0.8, 0.1], [0.8, 1.5], [0.3, 0.4]])

@@ -5,7 +5,7 @@ from itertools import islice
 
 import numpy as np
 import pytest
-from test_friction import EYE, SHARP, wall
+from test_friction import EYE, SHARP, Tone, wall
 from test_friction_tangent import CHANGES, RUNS
 from test_sensitivity import FINE, OF_CONTACTS, five_points
 from test_stops_with_friction import TUBE
@@ -42,6 +42,35 @@ def test_slip_throughout_by_the_coefficient():
     nearby = Nearby.of(lambda mu: changed(system, CHANGES["mu"], mu - 0.25), 0.25, 1e-3)
     found = sensitivity(system, [-1e-3, 0.0], [0.8, 1.5], 0.004, [0.004], nearby, method=FINE)
     np.testing.assert_allclose(found.states[-1][2:], [0.0, -1.6], atol=1e-9)
+
+
+@pytest.mark.parametrize("side", [2.0, -2.0, 0.1])
+@pytest.mark.parametrize(("omega", "phase"), [(0.0, 0.0), (900.0, -0.5 * np.pi)])
+def test_from_rest_on_the_surface_all_grows_with_the_load(side, omega, phase):
+    """With a linear law and no gap the motion is proportional to the load: its own derivative, in stick and slip."""
+
+    def pressed(load):
+        return replace(wall(), loads=[([3.0, side], Tone(load, omega, phase))])
+
+    found = sensitivity(pressed(1.0), [0.0, 0.0], [0.0, 0.0], 0.01, [0.01], Nearby.of(pressed, 1.0, 1e-3), method=FINE)
+    run = found.solution
+    np.testing.assert_allclose(found.states[-1][:2], run.q[-1], rtol=1e-6)
+    np.testing.assert_allclose(found.states[-1][2:], run.q_dot[-1], rtol=1e-6)
+
+
+def test_a_slip_that_ends_at_a_knot():
+    """Where N grows ten times as fast from a knot on, slip ends there: s is latched at the time of the knot."""
+    system = wall(PiecewiseLinear([4e5, 4e6], [1e-4]))
+
+    def end(v_n):
+        return integrate(system, [-1e-3, 0.0], [v_n, 0.6], 0.0016, method=SHARP).end[:4]
+
+    found = sensitivity(system, [-1e-3, 0.0], [0.8, 0.6], 0.0016, [0.0016], start=[0.0, 0.0, 1.0, 0.0], method=FINE)
+    omega = np.sqrt(4e5 / 0.08)
+    at_knot = 1e-3 / 0.8 + np.arcsin(1e-4 * omega / 0.8) / omega
+    assert found.solution.transitions.t[0] == pytest.approx(at_knot, rel=1e-9)
+    expected = five_points(lambda h: end(0.8 + h), 1e-5)
+    np.testing.assert_allclose(found.states[-1], expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
 
 
 # --- matrix level ----------------------------------------------------------------------------------------------------

@@ -229,10 +229,19 @@ def way_tolerance(problem, s, t, x):
 
 
 @inner
+def _slide_acceleration(problem, s, x, rate_of_x):
+    """ξ̈ in a state whose rate is known."""
+    u, u_dot, w, w_dot, _, _ = rows_at(problem, s, x)
+    u_twice, w_twice, turning_rate = accelerations_at(problem, s, rate_of_x)
+    args = u, u_dot, u_twice, w, w_dot, w_twice, turning_rate
+    return slide_acceleration(radius_of(problem, s), slider_of(problem, s), *args)
+
+
+@inner
 def renew_slider(problem, s, j, entry_rate, segment, t, x, rate_of_x, out):
     """Begin the segment behind border j in a state; ξ, ξ̇ and F_t go to ``out``. Returns the code of the event.
 
-    Where slip ends because N does, F_t is a zero with the sign of the slip.
+    F_t has the sign of the slip that begins, though it be a zero, and of one that ends because N does.
     """
     own, radius = slider_of(problem, s), radius_of(problem, s)
     way, speed = slide_of(problem, s, t, x)
@@ -250,8 +259,14 @@ def renew_slider(problem, s, j, entry_rate, segment, t, x, rate_of_x, out):
         own[CODE] = -own[CODE]
         return SLIPPED
     if own[CODE] == 0.0:
-        undrawn = abs(drawn(radius, own, way)) <= way_tolerance(problem, s, t, x)[0]
-        own[CODE] = math.copysign(1.0, speed if undrawn else force)
+        little, slow = way_tolerance(problem, s, t, x)
+        if abs(drawn(radius, own, way)) > little:
+            own[CODE] = math.copysign(1.0, force)
+        elif abs(speed) > slow:
+            own[CODE] = math.copysign(1.0, speed)
+        else:  # at rest on the surface it goes where it is pushed
+            own[CODE] = math.copysign(1.0, _slide_acceleration(problem, s, x, rate_of_x))
+        out[2] = math.copysign(force, own[CODE])
         return SLIPPED
     own[SLIDER] = way - force / own[STIFFNESS]
     own[CODE] = 0.0

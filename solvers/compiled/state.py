@@ -214,6 +214,7 @@ def end_event(problem, state, s, row):
         open_contact(problem, state, s, row[at.TIME], row[at.RATE])
         if rubs(problem, s):
             begin_slider(problem, s, row[at.TIME], state.x, state.entry_rate[s], False)
+            row[at.CODE] = slider_of(problem, s)[CODE]
     if row[at.TO] == 0.0 and rubs(problem, s):
         end_slider(problem, s)
     state.count[LOGGED] += 1

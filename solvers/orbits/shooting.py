@@ -121,7 +121,7 @@ def _check_isolated(problem: PeriodicProblem, chain: Chain) -> None:
     """Refuse an orbit whose neighbours are orbits too, to rounding, other latched numbers that stay put aside."""
     W, matrix = weights(*problem.make(chain.parameter)), chain.monodromy()
     if chain.coordinates < len(matrix):
-        size = np.linalg.norm(chain.x[0, : chain.coordinates] @ W.T)
+        size = float(np.linalg.norm(chain.x[0, : chain.coordinates] @ W.T)) or 1.0  # at rest it has none
         W = extended(W, size / problem.units(chain))
         kept = np.delete(np.arange(len(matrix)), chain.frozen)
         W, matrix = W[np.ix_(kept, kept)], matrix[np.ix_(kept, kept)]

@@ -13,7 +13,7 @@ from solvers.problem.matrices import Array
 """The element; s; what it met, a border of its law or else as named below; its segment before and after, 0 while no
 force acts; m, m/s and N as it was met, at the surface and at knots the angle in rad in a circular clearance for N, NaN
 elsewhere; N s and J since the run began; largest m and N of the contact; whether the entry rate is the floor; the law's
-code of what it did."""
+code of what it did, of an entry that of a slider's segment."""
 KNOT, BEGIN, FRICTION = -1.0, -2.0, -3.0
 """In GUARD: a knot or the surface; a contact that is under way as the run begins; no event, but what friction has done
 by the begin or the end of a contact, with the angle in DELTA, ξ̇ in RATE, the slider's way in FORCE, and CLIPPED 1 at

@@ -24,7 +24,6 @@ from solvers.problem.friction import CODE, CUT, FREE, MU, PRESSES, SLIDER, STICK
 from solvers.sensitivities import laws
 
 STUCK = 0.0  # code of the event with which stick begins
-_INSIDE = 1e-200  # m, where forces like δ^{1/4} grow without bound, and those like δ^{3/2} do not grow
 _CENTRE = 1e-12  # of the clearance: nearer to the centre, where nothing acts, slopes have no direction
 
 
@@ -121,40 +120,29 @@ class Slider:
         """F_t (k,)."""
         return self.numbers[STIFFNESS] * self.drawn(way) if self.sticks else self.share(normal) * normal
 
-    def begun(self, motion: ElementMotion, row: Array, entry_rate: float, under_way: bool) -> Array:
-        """Parameters after a contact has begun: in stick where N jumps or grows quicker than the spring is drawn.
-
-        One that is under way is free where the law pulls.
-        """
-        law, mu = self.contact.law, self.numbers[MU]
-        rate, speed = float(motion.rate[0]), float(motion.speed[0])
-        slips = mu == 0.0
-        if (
-            under_way
-            and law.borders > PRESSES
-            and laws.force(law, row, (motion.delta, motion.rate), entry_rate)[0] <= 0.0
-        ):
+    def begun(self, motion: ElementMotion, row: Array, entry_rate: float) -> Array:
+        """Parameters after a run has begun in contact: it sticks, or is free where the law pulls."""
+        law = self.contact.law
+        if law.borders > PRESSES and laws.force(law, row, (motion.delta, motion.rate), entry_rate)[0] <= 0.0:
             return self._latched(row, FREE, 0.0)
-        if not (under_way or slips):
-            growing = rate * laws.slopes(law, row, (_INSIDE, rate), entry_rate)[0, 0]
-            slips = laws.force(law, row, (0.0, rate), entry_rate)[0] <= 0.0
-            slips = slips and self.numbers[STIFFNESS] * abs(speed) > mu * growing
-        return self._latched(row, math.copysign(1.0, speed) if slips else STICK, float(motion.way[0]))
+        return self.entered(motion, row, STICK if self.numbers[MU] else math.copysign(1.0, float(motion.speed[0])))
+
+    def entered(self, motion: ElementMotion, row: Array, code: float) -> Array:
+        """Parameters after an entry, by which the run began a segment of this code."""
+        return self._latched(row, code, float(motion.way[0]))
 
     def renewed(self, row: Array, event: Array) -> Array:
         """Parameters after an event: stick or slip ends, or slip for want of N; or the slider is free no longer."""
         way, speed, force = (float(number) for number in event[at.DELTA : at.FORCE + 1])
         if event[at.GUARD] == PRESSES:
             return self._latched(row, FREE, 0.0)
-        if self.free:
-            return self._latched(row, STICK if event[at.CODE] == STUCK else math.copysign(1.0, speed), way)
-        code, rounding = self.numbers[CODE], 1e-15 * (abs(way) + 2.0 * math.pi * abs(self.contact.circle)) + 1e-20
-        if self.numbers[MU] == 0.0 and code != STICK:
-            return self._latched(row, -code, self.numbers[SLIDER])
-        if not self.sticks:
+        if event[at.CODE] == STUCK:
             return self._latched(row, STICK, way - force / self.numbers[STIFFNESS])
-        undrawn = abs(float(self.drawn(np.array(way)))) <= rounding
-        return self._latched(row, math.copysign(1.0, speed if undrawn else force), self.numbers[SLIDER])
+        if self.free:
+            return self._latched(row, math.copysign(1.0, speed), way)
+        if self.numbers[MU] == 0.0 and not self.sticks:
+            return self._latched(row, -self.numbers[CODE], self.numbers[SLIDER])
+        return self._latched(row, math.copysign(1.0, force), self.numbers[SLIDER])
 
     def _latched(self, row: Array, code: float, place: float) -> Array:
         """Parameters with other latched numbers."""

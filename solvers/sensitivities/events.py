@@ -18,7 +18,7 @@ from solvers.problem.friction import CODE, FREE, MU, STIFFNESS
 from solvers.sensitivities import laws
 from solvers.sensitivities.elements import forces_of
 from solvers.sensitivities.flow import Flow
-from solvers.sensitivities.stretches import Acting, after
+from solvers.sensitivities.stretches import Acting, after, rises
 
 GRAZING = 1e-9  # depth δ̇²/2|δ̈| to which an entry would go without force, in units of the motion, below which it grazes
 _OFF = 1e-10  # relative distance from a knot at which a law is certainly on one side of it
@@ -44,7 +44,7 @@ def cross(flow: Flow, t: float, row: Array, acting: Acting, span: float, last: A
     if row[at.GUARD] == at.BEGIN:
         return _latch_at_start(flow, t, s, acting), np.zeros(flow.columns)
     if flow.slider(s, acting) is not None and row[at.GUARD] >= 0.0:
-        _renew_slider(flow, t, s, acting, following)
+        _renew_slider(flow, t, s, acting, following, np.zeros(flow.columns) if last is None else last)
         return following, np.zeros(flow.columns)
     memory = row[at.GUARD] >= 0.0
     rate, acceleration = flow.rates(t, s, acting)
@@ -57,7 +57,7 @@ def cross(flow: Flow, t: float, row: Array, acting: Acting, span: float, last: A
     if entering:
         floored = abs(row[at.RATE]) < flow.system.contacts[s].law.entry_rate_floor
         flow.entry[s] = 0.0 if floored else np.sign(rate) * (sped + acceleration * shift)
-        following = _begin_slider(flow, t, s, following, shift, False)
+        following = _enter_slider(flow, t, row, following, shift)
     normal, forces = _jump(flow, t, row, acting, following)
     flow.y -= np.outer(flow.push[s].T @ forces, shift)
     flow.impulse[s] -= normal * shift
@@ -72,26 +72,33 @@ def _latch_at_start(flow: Flow, t: float, s: int, acting: Acting) -> Acting:
     slider = flow.slider(s, acting)
     if slider is None or slider.numbers[CODE] != FREE:
         return acting
-    return _begin_slider(flow, t, s, acting, np.zeros(flow.columns), True)
+    begun = slider.begun(flow.motion_of(t, s), acting.rows[s], acting.entry_rate[s])
+    return _latch_slider(flow, t, s, acting.changed(s, rows=begun), np.zeros(flow.columns))
 
 
-def _begin_slider(flow: Flow, t: float, s: int, acting: Acting, shift: Array, under_way: bool) -> Acting:
-    """Stick or slip as a contact begins: s = ξ then."""
+def _enter_slider(flow: Flow, t: float, row: Array, acting: Acting, shift: Array) -> Acting:
+    """Stick or slip as a contact begins."""
+    s = int(row[at.ELEMENT])
     slider = flow.slider(s, acting)
     if slider is None:
         return acting
-    motion = flow.motion_of(t, s)
-    begun = acting.changed(s, rows=slider.begun(motion, acting.rows[s], acting.entry_rate[s], under_way))
+    begun = slider.entered(flow.motion_of(t, s), acting.rows[s], float(row[at.CODE]))
+    return _latch_slider(flow, t, s, acting.changed(s, rows=begun), shift)
+
+
+def _latch_slider(flow: Flow, t: float, s: int, begun: Acting, shift: Array) -> Acting:
+    """What a slider latches that sticks as its contact begins: s = ξ then."""
     flow.latched[s][:] = 0.0
     if flow.slider(s, begun).sticks:  # type: ignore[union-attr]
-        flow.latched[s][1] = flow.way_change(t, s) + motion.speed[0] * shift
+        flow.latched[s][1] = flow.way_change(t, s) + float(flow.motion_of(t, s).speed[0]) * shift
     return begun
 
 
-def _renew_slider(flow: Flow, t: float, s: int, acting: Acting, following: Acting) -> None:
+def _renew_slider(flow: Flow, t: float, s: int, acting: Acting, following: Acting, shift: Array) -> None:
     """What a slider latches where stick begins, s = ξ - F_t/k_t.
 
-    Where slip ends the rate of s is zero, so that dt* does not matter; where N begins to grow from zero dt* = -dN/Ṅ.
+    Where slip ends the rate of s is zero, so that dt* does not matter, unless Ṅ jumps there, at a knot or an event of
+    another element, whose dt* it is. Where N begins to grow from zero dt* = -dN/Ṅ.
     """
     flow.latched[s][:] = 0.0
     slider, before = flow.slider(s, following), flow.slider(s, acting)
@@ -102,10 +109,11 @@ def _renew_slider(flow: Flow, t: float, s: int, acting: Acting, following: Actin
         flow.latched[s][1] = flow.way_change(t, s) - float(flow.motion_of(t, s).speed[0]) * pressed / growing
         return
     numbers = slider.numbers
-    _, _, pressed = flow.at_instant(t, s, acting)
+    _, growing, pressed = flow.at_instant(t, s, acting)
     normal = flow.force(t, s, acting)
     force, share = before.force(np.zeros(1), normal)[0], before.share(normal)[0]
-    flow.latched[s][1] = flow.way_change(t, s) - share / numbers[STIFFNESS] * pressed
+    rate = float(flow.motion_of(t, s).speed[0]) - share / numbers[STIFFNESS] * growing
+    flow.latched[s][1] = flow.way_change(t, s) - share / numbers[STIFFNESS] * pressed + rate * shift
     if numbers[MU]:
         one = flow.by.elements[s]
         changed = one.mu / numbers[MU] - one.stiffness / numbers[STIFFNESS]
@@ -115,7 +123,7 @@ def _renew_slider(flow: Flow, t: float, s: int, acting: Acting, following: Actin
 def _at_knot(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[Any, ...], span: float) -> Array:
     """dt* at the surface or a knot."""
     s, (moved, rate, acceleration) = int(row[at.ELEMENT]), motion
-    up = row[at.RATE] > 0.0
+    up = rises(row)
     border = acting.segment[s] if up else acting.segment[s] - 1
     late = moved.copy()
     late[flow.own] -= flow.by.of_knot(s, border)

@@ -98,6 +98,12 @@ def acting_at_start(system: System, x: Array, rows: Array, memory: Sequence[Any]
     return Acting(tuple(segment), tuple(entry_rate), tuple(parameters))
 
 
+def rises(row: Array) -> bool:
+    """Whether a knot or the surface is met inwards: what rests on its surface has no rate to tell by."""
+    before, behind = row[at.FROM], row[at.TO]
+    return bool(behind > before if behind != before else row[at.RATE] > 0.0)
+
+
 def after(system: System, acting: Acting, row: Array) -> Acting:
     """What acts after an event."""
     s, guard, rate = int(row[at.ELEMENT]), row[at.GUARD], row[at.RATE]
@@ -107,7 +113,7 @@ def after(system: System, acting: Acting, row: Array) -> Acting:
     if row[at.FROM] == 0.0 and row[at.TO] > 0.0:
         acting = acting.changed(s, entry_rate=max(abs(rate), law.entry_rate_floor))
     if guard == at.KNOT:
-        return acting.changed(s, segment=acting.segment[s] + (1 if rate > 0.0 else -1))
+        return acting.changed(s, segment=acting.segment[s] + (1 if rises(row) else -1))
     slider = Slider.of(system.contacts[s], acting.rows[s])
     if slider is not None:
         return acting.changed(s, rows=slider.renewed(acting.rows[s], row))

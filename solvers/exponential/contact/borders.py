@@ -23,6 +23,7 @@ from solvers.compiled.kernels import (
     rhs,
     row_of,
     rubs,
+    slider_of,
 )
 from solvers.compiled.parts import PASSED, part
 from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
@@ -39,6 +40,7 @@ from solvers.exponential.contact.slider_margins import (
     slider_margins_in,
     slider_margins_on_step,
 )
+from solvers.problem.friction import CODE
 
 UNRESOLVED = -2
 _ON = 1e-9  # margin, in units of the largest of the step, at which a step counts as begun on the border
@@ -374,10 +376,18 @@ def passed(problem, state, scratch, element, border, w, x):
     return (UNRESOLVED, -1) if dips and found < 0 else (found, which)
 
 
+@inlined
+def _know_rate(problem, state, scratch, s):
+    """The rate of the state, where a slider that sticks needs it: one at rest begins to slip by its acceleration."""
+    if rubs(problem, s) and slider_of(problem, s)[CODE] == 0.0:
+        rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, scratch.trial)
+
+
 @inner
 def renew_border(problem, state, scratch, element, border):
     """Renew one border in the present state."""
     delta, rate = margins_of(problem, state, scratch, element, state.now[T], state.x, scratch.margin)
+    _know_rate(problem, state, scratch, element)
     renew(problem, state, element, border, delta, rate)
     note_event(state)
 
@@ -398,6 +408,7 @@ def renew_all(problem, state, scratch, element, border):
         count = problem.border_count[s]
         if _is_without(problem, state, s):
             continue
+        _know_rate(problem, state, scratch, s)
         if s == element and count == 1:
             renew(problem, state, s, border, delta, rate)
             continue
