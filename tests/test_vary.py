@@ -283,6 +283,24 @@ def test_the_same_with_a_bound_on_the_reach():
         ask(constraints={reach: 0.3 * bound}, tolerance=1e-2)
 
 
+@pytest.mark.parametrize("number", range(12))
+def test_a_limit_of_what_jumps_is_met_to_its_jumps(number):
+    """g jumps by less than 0.01 about x at every point: beyond x = 0.6 it is kept nowhere, below 0.59 everywhere."""
+
+    def damping(run):
+        return run.model.scene.damping.zeta[0]
+
+    def jumps(run):
+        x = damping(run)
+        return x + 0.01 * np.random.default_rng([number, int(1e12 * x)]).uniform()
+
+    ask = partial(fb.study.minimise, rod(damping=fb.ModalDamping([0.1])), {"zeta[0]": (0.05, 0.95)})
+    found = ask(lambda run: -damping(run), {jumps: 0.6}, duration=0.01, dt=5e-3, modes=1, elements=4)
+    assert 0.585 < found.at["damping.zeta[0]"] < 0.6
+    assert found.active == ("jumps",)
+    assert found.limits[0].value <= 0.6
+
+
 def test_a_minimum_at_an_end_and_in_two_parameters():
     scene = rod(damping=fb.ModalDamping([0.1]), forces=[fb.PointForce(0.5, fb.Step(1.0, 1e-2))])
 

@@ -4,8 +4,9 @@
 
 The box is first looked over at points spread evenly (Halton's sequence), then searched from the best of them: by SLSQP,
 sequential quadratic programming, where all that is asked has exact gradients; else, and where that does not end at a
-smooth minimum, by COBYQA, a trust-region method with quadratic models that needs no derivatives. Noise has the same
-seeds at every point, so that f is a function of x alone.
+smooth minimum, by COBYQA, a trust-region method with quadratic models that needs no derivatives. From the best point
+the way to a lower one beyond a limit is halved. Noise has the same seeds at every point, so that f is a function of x
+alone.
 """
 
 from __future__ import annotations
@@ -366,7 +367,32 @@ class _Search:
             options={**radii, "maxfev": max(most - len(self.values), 1)},
         )
         self.pressing = np.zeros(len(self.bounds), dtype=bool)
+        self._close_in(tolerance, most)
         return bool(found.success)
+
+    def _keeps(self, x: Vector) -> bool:
+        """Whether the limits are kept at shares x."""
+        return bool(np.all(self.value(x)[1:] <= self.bounds))
+
+    def _close_in(self, tolerance: float, most: int) -> None:
+        """Halve the way from the best point to the nearest with a lower value, which breaks a limit.
+
+        It ends when both are within the tolerance, or the value no longer falls. Where limited quantities jump, as
+        statistics of noise do, models end far from a limit, or beyond it.
+        """
+        inside, least = self.shares[self.best()], self.values[self.best()][0]
+        lower = [share for share, value in zip(self.shares, self.values, strict=True) if value[0] < least]
+        if not lower or not self._keeps(inside):
+            return
+        outside = min(lower, key=lambda share: float(np.abs(share - inside).max()))
+        while np.abs(outside - inside).max() > tolerance and len(self.values) < most:
+            middle = 0.5 * (inside + outside)
+            if not self._keeps(middle):
+                outside = middle
+            elif self.value(middle)[0] < self.value(inside)[0]:
+                inside = middle
+            else:
+                return
 
 
 def _found(search: _Search, tolerance: float, converged: bool) -> Minimum:
