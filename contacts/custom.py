@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.custom_kernels import Function, compiled
+from contacts.custom_kernels import Function, derivative_kernel, difference_kernel, force_kernel
 from contacts.law import ENTRY_RATE_FLOOR, Law
 from contacts.numbers import LARGEST_EXPONENT, check_number, reals
 
@@ -43,12 +43,14 @@ class CustomLaw(Law):
     @property
     def kernel(self) -> Any:
         """The compiled function."""
-        return compiled(self.function, self.derivative, len(self.values))[0]
+        return force_kernel(self.function, len(self.values))
 
     @property
     def gradient(self) -> Any:
         """Its derivatives as given, else central differences, compiled."""
-        return compiled(self.function, self.derivative, len(self.values))[1]
+        if self.derivative is None:
+            return difference_kernel(self.function, len(self.values))
+        return derivative_kernel(self.derivative, len(self.values))
 
     @property
     def equation(self) -> str:  # type: ignore[override]
@@ -230,7 +232,7 @@ def _check_derivative(made: CustomLaw) -> None:
 
     pointer = ctypes.POINTER(ctypes.c_double)
     delta, delta_dot = np.array([1e-4, 3e-4]), np.array([0.3, -0.2])
-    kernels = (made.gradient, compiled(made.function, None, len(made.values))[1])
+    kernels = (made.gradient, difference_kernel(made.function, len(made.values)))
     found = np.empty((2, 3, 2))
     for kernel, out in zip(kernels, found, strict=True):
         arrays = [x.ctypes.data_as(pointer) for x in (delta, delta_dot, made.parameters)]

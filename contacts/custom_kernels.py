@@ -27,9 +27,9 @@ KNOWN = {"builtins", "cmath", "math", "numba", "numpy"}  # told by their names a
 
 
 @lru_cache(maxsize=256)
-def compiled(function: Function, derivative: Function | None, count: int) -> tuple[Any, Any]:
-    """Compile a scalar force and its derivatives into the batch kernels; what raises gives NaN, which stops a run."""
-    from contacts.kernels import GRADIENT, SIGNATURE
+def force_kernel(function: Function, count: int) -> Any:
+    """Compile a scalar force into the batch kernel; where it raises it gives NaN, which stops a run."""
+    from contacts.kernels import SIGNATURE
 
     scalar = inner(function)
 
@@ -37,7 +37,15 @@ def compiled(function: Function, derivative: Function | None, count: int) -> tup
         for i in range(n):
             force[i] = scalar(delta[i], delta_dot[i], entry_rate, *values)
 
-    def differences(n, delta, delta_dot, entry_rate, values, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
+    return or_say_where(lambda: kept(SIGNATURE, batch_of(inner(forces), count)), function, "law")
+
+
+@lru_cache(maxsize=256)
+def difference_kernel(function: Function, count: int) -> Any:
+    """Compile central differences of a scalar force, likewise."""
+    scalar = inner(function)
+
+    def slopes(n, delta, delta_dot, entry_rate, values, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
         for i in range(n):
             d, v, r = delta[i], delta_dot[i], entry_rate
             h = 1e-5 * abs(d) + 1e-14  # relative to the cube root of rounding; a stop is not asked below its surface
@@ -48,19 +56,26 @@ def compiled(function: Function, derivative: Function | None, count: int) -> tup
             h = 1e-5 * r
             by_entry[i] = (scalar(d, v, r + h, *values) - scalar(d, v, r - h, *values)) / (2.0 * h)
 
-    slopes, source = differences, function
-    if derivative is not None:
-        given, source = inner(derivative), derivative
+    return _gradient(slopes, count, function, "law")
 
-        def slopes(n, delta, delta_dot, entry_rate, values, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
-            for i in range(n):
-                by_delta[i], by_rate[i], by_entry[i] = given(delta[i], delta_dot[i], entry_rate, *values)
 
-    kind = "law" if derivative is None else "derivative"
-    return (
-        or_say_where(lambda: kept(SIGNATURE, batch_of(inner(forces), count)), function, "law"),
-        or_say_where(lambda: kept(GRADIENT, gradient_batch(inner(slopes), count)), source, kind),
-    )
+@lru_cache(maxsize=256)
+def derivative_kernel(derivative: Function, count: int) -> Any:
+    """Compile given derivatives of a scalar force, likewise."""
+    given = inner(derivative)
+
+    def slopes(n, delta, delta_dot, entry_rate, values, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
+        for i in range(n):
+            by_delta[i], by_rate[i], by_entry[i] = given(delta[i], delta_dot[i], entry_rate, *values)
+
+    return _gradient(slopes, count, derivative, "derivative")
+
+
+def _gradient(slopes: Function, count: int, function: Function, kind: str) -> Any:
+    """The kernel of slopes, or the line of the user's function that cannot be compiled."""
+    from contacts.kernels import GRADIENT
+
+    return or_say_where(lambda: kept(GRADIENT, gradient_batch(inner(slopes), count)), function, kind)
 
 
 def batch_of(forces: Any, count: int) -> Function:

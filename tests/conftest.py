@@ -1,11 +1,14 @@
 """Tests run in parallel: one worker per processor, machine code compiled before they start."""
 
+import gc
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+gc.set_threshold(50_000, 50)  # a worker holds a million objects, which every full search for garbage visits
 
 REALISATION = int(os.environ.get("FEMBEAM_REALISATION", "0"))  # 0 is the test's own
 
@@ -52,6 +55,12 @@ def pytest_collection_modifyitems(config, items):
     examples = [item for item in items if item.get_closest_marker("example")]
     config.hook.pytest_deselected(items=examples)
     items[:] = [item for item in items if not item.get_closest_marker("example")]
+
+
+def pytest_collection_finish(session):
+    """What is loaded by now stays: no search for garbage visits it."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from sliders import Slider
+from test_own_memory import OWN
 
-from contacts import Border, Hertz, KelvinVoigt, Polynomial, Segment, memory_law
+from contacts import Hertz, KelvinVoigt, Polynomial
 from contacts.memory import BoucWen, Coulomb, Iwan, Jenkins, WaltonBraun
 from fembeam import Harmonic
 from solvers import Contact, DormandPrince, Exponential, Parameter, System, integrate, orbit
@@ -259,29 +260,6 @@ def test_bad_memory_is_refused():
         Contact([1.0], Jenkins(50.0, 0.4))
 
 
-def bent(delta, delta_dot, kink, soft, hard):
-    return soft * delta
-
-
-def stiffer(delta, delta_dot, kink, soft, hard):
-    return soft * delta + (hard - soft) * (delta - kink)
-
-
-def below(delta, delta_dot, kink, soft, hard):
-    return kink - delta
-
-
-def above(delta, delta_dot, kink, soft, hard):
-    return delta - kink
-
-
-BENT = memory_law(
-    "bent",
-    {"soft": Segment(bent, Border(below, "hard")), "hard": Segment(stiffer, Border(above, "soft"))},
-    {"kink": 0.1},
-)(soft=1.0, hard=2.0)
-
-
 @pytest.mark.parametrize(
     ("law", "numbers", "place", "codes"),
     [
@@ -290,8 +268,8 @@ BENT = memory_law(
         (BoucWen(50.0, 0.1, 1.0, 1.0, 1.0), [3.0, 0.0, 0.0], 0, "-1, 0, 1"),
         (WaltonBraun(50.0, 100.0), [5.0, 0.0], 0, "0, 1, 2"),
         (Jenkins(50.0, 0.4) + Hertz(100.0) + WaltonBraun(50.0, 100.0), [2.0, 0.0, 0.0, 0.0, 0.0, 0.0], 0, "0, 1"),
-        (Jenkins(50.0, 0.4) + BENT, [0.0, 0.0, 2.0, 0.1], 2, "0, 1"),
-        (BENT, [-1.0, 0.1], 0, "0, 1"),
+        (Jenkins(50.0, 0.4) + OWN, [0.0, 0.0, 2.0, 0.0, 0.0], 2, "0, 1"),
+        (OWN, [-1.0, 0.0, 0.0], 0, "0, 1"),
     ],
 )
 def test_codes_that_are_no_segment_of_the_law_are_refused(law, numbers, place, codes):

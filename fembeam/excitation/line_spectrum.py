@@ -124,14 +124,15 @@ class LineSpectrum:
         L.I. Bluestein, A linear filtering approach to the computation of discrete Fourier transform, IEEE Trans. Audio
         Electroacoust. 18 (1970) 451.
         """
-        from scipy.signal import fftconvolve
+        from scipy.fft import fft, ifft, next_fast_len
 
         n, lines = t.size, self.amplitude.size
         half = self.spacing * (t[-1] - t[0]) / (n - 1) / 2
         chirp = np.exp(1j * half * np.arange(max(n, lines), dtype=np.float64) ** 2)
         turned = self.amplitude * np.exp(1j * self.omega * t[0]) * chirp[:lines]
         kernel = np.concatenate([chirp[lines - 1 : 0 : -1], chirp[:n]]).conj()
-        sums = fftconvolve(turned, kernel, mode="full")[lines - 1 : lines - 1 + n]
+        size = next_fast_len(kernel.size)  # what a shorter transform wraps falls on the sums before those read
+        sums = ifft(fft(turned, size) * fft(kernel, size))[lines - 1 : lines - 1 + n]
         return np.asarray((np.exp(1j * self.first * self.spacing * (t - t[0])) * chirp[:n] * sums).real)
 
     def nodes(self, duration: float, rtol: float) -> tuple[float, NDArray[np.float64]]:
