@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic
+from fembeam.excitation import Harmonic
 from solvers import (
     RK4,
     CentralDifference,
@@ -560,3 +561,21 @@ def test_borders_are_met_where_dashpots_couple_rigid_motions(v_t):
     exact, run = (bounce(coupled, v_t, method).transitions for method in METHODS)
     assert run.event.tolist() == exact.event.tolist() == ["stick", "slip"]
     np.testing.assert_allclose(run.t, exact.t, rtol=0.0, atol=1e-11)
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8, 1e-10])
+def test_a_stick_before_an_opening_lasts_as_long_as_that_of_a_second_method(rtol):
+    """A stick begins where a slip ends, with a margin of zero that rises; it slips again just before it opens."""
+    law = Hysteretic(1e11, damping_factor=0.86, exponent=1.5, entry_rate_floor=1.2e-5)
+    row, across = np.array([-1.19, -0.31]), np.array([0.31, -1.19])
+    contact = Contact(row, law, map="oblique", tangent=across, friction=Friction(1.95, 1.6e7))
+    tones = Harmonic(1.0, 41.4), Harmonic(1.0, 41.4, phase=np.pi / 2), Harmonic(1.0, 0.0)
+    loads = zip([[0.25, -0.24], [-0.23, -0.73], [0.028, 0.052]], tones, strict=True)
+    system = System(np.eye(2), np.diag([19.3, 11.0]), np.diag([7750.0, 4110.0]), [contact], list(loads))
+    found, other = (
+        integrate(system, [0.0, 0.0], [0.0, 0.0], 0.6, method=method).transitions
+        for method in (Exponential(rtol), DormandPrince(1e-10))
+    )
+    later, same = found.t > 1e-3, other.t > 1e-3  # at first it slips for a nanosecond, or not
+    assert found.event[later].tolist() == other.event[same].tolist()
+    np.testing.assert_allclose(found.t[later], other.t[same], rtol=0.0, atol=10.0 * rtol)

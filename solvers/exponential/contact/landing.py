@@ -82,6 +82,7 @@ from solvers.problem.friction import CODE, PEAK, STIFFNESS
 
 _MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
 _SMALL = 1e-4  # part of a landing by which its length may change without another step: the rule's error is its cube
+_BEGINS_THERE = 1e-6  # margin, in units of its largest, with which a landing begins on the border that it ends on
 _STILL = 1e-10  # margin, in units of its largest, from which on trials that do not halve it have met its rounding
 _MOST_VERTICES = 6  # of parabolas, to a maximum inside a landing
 _MOST_HALVINGS = 40  # the same on a border, whose margin may hardly change but at the start
@@ -466,8 +467,8 @@ def _power(tables, stop):
 def _begin_at_opening(problem, tables, state, scratch, stop, border, near):
     """Way in u of a landing on a border before a stop opens; the scale of its margin up to there is noted.
 
-    The place is guessed from margins at both ends for a slider that sticks, with the way it slips; else from the time
-    as if δ̇ stayed, with 0.
+    The place is guessed from margins at both ends for a slider that sticks, with the way it slips; else, and where a
+    margin that begins at zero rises before it falls, from the time as if δ̇ stayed, with 0.
     """
     u, delta, own = scratch.stages[START, state.x.size + 1], scratch.start_motion[stop, 0], slider_of(problem, stop)
     w, kappa, sticks = scratch.stages[START], tables.time_exponent[1 + stop], 1.0 if own[CODE] == 0.0 else 0.0
@@ -477,7 +478,7 @@ def _begin_at_opening(problem, tables, state, scratch, stop, border, near):
     largest = max(abs(begin), abs(scratch.margin[border]))
     rounding = own[STIFFNESS] * way_tolerance(problem, stop, state.now[T], state.x)[0]
     scratch.largest[stop, border], scratch.noise[stop, border] = largest, max(_OF_LARGEST * largest, 2.0 * rounding)
-    if sticks > 0.0 and end < 0.0 < begin:
+    if sticks > 0.0 and end < 0.0 and begin > _BEGINS_THERE * largest:
         begin, _ = _apart(problem, tables, state, scratch, stop, border, w, sign)
         return u * (1.0 - (end / (end - begin)) ** (1.0 / _power(tables, stop))), sign
     left = max(1.0 + near * scratch.start_motion[stop, 1] / delta, 0.0) if delta > 0.0 else 0.0
@@ -517,7 +518,7 @@ def _meet(problem, tables, state, scratch, stop, border, search):
     variable, way, span, furthest, largest, enough, sign = search
     x, before, power = scratch.stages[LANDED], 0.0, _power(tables, stop) if sign != 0.0 else 1.0
     apart, sign = _apart(problem, tables, state, scratch, stop, border, scratch.stages[START], sign)
-    begins_there = (apart if border >= 0 else abs(apart)) <= 1e-6 * largest
+    begins_there = (apart if border >= 0 else abs(apart)) <= _BEGINS_THERE * largest
     least = 0.0 if border >= 0 and not begins_there else 0.1 * span
     if begins_there:  # the secant needs another point
         before = 0.9 * span
