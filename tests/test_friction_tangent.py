@@ -66,6 +66,39 @@ def test_the_tangent_where_a_law_pulls_and_pushes_again(clamp):
     assert abs(run.tangent - expected).max() < 5e-5 * abs(expected).max()
 
 
+def knotted(d):
+    """N grows ten times as fast from a knot on: slip ends there."""
+    return wall(PiecewiseLinear([4e5 * (1.0 + d), 4e6], [1e-4]))
+
+
+def pressed_on(d):
+    """Slip along a wall with a dashpot ends as another stop begins with a force that presses the mass to the wall."""
+    one, other = wall(KelvinVoigt(4e5, 100.0), k_t=4e4), Contact([0.6, -0.8], KelvinVoigt(4e5, 600.0), 4e-4 * (1.0 + d))
+    return replace(one, contacts=[*one.contacts, other])
+
+
+@pytest.mark.parametrize(
+    ("changed", "q", "q_dot", "duration"),
+    [(knotted, [-1e-3, 0.0], [0.8, 0.6], 0.0016), (pressed_on, [-4e-5, -9e-5], [0.4, 0.9], 0.0011)],
+)
+def test_the_tangent_where_a_slip_ends_because_the_rate_of_N_jumps(changed, q, q_dot, duration):
+    """s has the derivative of its place at the time of the knot or the entry; also by a parameter."""
+    step = 1e-5
+    parameter = Parameter(changed(-step), changed(step), step)
+    run = integrate(changed(0.0), q, q_dot, duration, method=FINE, tangent=parameter)
+    ended = run.transitions.t[list(run.transitions.event).index("stick")]
+    if changed is pressed_on:
+        assert ended == run.contacts.t_in[run.contacts.stop == 1][0]
+    else:
+        omega = np.sqrt(4e5 / 0.08)
+        assert ended == pytest.approx(1e-3 / 0.8 + np.arcsin(1e-4 * omega / 0.8) / omega, rel=1e-9)
+    ends = [integrate(changed(d), q, q_dot, duration, method=SHARP).end[:4] for d in (step, -step)]
+    expected = np.column_stack(
+        [by_differences(changed(0.0), q, q_dot, duration, 1e-7), (ends[0] - ends[1]) / (2.0 * step)]
+    )
+    assert np.all(abs(run.tangent - expected).max(axis=0) < 1e-6 * abs(expected).max(axis=0))
+
+
 def test_the_tangent_beside_other_elements():
     """A hole with friction, a slider and a stop on the same place."""
     hole = Contact(EYE[:2, :2], Hertz(1e6), 1e-2, map="annulus", friction=Friction(0.3, 5e4))

@@ -56,6 +56,7 @@ from solvers.compiled.state import (
     HEAD,
     KIND,
     LANDING,
+    LAST_EVENT,
     RECORDED,
     RENEWAL,
     SECOND,
@@ -144,9 +145,11 @@ def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, directi
     if border > 0:
         jump -= force_at(problem, s, below, rate, past.entry_rate[s], derivatives.batch)
     jump *= direction
+    past.now[LAST_EVENT] = t
     for c in range(derivatives.y.shape[0]):
         moved = change_of(problem, variation, derivatives, past.x, c, s, 0, t)
         shift = -moved / rate if abs(rate) > still else 0.0
+        derivatives.shift[c, problem.law.size] = shift
         if entering:
             floored = abs(rate) < problem.floor[s]
             change = change_of(problem, variation, derivatives, past.x, c, s, 1, t) + acceleration * shift

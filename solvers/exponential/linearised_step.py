@@ -37,7 +37,7 @@ class Derivatives(NamedTuple):
 
     y: Annotated[Any, "columns, X"]  # of the state at fixed time
     entry: Annotated[Any, "columns, E"]  # of the latched entry rates
-    shift: Annotated[Any, "columns, E+1"]  # of the entry times, and of the time of the last border
+    shift: Annotated[Any, "columns, E+1"]  # of the entry times, and of the time of the last knot or border
     force: Annotated[Any, "R+L, S"]  # of one column: forces, then signals, at the nodes of a step
     signal: Annotated[Any, "L, S"]  # slopes of the sampled signals there
     response: Annotated[Any, "R, 2, S"]  # of δ and δ̇ to these slopes

@@ -4,9 +4,13 @@ At fixed time the forces on the rows change by their slopes, `friction.row_slope
 
     dF_t = -k_t ds in stick,  ±μ dN in slip,   dN by the latched entry rate.
 
-s is latched at entry, ds = dξ + ξ̇ dt*, and where slip ends, at s = ξ - F_t/k_t: its slope by time is zero there, so
-that ds = dξ - dF_t/k_t does not depend on when. F_t is continuous at all borders. A parameter adds what the forces
-change by at fixed motion, a difference of the two laws ahead and behind.
+s is latched at entry, ds = dξ + ξ̇ dt*, and where slip ends, at s = ξ - F_t/k_t,
+
+    ds = dξ - dF_t/k_t + (ξ̇ - Ḟ_t/k_t) dt*.
+
+There ṡ = ξ̇ - Ḟ_t/k_t falls to zero, so that it does not matter when, unless it jumps with Ṅ, at a knot or an event of
+another element, whose dt* it is. F_t is continuous at all borders. A parameter adds what the forces change by at fixed
+motion, a difference of the two laws ahead and behind.
 """
 
 from __future__ import annotations
@@ -30,7 +34,7 @@ from solvers.compiled.kernels import (
     slider_of,
 )
 from solvers.compiled.sliding import begin_slider, end_slider, normal_force, renew_slider, slopes_of
-from solvers.compiled.state import T
+from solvers.compiled.state import LAST_EVENT, T
 from solvers.exponential.circles.derivative import change_of, explicit_change, is_parameter, row_change
 from solvers.exponential.circles.friction import (
     WAYS,
@@ -129,7 +133,8 @@ def _by_law(problem, ahead, behind, past, variation, s):
 def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
     """Stick, slip or the freedom of a slider ends; where it sticks from then on, s is latched.
 
-    Behind a slip ds does not depend on when; where N begins to grow, ds = dξ + ξ̇ dt*, dt* = -dN/Ṅ.
+    Where slip ends dt* is that of the event which ended it, if one did; where N begins to grow, ds = dξ + ξ̇ dt* with
+    dt* = -dN/Ṅ.
     """
     t, own, entry = past.now[T], slider_of(problem, s), past.entry_rate[s]
     rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
@@ -148,7 +153,10 @@ def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
         found = way_change(problem, variation, derivatives, past.x, c, s, t) - share * pressed
         if is_parameter(variation, derivatives, c):
             pressed, found = pressed + by_law[0], found + by_law[1]
-        found -= speed * pressed / growing if was == FREE and growing != 0.0 else 0.0
+        if was == FREE:
+            found -= speed * pressed / growing if growing != 0.0 else 0.0
+        elif past.now[LAST_EVENT] == t:
+            found += (speed - share * growing) * derivatives.shift[c, problem.law.size]
         derivatives.latched[c, _place(problem, s)] = found if own[CODE] == 0.0 else 0.0
     _keep_together(problem, ahead, behind, variation, s)
 
