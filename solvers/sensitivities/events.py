@@ -44,8 +44,9 @@ def cross(flow: Flow, t: float, row: Array, acting: Acting, span: float, last: A
     if row[at.GUARD] == at.BEGIN:
         return _latch_at_start(flow, t, s, acting), np.zeros(flow.columns)
     if flow.slider(s, acting) is not None and row[at.GUARD] >= 0.0:
-        _renew_slider(flow, t, s, acting, following, np.zeros(flow.columns) if last is None else last)
-        return following, np.zeros(flow.columns)
+        shift = np.zeros(flow.columns) if last is None else last
+        _renew_slider(flow, t, s, acting, following, shift)
+        return following, shift
     memory = row[at.GUARD] >= 0.0
     rate, acceleration = flow.rates(t, s, acting)
     moved, sped = flow.change(t, s)
