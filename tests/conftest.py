@@ -18,18 +18,20 @@ _STEPPING = """
 import solvers, solvers.exponential.linearised
 from contacts import Hertz
 zero, plane, law = [[0.0, 0.0], [0.0, 0.0]], [[1.0, 0.0], [0.0, 1.0]], Hertz(1e6)
-ball = solvers.System(plane, zero, zero, [solvers.Contact([1.0, 0.0], law)])
-disc = solvers.System(plane, zero, zero, [solvers.Contact(plane, law, 1e-4, map="annulus")])
+ball = solvers.Contact([1.0, 0.0], law)
+disc = solvers.Contact(plane, law, 1e-4, map="annulus")
 constant = solvers.Newmark(1e-4), solvers.RK4(1e-4), solvers.HenonRK2(1e-4, 1e-4)
-for system, methods in ((ball, constant), (disc, ())):
+for contact, methods in {runs}:
+    system = solvers.System(plane, zero, zero, [contact])
     for method in (solvers.DormandPrince(), *methods):
         solvers.integrate(system, [0.0, 0.0], [-0.5, 0.0], 1e-3, method=method)
 """
 KERNELS = [
-    f"{_NAMES} load_parts(PROBLEM, range(CIRCLES.start)); advance_of(False)",
+    _STEPPING.replace("{runs}", "[(ball, constant)]"),
+    _STEPPING.replace("{runs}", "[(disc, ())]"),
     f"{_NAMES} load_parts(PLANAR_PROBLEM, range(PLACES)); advance_of(True)",
-    _STEPPING,
-]  # take equally long to compile
+    f"{_NAMES} load_parts(PROBLEM, range(CIRCLES.start)); advance_of(False)",
+]  # each compiled by a process of its own
 
 
 def pytest_xdist_auto_num_workers(config):
