@@ -8,7 +8,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic
-from fembeam.excitation import Harmonic
 from solvers import (
     RK4,
     CentralDifference,
@@ -569,7 +568,7 @@ def test_a_stick_before_an_opening_lasts_as_long_as_that_of_a_second_method(rtol
     law = Hysteretic(1e11, damping_factor=0.86, exponent=1.5, entry_rate_floor=1.2e-5)
     row, across = np.array([-1.19, -0.31]), np.array([0.31, -1.19])
     contact = Contact(row, law, map="oblique", tangent=across, friction=Friction(1.95, 1.6e7))
-    tones = Harmonic(1.0, 41.4), Harmonic(1.0, 41.4, phase=np.pi / 2), Harmonic(1.0, 0.0)
+    tones = Tone(1.0, 41.4), Tone(1.0, 41.4, np.pi / 2), Tone(1.0, 0.0)
     loads = zip([[0.25, -0.24], [-0.23, -0.73], [0.028, 0.052]], tones, strict=True)
     system = System(np.eye(2), np.diag([19.3, 11.0]), np.diag([7750.0, 4110.0]), [contact], list(loads))
     found, other = (
