@@ -73,6 +73,22 @@ def test_a_slip_that_ends_at_a_knot():
     np.testing.assert_allclose(found.states[-1], expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
 
 
+def test_two_slips_that_one_entry_ends():
+    """Two equal walls with dashpots; another stop presses the mass to both at once."""
+    one, push = wall(KelvinVoigt(2e5, 50.0), k_t=2e4), Contact([0.6, -0.8], KelvinVoigt(4e5, 600.0), 4e-4)
+    system = replace(one, contacts=[one.contacts[0], one.contacts[0], push])
+
+    def end(v_n):
+        return integrate(system, [-4e-5, -9e-5], [v_n, 0.9], 0.0011, method=SHARP).end[:4]
+
+    start = [0.0, 0.0, 1.0, 0.0]
+    found = sensitivity(system, [-4e-5, -9e-5], [0.4, 0.9], 0.0011, [0.0011], start=start, method=FINE)
+    stuck = found.solution.transitions
+    assert stuck.t[stuck.event == "stick"].tolist() == 2 * [found.solution.contacts.t_in[2]]
+    expected = five_points(lambda h: end(0.4 + h), 1e-5)
+    np.testing.assert_allclose(found.states[-1], expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
+
+
 # --- matrix level ----------------------------------------------------------------------------------------------------
 
 
