@@ -8,6 +8,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import pytest
 from numba import njit, types
+from numba.core.errors import TypingError
 from numba.core.inline_closurecall import InlineWorker
 from numba.core.registry import cpu_target
 from numba.core.types.functions import BaseFunction
@@ -20,7 +21,7 @@ from solvers import Contact, Exponential, System
 from solvers.compiled import decorators, dop853_tableau
 from solvers.compiled.fields import dimensions_of, packed_type, shapes_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned, unpacker
-from solvers.compiled.shortcuts import Shortcuts
+from solvers.compiled.shortcuts import Shortcuts, known_by_type
 from solvers.compiled.simd import bit_pattern, load8, positive8, splat8, sqrt8, store8, sum8
 from solvers.compiled.sums import combine, padded
 from solvers.exponential.contact.nodes import LOCAL, S, gauss_jacobi, node_sets_of, series_of
@@ -392,6 +393,26 @@ def test_shortcuts_of_the_compiler_end_with_it():
         assert BaseFunction.get_call_type is not own[0]
         raise ZeroDivisionError
     assert (BaseFunction.get_call_type, InlineWorker.inline_function) == own
+
+
+def test_branches_that_a_type_excludes_are_not_compiled():
+    """The branch would not compile; numba's own pruning does not know of the function, whose machine code is right."""
+
+    @known_by_type(lambda kind: False if isinstance(kind, types.Float) else None)
+    @njit
+    def is_text(x):
+        return x == "text"
+
+    @njit
+    def length(x):
+        return len(x) if is_text(x) else 0
+
+    with decorators._SHORTCUTS.taken():
+        assert length(1.5) == 0
+        assert length("text") == 4  # a type of which nothing is known
+        assert length("word") == 0
+        with pytest.raises(TypingError):
+            length(1)
 
 
 LINKED = """

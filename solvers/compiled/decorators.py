@@ -18,7 +18,7 @@ The row of `simd` is of a copy changed by hand. Without `packed` parts cannot be
 of both. `pair_response` returns an array, which only a merged function may: without merging it has to fill one. `parts`
 halve the time of compiling: the first run took 67 s of processor without, 33 s with them, by turns;
 ``python tests/bench/start_up.py`` measures it.
-The methods of numba replaced in `shortcuts` leave 0.76 of the time of compiling, and the same machine code.
+The methods of numba replaced in `shortcuts` leave 0.54 of the time of compiling, and machine code that is no slower.
 ``no_cpython_wrapper`` and ``no_cfunc_wrapper`` save most of the compile time of inner functions and no run time.
 ``_nrt``, ``forceinline`` and these two are not documented by numba, nor are a function's ``_cache`` and what is
 imported of ``numba.core``: hence the upper bound of its version in pyproject.toml. With a new version: raise the bound,

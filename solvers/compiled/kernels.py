@@ -34,6 +34,7 @@ from solvers.compiled.fields import packed_type
 from solvers.compiled.friction import friction_force, slide, slip_of, speed_of, way_of
 from solvers.compiled.packed import PackedType
 from solvers.compiled.parts import RADIAL_ACCELERATION, RADIAL_MOTION, RADIAL_PUSH, part
+from solvers.compiled.shortcuts import known_by_type
 from solvers.problem.friction import ACCOUNTS, ARM, CODE
 
 
@@ -100,11 +101,22 @@ def type_of(problem: Problem) -> types.NamedTuple:
     return PLANAR_PROBLEM if isinstance(problem, PlanarProblem) else PROBLEM
 
 
+def _planar(kind):
+    """Whether a type of the compiler is that of a `PlanarProblem`; None before types are known."""
+    kind = kind.kind if isinstance(kind, PackedType) else kind
+    return issubclass(kind.instance_class, PlanarProblem) if isinstance(kind, types.NamedTuple) else None
+
+
+def _never_on_lines(kind):
+    """What is known of something that only a `PlanarProblem` has."""
+    return None if _planar(kind) is not False else False
+
+
+@known_by_type(_planar)
 @intrinsic
 def is_planar(typingctx, problem):
     """Whether a problem is a `PlanarProblem`; a constant of the compiled code."""
-    kind = problem.kind if isinstance(problem, PackedType) else problem
-    planar = issubclass(kind.instance_class, PlanarProblem)
+    planar = _planar(problem)
     return types.boolean(problem), lambda context, *_: context.get_constant(types.boolean, planar)
 
 
@@ -374,6 +386,7 @@ def place_of(problem, s):
     return problem.own[s] if is_planar(problem) else s
 
 
+@known_by_type(_never_on_lines)
 @inlined
 def rubs(problem, s):
     """Whether a stop has friction."""
@@ -479,6 +492,7 @@ def add_sideways(problem, s, force, x, rate):
     _add_to_rows(problem, s, u, w, 0.0, force, rate)
 
 
+@known_by_type(_never_on_lines)
 @inlined
 def is_circle(problem, s):
     """Whether a stop is a circular clearance."""
