@@ -30,7 +30,7 @@ from solvers.compiled.kernels import (
     PLANAR_PROBLEM,
     acceleration_of,
     add_push,
-    add_sideways,
+    add_tangential,
     call_gradient,
     contact_forces,
     contact_gradient,
@@ -68,7 +68,7 @@ from solvers.compiled.state import (
 )
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.derivative import add_radial_change, change_of, explicit_change, is_parameter
-from solvers.exponential.circles.friction import share_of
+from solvers.exponential.circles.friction import friction_by_normal
 from solvers.exponential.circles.friction_derivative import (
     add_rubbing_change,
     begin_rubbing,
@@ -115,7 +115,7 @@ def _begin(problem, ahead, behind, past, scratch, derivatives, variation):
     """Find the segments of the stops as the run does at its start, and latch the derivatives of their rates."""
     for s in range(problem.law.size):
         if rubs(problem, s):
-            scratch.row_ways[6 * s, 0] = slider_of(problem, s)[CODE]
+            scratch.row_directions_at_nodes[6 * s, 0] = slider_of(problem, s)[CODE]
     begin_contacts(problem, past)
     for s in range(problem.law.size):
         if past.segment[s] > 0:
@@ -123,7 +123,7 @@ def _begin(problem, ahead, behind, past, scratch, derivatives, variation):
             for c in range(derivatives.y.shape[0]):
                 change = change_of(problem, variation, derivatives, past.x, c, s, 1, 0.0)
                 derivatives.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
-            if rubs(problem, s) and scratch.row_ways[6 * s, 0] == FREE:
+            if rubs(problem, s) and scratch.row_directions_at_nodes[6 * s, 0] == FREE:
                 latch_begin(problem, ahead, behind, past, derivatives, variation, s)
 
 
@@ -157,8 +157,8 @@ def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, directi
             derivatives.entry[c, s] = 0.0 if floored else change
         add_push(problem, s, -jump * shift, past.x, derivatives.y[c])
         if rubs(problem, s) and border > 0:
-            drag = share_of(slider_of(problem, s)) * jump
-            add_sideways(problem, s, -drag * shift, past.x, derivatives.y[c])
+            drag = friction_by_normal(slider_of(problem, s)) * jump
+            add_tangential(problem, s, -drag * shift, past.x, derivatives.y[c])
     past.segment[s] += direction
     if rubs(problem, s) and entering:
         begin_rubbing(problem, ahead, behind, past, derivatives, variation, s)

@@ -91,7 +91,7 @@ def _latch_slider(flow: Flow, t: float, s: int, begun: Acting, shift: Array) -> 
     """What a slider latches that sticks as its contact begins: s = ξ then."""
     flow.latched[s][:] = 0.0
     if flow.slider(s, begun).sticks:  # type: ignore[union-attr]
-        flow.latched[s][1] = flow.way_change(t, s) + float(flow.motion_of(t, s).speed[0]) * shift
+        flow.latched[s][1] = flow.xi_change(t, s) + float(flow.motion_of(t, s).speed[0]) * shift
     return begun
 
 
@@ -107,14 +107,14 @@ def _renew_slider(flow: Flow, t: float, s: int, acting: Acting, following: Actin
         return
     if before.free:
         _, growing, pressed = flow.at_instant(t, s, acting.changed(s, rows=before.uncut(acting.rows[s])))
-        flow.latched[s][1] = flow.way_change(t, s) - float(flow.motion_of(t, s).speed[0]) * pressed / growing
+        flow.latched[s][1] = flow.xi_change(t, s) - float(flow.motion_of(t, s).speed[0]) * pressed / growing
         return
     numbers = slider.numbers
     _, growing, pressed = flow.at_instant(t, s, acting)
     normal = flow.force(t, s, acting)
     force, share = before.force(np.zeros(1), normal)[0], before.share(normal)[0]
     rate = float(flow.motion_of(t, s).speed[0]) - share / numbers[STIFFNESS] * growing
-    flow.latched[s][1] = flow.way_change(t, s) - share / numbers[STIFFNESS] * pressed + rate * shift
+    flow.latched[s][1] = flow.xi_change(t, s) - share / numbers[STIFFNESS] * pressed + rate * shift
     if numbers[MU]:
         one = flow.by.elements[s]
         changed = one.mu / numbers[MU] - one.stiffness / numbers[STIFFNESS]

@@ -129,7 +129,7 @@ class Flow:
         found[0][self.own] -= np.sign(self.system.contacts[s].circle) * self.by.elements[s].clearance
         return found
 
-    def way_change(self, t: float, s: int) -> Array:
+    def xi_change(self, t: float, s: int) -> Array:
         """dξ (m,) of an element with friction at fixed time."""
         motion = self.motion_of(t, s)
         found, one = motion.rub[:, 0] @ self._rows_change(t, s)[0], self.by.elements[s]

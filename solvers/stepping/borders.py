@@ -23,15 +23,15 @@ from solvers.compiled.kernels import (
     rubs,
     slider_of,
 )
-from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
+from solvers.compiled.renewals import count_event, margins, margins_before, margins_in, renew
 from solvers.compiled.sliding import (
     POINT,
-    SPEED,
-    WAY,
+    XI,
+    XI_RATE,
     move_point,
     point_of,
     slider_margins,
-    way_tolerance,
+    xi_tolerances,
 )
 from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
 from solvers.problem.friction import CODE
@@ -58,15 +58,15 @@ def _present_of_slider(problem, state, space, s, t, x, rate):
     point_of(problem, s, t, x, rate, point)
     scale[0] = max(scale[0], 4.0 * surface_tolerance(problem, s, x))
     scale[1] = max(scale[1], rate_tolerance(problem, s, x))
-    way, speed = way_tolerance(problem, s, t, x)
-    scale[2], scale[3] = max(scale[2], 4.0 * way), max(scale[3], speed)
+    xi, xi_rate = xi_tolerances(problem, s, t, x)
+    scale[2], scale[3] = max(scale[2], 4.0 * xi), max(scale[3], xi_rate)
     segment, entry, present, count = state.segment[s], state.entry_rate[s], space.present[s], problem.border_count[s]
     slider_margins(problem, s, segment, entry, point, present)
     for j in range(count):
         space.rounding[s, j] = 1e-15 * abs(present[j])
     for i in range(4):
         copy(point, moved, POINT)
-        moved[i if i < 2 else WAY if i == 2 else SPEED] += scale[i]
+        moved[i if i < 2 else XI if i == 2 else XI_RATE] += scale[i]
         slider_margins(problem, s, segment, entry, moved, space.one)
         for j in range(count):
             space.rounding[s, j] += abs(space.one[j] - present[j])
@@ -288,7 +288,7 @@ def renew_border(problem, state, space, s, j):
     else:
         delta, rate = margins_in(problem, state, s, state.x, space.trial, space.margin)
     renew(problem, state, s, j, delta, rate)
-    note_event(state)
+    count_event(state)
 
 
 @kernel
@@ -318,7 +318,7 @@ def renew_together(problem, state, space, h, element, border):
                 renew(problem, state, s, j, delta, rate)
                 if not rubs(problem, s):
                     _present(problem, state, space, s, state.now[T], state.x, state.rate)
-    note_event(state)
+    count_event(state)
 
 
 @inner
@@ -338,5 +338,5 @@ def renew_passed(problem, state, space):
                 _present(problem, state, space, s, state.now[T], state.x, state.rate)
                 found = True
     if found:
-        note_event(state)
+        count_event(state)
     return found

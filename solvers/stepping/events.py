@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from solvers.compiled.friction import slide, slide_acceleration
+from solvers.compiled.friction import xi_acceleration_of, xi_and_rate_of
 from solvers.compiled.kernels import (
     dot,
     indentation,
@@ -21,7 +21,7 @@ from solvers.compiled.kernels import (
     radius_of,
     slider_of,
 )
-from solvers.compiled.sliding import ACCELERATION, DELTA, RATE, SPEED, WAY, WAY_ACCELERATION
+from solvers.compiled.sliding import ACCELERATION, DELTA, RATE, XI, XI_ACCELERATION, XI_RATE
 from solvers.compiled.state import surface_tolerance
 
 # finer near 0, where a contact just left may come back
@@ -77,7 +77,7 @@ def _slope(coefficients, theta):
 @inner
 def point_at(problem, s, t, h, theta, coefficients, point):
     """Motion of an element with friction at θ of a step of duration h from t, see `compiled.sliding`."""
-    radius, own, turned, turning, turning_rate = radius_of(problem, s), slider_of(problem, s), 0.0, 0.0, 0.0
+    radius, slider, turned, turning, turning_rate = radius_of(problem, s), slider_of(problem, s), 0.0, 0.0, 0.0
     u, u_dot = polynomial(coefficients[0], theta), polynomial(coefficients[1], theta)
     w, w_dot = polynomial(coefficients[2], theta), polynomial(coefficients[3], theta)
     u_twice, w_twice = _slope(coefficients[1], theta) / h, _slope(coefficients[3], theta) / h
@@ -91,8 +91,8 @@ def point_at(problem, s, t, h, theta, coefficients, point):
         along = speed + u * u_twice + w * w_twice
         twice = (along - product * product / square) / math.sqrt(square)
         point[ACCELERATION] = twice if radius > 0.0 else -twice
-    point[WAY], point[SPEED] = slide(radius, own, t + theta * h, u, u_dot, w, w_dot, turned, turning)
-    point[WAY_ACCELERATION] = slide_acceleration(radius, own, u, u_dot, u_twice, w, w_dot, w_twice, turning_rate)
+    point[XI], point[XI_RATE] = xi_and_rate_of(radius, slider, t + theta * h, u, u_dot, w, w_dot, turned, turning)
+    point[XI_ACCELERATION] = xi_acceleration_of(radius, slider, u, u_dot, u_twice, w, w_dot, w_twice, turning_rate)
 
 
 @inner

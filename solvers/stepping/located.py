@@ -19,7 +19,7 @@ from solvers.compiled.kernels import (
     slider_of,
 )
 from solvers.compiled.renewals import most_rows
-from solvers.compiled.sliding import DELTA, RATE, WAY, normal_force
+from solvers.compiled.sliding import DELTA, RATE, XI, normal_force
 from solvers.compiled.state import (
     AT_ONCE,
     CALLS,
@@ -99,8 +99,8 @@ def _peak_of_friction(problem, state, space, h, s):
         if value > best:
             best, place = value, i
     a, b = _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
-    own = slider_of(problem, s)
-    own[PEAK] = max(own[PEAK], best, golden_section(_friction_at, known, a, b)[1])
+    slider = slider_of(problem, s)
+    slider[PEAK] = max(slider[PEAK], best, golden_section(_friction_at, known, a, b)[1])
 
 
 @inner
@@ -111,7 +111,7 @@ def _friction_at(known, theta):
     normal = normal_force(
         problem, s, state.segment[s], state.entry_rate[s], space.point[0, DELTA], space.point[0, RATE]
     )
-    return abs(friction_force(radius_of(problem, s), slider_of(problem, s), space.point[0, WAY], normal))
+    return abs(friction_force(radius_of(problem, s), slider_of(problem, s), space.point[0, XI], normal))
 
 
 @inner

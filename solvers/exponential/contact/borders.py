@@ -28,7 +28,7 @@ from solvers.compiled.kernels import (
     slider_of,
 )
 from solvers.compiled.parts import PASSED, part
-from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
+from solvers.compiled.renewals import count_event, margins, margins_before, margins_in, renew
 from solvers.compiled.sliding import DELTA, RATE
 from solvers.compiled.state import LAST_EVENT, T, rate_tolerance, surface_tolerance
 from solvers.exponential.contact.crossings import extremum
@@ -394,7 +394,7 @@ def renew_border(problem, state, scratch, element, border):
     delta, rate = margins_of(problem, state, scratch, element, state.now[T], state.x, scratch.margin)
     _update_rate(problem, state, scratch, element)
     renew(problem, state, element, border, delta, rate)
-    note_event(state)
+    count_event(state)
 
 
 @inner
@@ -431,4 +431,4 @@ def renew_all(problem, state, scratch, element, border):
                 renew(problem, state, s, j, depth, speed)
                 if not rubs(problem, s):
                     margins_of(problem, state, scratch, s, state.now[T], state.x, scratch.margin)
-    note_event(state)
+    count_event(state)

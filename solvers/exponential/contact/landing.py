@@ -27,7 +27,7 @@ import math
 import numpy as np
 
 from solvers.compiled.dop853_tableau import E3, E5, STAGES
-from solvers.compiled.friction import drawn
+from solvers.compiled.friction import spring_stretch
 from solvers.compiled.kernels import (
     abs_dot,
     contact_gradient,
@@ -49,7 +49,7 @@ from solvers.compiled.kernels import (
     slider_of,
 )
 from solvers.compiled.parts import PASSED
-from solvers.compiled.sliding import WAY, slider_force, way_tolerance
+from solvers.compiled.sliding import XI, slider_force, xi_tolerances
 from solvers.compiled.state import (
     CALLS,
     LANDING,
@@ -243,8 +243,8 @@ def _begin_peaks(problem, state, scratch):
             column = first + 2 * s
             state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], work[0, column] / work[0, size])
             if rubs(problem, s):
-                own, column = slider_of(problem, s), problem.friction[s, 1] + 1
-                own[PEAK] = max(own[PEAK], abs(work[0, column] / work[0, size]))
+                slider, column = slider_of(problem, s), problem.friction[s, 1] + 1
+                slider[PEAK] = max(slider[PEAK], abs(work[0, column] / work[0, size]))
 
 
 @inner
@@ -258,7 +258,7 @@ def _friction_after(problem, tables, state, scratch, variable, stop, length, s):
 @inner
 def _locate_friction_peak(problem, tables, state, scratch, variable, stop, span, s):
     """Raise the largest |F_t| of stop s by its maximum inside a landing, found by successive parabolas."""
-    a, b, c, own = 0.0, 0.5 * span, span, slider_of(problem, s)
+    a, b, c, slider = 0.0, 0.5 * span, span, slider_of(problem, s)
     low = _friction_after(problem, tables, state, scratch, variable, stop, a, s)
     best = _friction_after(problem, tables, state, scratch, variable, stop, b, s)
     high = _friction_after(problem, tables, state, scratch, variable, stop, c, s)
@@ -277,7 +277,7 @@ def _locate_friction_peak(problem, tables, state, scratch, variable, stop, span,
             a, low = vertex, value
         else:
             c, high = vertex, value
-    own[PEAK] = max(own[PEAK], best)
+    slider[PEAK] = max(slider[PEAK], best)
 
 
 @inlined
@@ -457,8 +457,8 @@ def _event_function(problem, tables, state, scratch, stop, border, x, sign):
     margins_of(problem, state, scratch, stop, x[state.x.size], x, scratch.margin)
     value = scratch.margin[border]
     if is_planar(problem) and sign != 0.0:
-        own = slider_of(problem, stop)
-        force = own[STIFFNESS] * drawn(radius_of(problem, stop), own, scratch.point[1, WAY])
+        slider = slider_of(problem, stop)
+        force = slider[STIFFNESS] * spring_stretch(radius_of(problem, stop), slider, scratch.point[1, XI])
         if value < 0.0:
             sign = math.copysign(1.0, force)
         value += abs(force) - sign * force
@@ -496,13 +496,13 @@ def _guess_before_opening(problem, tables, state, scratch, stop, border, guess):
     Otherwise, and where the margin begins at zero, the length follows from the ``guess`` of the time with δ̇ constant,
     and the sign is 0. Largest margin and rounding up to the opening go to ``scratch``.
     """
-    u, delta, own = scratch.stages[START, state.x.size + 1], scratch.start_motion[stop, 0], slider_of(problem, stop)
-    w, kappa, sticks = scratch.stages[START], tables.time_exponent[1 + stop], 1.0 if own[CODE] == 0.0 else 0.0
+    u, delta, slider = scratch.stages[START, state.x.size + 1], scratch.start_motion[stop, 0], slider_of(problem, stop)
+    w, kappa, sticks = scratch.stages[START], tables.time_exponent[1 + stop], 1.0 if slider[CODE] == 0.0 else 0.0
     begin, _ = _event_function(problem, tables, state, scratch, stop, border, w, 0.0)
     _step(problem, tables, state, scratch, np.int64(ROOT), stop, -u)
     end, sign = _event_function(problem, tables, state, scratch, stop, border, scratch.stages[LANDED], sticks)
     largest = max(abs(begin), abs(scratch.margin[border]))
-    rounding = own[STIFFNESS] * way_tolerance(problem, stop, state.now[T], state.x)[0]
+    rounding = slider[STIFFNESS] * xi_tolerances(problem, stop, state.now[T], state.x)[0]
     scratch.largest[stop, border], scratch.noise[stop, border] = (
         largest,
         max(_ROUNDING * largest, 2.0 * rounding),

@@ -186,9 +186,9 @@ def state_peaks(problem, state, scratch, x):
             state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], batch[0])
             state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], batch[2])
             if rubs(problem, s):
-                own = slider_of(problem, s)
+                slider = slider_of(problem, s)
                 force = slider_force(problem, s, state.segment[s], state.entry_rate[s], state.now[T], x)
-                own[PEAK] = max(own[PEAK], abs(force))
+                slider[PEAK] = max(slider[PEAK], abs(force))
 
 
 @inner

@@ -61,9 +61,9 @@ def note_energy(problem, tables, state, scratch):
                 )
         work, impulse = state.x[2 * n + 2 + 2 * s], abs(state.x[2 * n + 3 + 2 * s])
         if rubs(problem, s):  # |F_t| <= μN; the work of a prescribed spin is given
-            own, account = slider_of(problem, s), problem.friction[s, 1]
-            impulse *= 1.0 + own[MU]
-            work += state.x[account] - own[ARM] * own[SPIN] * state.x[account + 1]
+            slider, account = slider_of(problem, s), problem.friction[s, 1]
+            impulse *= 1.0 + slider[MU]
+            work += state.x[account] - slider[ARM] * slider[SPIN] * state.x[account + 1]
         if problem.knots[s, 0] < 0.0:  # a force of both signs
             impulse = state.active[s, PEAK_FORCE] * state.now[T]
         allowed += 2.0 * steady * impulse - work
