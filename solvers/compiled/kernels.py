@@ -469,11 +469,8 @@ def _add_to_rows(problem, s, u, w, normal, tangential, rate):
             rate[i] += problem.push[first, i] * normal - problem.push[first + 1, i] * tangential
         return
     square = u * u + w * w
-    tangential_share, normal_share = (
-        tangential * abs(radius) / square,
-        math.copysign(normal, normal * radius) / math.sqrt(square),
-    )
-    first_force, second_force = normal_share * u - tangential_share * w, normal_share * w + tangential_share * u
+    share_t, share_n = tangential * abs(radius) / square, math.copysign(normal, normal * radius) / math.sqrt(square)
+    first_force, second_force = share_n * u - share_t * w, share_n * w + share_t * u
     for i in range(size):
         rate[i] += problem.push[first, i] * first_force + problem.push[first + 1, i] * second_force
     if first + 2 < row_of(problem, s + 1):

@@ -234,14 +234,11 @@ def end_slider(problem, s):
 def xi_tolerances(problem, s, t, x):
     """Rounding of ξ, m, and of ξ̇, m/s; of an oblique stop both are read by the second row alone."""
     slider, first, size = slider_of(problem, s), problem.first[s], 2 * problem.k.size
-    xi, xi_rate = (
-        TURN * abs(radius_of(problem, s)) + abs(slider[ARM] * slider[SPIN] * t),
-        abs(slider[ARM] * slider[SPIN]),
-    )
+    xi, rate = TURN * abs(radius_of(problem, s)) + abs(slider[ARM] * slider[SPIN] * t), abs(slider[ARM] * slider[SPIN])
     for r in range(first if is_circle(problem, s) else first + 1, problem.first[s + 1]):
         xi += abs(problem.gap[r]) + abs_dot(problem.read[r], x, size)
-        xi_rate += abs_dot(problem.read_rate[r], x, size)
-    return 1e-15 * xi + 1e-20, 1e-13 * xi_rate
+        rate += abs_dot(problem.read_rate[r], x, size)
+    return 1e-15 * xi + 1e-20, 1e-13 * rate
 
 
 @inner

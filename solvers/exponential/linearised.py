@@ -115,7 +115,7 @@ def _begin(problem, ahead, behind, past, scratch, derivatives, variation):
     """Find the segments of the stops as the run does at its start, and latch the derivatives of their rates."""
     for s in range(problem.law.size):
         if rubs(problem, s):
-            scratch.row_directions_at_nodes[6 * s, 0] = slider_of(problem, s)[CODE]
+            scratch.node_directions[6 * s, 0] = slider_of(problem, s)[CODE]
     begin_contacts(problem, past)
     for s in range(problem.law.size):
         if past.segment[s] > 0:
@@ -123,7 +123,7 @@ def _begin(problem, ahead, behind, past, scratch, derivatives, variation):
             for c in range(derivatives.y.shape[0]):
                 change = change_of(problem, variation, derivatives, past.x, c, s, 1, 0.0)
                 derivatives.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
-            if rubs(problem, s) and scratch.row_directions_at_nodes[6 * s, 0] == FREE:
+            if rubs(problem, s) and scratch.node_directions[6 * s, 0] == FREE:
                 latch_begin(problem, ahead, behind, past, derivatives, variation, s)
 
 

@@ -171,15 +171,9 @@ def _is_any_near(problem, tables, scratch, x):
 @merged
 def _cross_cells(problem, tables, energy_tables, state, scratch, most):
     """Cross whole cells while no stop is near; returns how many, ``most`` at most."""
-    h, x, current, clock, with_energy = (
-        problem.table_dt[0],
-        scratch.split_state,
-        0,
-        state.now,
-        energy_tables.active > 0.0,
-    )
-    begin, offset = cell_of(problem, clock[T])
-    end = min(int(clock[T_END] / h), begin + most, problem.table_start[1] - problem.table_start[0] - 1)
+    h, x, current, now, with_energy = problem.table_dt[0], scratch.split_state, 0, state.now, energy_tables.active > 0.0
+    begin, offset = cell_of(problem, now[T])
+    end = min(int(now[T_END] / h), begin + most, problem.table_start[1] - problem.table_start[0] - 1)
     cell, bounded = begin, begin
     if abs(offset) < 1e-7 * h:
         split(problem, state.x, x[0])
@@ -195,7 +189,7 @@ def _cross_cells(problem, tables, energy_tables, state, scratch, most):
                 break
             cell += 1
             if state.due[state.count[SAMPLED]] < cell * h:
-                clock[T] = min(cell * h, clock[T_END])
+                now[T] = min(cell * h, now[T_END])
                 copy_split(x[current], x[2])
                 _sample(problem, tables, energy_tables, state, scratch, (cell - 1) * h)
             if with_energy:
@@ -205,7 +199,7 @@ def _cross_cells(problem, tables, energy_tables, state, scratch, most):
             current = 1 - current
         if cell > begin:
             join(problem, x[current], state.x)
-            clock[T] = min(cell * h, clock[T_END])
+            now[T] = min(cell * h, now[T_END])
             state.count[STEPS] += cell - begin
             if with_energy:
                 start_account(problem, state, scratch)

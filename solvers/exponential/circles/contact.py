@@ -45,17 +45,13 @@ _TINY = 1e-300  # m²: makes δ̇ at the centre, where there is no direction, 0 
 @inlined
 def _radial_nodes(problem, scratch, s):
     """Write δ and δ̇ at the nodes from the motion of both rows; returns both components of σ e."""
-    u, w, radial = (
-        scratch.motion[problem.first[s]],
-        scratch.motion[problem.first[s] + 1],
-        scratch.motion[problem.own[s]],
-    )
+    u, w, own = scratch.motion[problem.first[s]], scratch.motion[problem.first[s] + 1], scratch.motion[problem.own[s]]
     along, across, sign = load8(u[0], 0), load8(w[0], 0), 1.0 if problem.radius[s] > 0.0 else -1.0
     r = sqrt8(along * along + across * across + splat8(_TINY))
     turned = splat8(sign) / r
     along, across = along * turned, across * turned
-    store8(radial[0], 0, splat8(sign) * r - splat8(problem.radius[s]))
-    store8(radial[1], 0, along * load8(u[1], 0) + across * load8(w[1], 0))
+    store8(own[0], 0, splat8(sign) * r - splat8(problem.radius[s]))
+    store8(own[1], 0, along * load8(u[1], 0) + across * load8(w[1], 0))
     return along, across
 
 
@@ -75,8 +71,8 @@ def radial_nodes(problem, scratch, s):
 def _radial_forces(problem, tables, state, scratch, s):
     """Write N at the nodes for the motion of both rows, and its components, into ``scratch.law_force``."""
     along, across = _radial_nodes(problem, scratch, s)
-    row, radial = problem.first[s], problem.own[s]
-    motion, force = scratch.motion[radial], scratch.law_force[radial]
+    row, own = problem.first[s], problem.own[s]
+    motion, force = scratch.motion[own], scratch.law_force[own]
     law = tables.power_law[s]
     if law[EXPONENT] > 0.0:
         deep, rate = positive8(load8(motion[0], 0)), load8(motion[1], 0)

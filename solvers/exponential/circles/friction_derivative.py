@@ -175,10 +175,7 @@ def store_row_directions(problem, scratch, s):
         u, w = scratch.motion[first, 0, i], scratch.motion[first + 1, 0, i]
         for a in range(count_of(problem, s)):
             by_delta, by_xi = row_directions(problem, s, u, w, a)
-            scratch.row_directions_at_nodes[6 * s + 2 * a, i], scratch.row_directions_at_nodes[6 * s + 2 * a + 1, i] = (
-                by_delta,
-                by_xi,
-            )
+            scratch.node_directions[6 * s + 2 * a, i], scratch.node_directions[6 * s + 2 * a + 1, i] = by_delta, by_xi
 
 
 @inner
@@ -227,19 +224,16 @@ def rubbing_residual(problem, tables, scratch, derivatives, variation, node_set,
     parameter, latched = is_parameter(variation, derivatives, c), derivatives.latched[c, _latched_place(problem, s)]
     for i in range(S):
         t = begin + tables.contact_step[level] * tables.times[node_set, i]
-        normal_change = derivatives.entry[c, s] * scratch.slope[s, 2, i]
-        friction_change = friction_by_normal(slider) * normal_change - friction_by_xi(slider) * latched
+        d_normal = derivatives.entry[c, s] * scratch.slope[s, 2, i]
+        d_friction = friction_by_normal(slider) * d_normal - friction_by_xi(slider) * latched
         if parameter and variation.law_step > 0.0:
-            normal_change, friction_change = (
-                normal_change + derivatives.by_rows[first, i],
-                friction_change + derivatives.by_rows[first + 1, i],
+            d_normal, d_friction = (
+                d_normal + derivatives.by_rows[first, i],
+                d_friction + derivatives.by_rows[first + 1, i],
             )
         for a in range(m):
-            by_delta, by_xi = (
-                scratch.row_directions_at_nodes[6 * s + 2 * a, i],
-                scratch.row_directions_at_nodes[6 * s + 2 * a + 1, i],
-            )
-            change = by_delta * normal_change + by_xi * friction_change
+            by_delta, by_xi = scratch.node_directions[6 * s + 2 * a, i], scratch.node_directions[6 * s + 2 * a + 1, i]
+            change = by_delta * d_normal + by_xi * d_friction
             for b in range(m):
                 for d in range(2):
                     value = scratch.motion[first + b, d, i]
@@ -286,16 +280,13 @@ def add_rubbing_change(problem, ahead, behind, derivatives, variation, s, entry_
     row_slopes(problem, s, motion, 0, rate, normal, tangential, by_delta, by_rate, slopes)
     for c in range(derivatives.y.shape[0]):
         y, latched = derivatives.trial[c], derivatives.latched[c, _latched_place(problem, s)]
-        normal_change = by_entry * derivatives.entry[c, s]
-        friction_change = friction_by_normal(slider) * normal_change - friction_by_xi(slider) * latched
+        d_normal = by_entry * derivatives.entry[c, s]
+        d_friction = friction_by_normal(slider) * d_normal - friction_by_xi(slider) * latched
         if is_parameter(variation, derivatives, c):
-            normal_change, friction_change = (
-                normal_change + normal_by_parameter,
-                friction_change + friction_by_parameter,
-            )
+            d_normal, d_friction = d_normal + normal_by_parameter, d_friction + friction_by_parameter
         for a in range(m):
             press, rub = row_directions(problem, s, motion[0, 0, 0], motion[1, 0, 0], a)
-            change = press * normal_change + rub * friction_change
+            change = press * d_normal + rub * d_friction
             for b in range(m):
                 for d in range(2):
                     moved = row_change(problem, variation, derivatives, y, c, first + b, d, t)

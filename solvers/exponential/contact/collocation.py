@@ -256,7 +256,7 @@ def _derivative_error(problem, tables, state, scratch, h):
     2.7e-11 (ωh)^9; ẍ = -c ẋ with less than that for ω = c. A strong dashpot that would take too many steps is ignored
     once its motion has decayed since the last event; then only the slow decay rate k/c counts.
     """
-    square, out, time_since_event = 0.0, scratch.local_motion[FORCES], state.now[T] - max(state.now[LAST_EVENT], 0.0)
+    square, out, since = 0.0, scratch.local_motion[FORCES], state.now[T] - max(state.now[LAST_EVENT], 0.0)
     for s in range(problem.law.size):
         if state.segment[s] == 0:
             continue
@@ -270,11 +270,7 @@ def _derivative_error(problem, tables, state, scratch, h):
         if rubs(problem, s):
             stiffness = max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
         stiffness, damping = stiffness * mobility, largest_size(slopes[1]) * mobility
-        faded = (
-            damping**2 > 4.0 * stiffness
-            and damping * time_since_event > _FADED
-            and damping * state.now[T_END] > _MOST_RADIANS
-        )
+        faded = damping**2 > 4.0 * stiffness and damping * since > _FADED and damping * state.now[T_END] > _MOST_RADIANS
         square += (stiffness / damping if faded else math.sqrt(stiffness) + damping) ** 2
     scratch.stiffened[0] = math.sqrt(square)
     angle = scratch.stiffened[0] * h

@@ -147,10 +147,8 @@ def _memory_force_error(problem, state, scratch, s, span):
     deltas[1], rates[1] = indentation_and_rate(problem, s, work[LANDED])
     contact_gradient(problem, s, deltas, rates, state.entry_rate[s], slope[0], slope[1], slope[2])
     by_delta, by_rate = max(abs(slope[0, 0]), abs(slope[0, 1])), max(abs(slope[1, 0]), abs(slope[1, 1]))
-    slope_changes = (
-        abs(slope[0, 0] - slope[0, 1]) > STRAIGHT * by_delta or abs(slope[1, 0] - slope[1, 1]) > STRAIGHT * by_rate
-    )
-    if not slope_changes:
+    varies = abs(slope[0, 0] - slope[0, 1]) > STRAIGHT * by_delta or abs(slope[1, 0] - slope[1, 1]) > STRAIGHT * by_rate
+    if not varies:
         return 0.0
     for i in range(1, STAGES):
         largest_force = max(largest_force, abs(work[i, impulse]) / work[i, state.x.size])
@@ -334,7 +332,7 @@ def _accept(problem, tables, state, scratch, variable, stop, level, span):
 
 
 @inlined
-def _longest_landing(problem, tables, state, scratch):
+def _longest_time(problem, tables, state, scratch):
     """Longest landing, s: `landing_reach` over the fastest rate, and at most a cell of the sampled signals.
 
     For the derivative of a run it is also `landing_reach` over the frequency to which contacts stiffen the structure.
@@ -363,7 +361,7 @@ def _derivative_factor(problem, tables, state, stop, w, x):
 
 
 @inlined
-def _border_indentation(problem, state, stop, direction):
+def _knot(problem, state, stop, direction):
     """Indentation, m, at the upper (direction 1) or lower (-1) border of the stop's segment."""
     return problem.knots[stop, state.segment[stop] - (1 if direction < 0 else 0)]
 
@@ -375,7 +373,7 @@ def may_land(problem, tables, state, scratch, stop, direction, time_to_border):
     It reads δ and δ̇ at the start of the step from ``scratch.start_motion``.
     """
     delta, rate = scratch.start_motion[stop, 0], scratch.start_motion[stop, 1]
-    if time_to_border > _longest_landing(problem, tables, state, scratch) or abs(rate) <= rate_tolerance(
+    if time_to_border > _longest_time(problem, tables, state, scratch) or abs(rate) <= rate_tolerance(
         problem, stop, state.x
     ):
         return False
@@ -384,7 +382,7 @@ def may_land(problem, tables, state, scratch, stop, direction, time_to_border):
         if tables.time_exponent[1 + stop] == 2.0:
             limit = min(_LAST_STEP_ROOT * scratch.accuracy[REACH] ** 2, _MOST_ROOT)
         return delta <= limit * state.active[stop, PEAK_DELTA]
-    level = _border_indentation(problem, state, stop, direction)
+    level = _knot(problem, state, stop, direction)
     return state.segment[stop] == 0 or abs(level - delta) <= 0.2 * max(level, delta)
 
 
@@ -411,16 +409,12 @@ def land(problem, tables, state, scratch, stop, direction, time_to_border):
     scratch.landed[0] = -1
     if not may_land(problem, tables, state, scratch, stop, direction, time_to_border):
         return -1
-    longest, kappa = _longest_landing(problem, tables, state, scratch), tables.time_exponent[1 + stop]
+    longest, kappa = _longest_time(problem, tables, state, scratch), tables.time_exponent[1 + stop]
     leaving = direction < 0 and state.segment[stop] == 1
     start_landing(problem, tables, state, scratch, stop, np.int64(ROOT))
     w, x = scratch.stages[START], scratch.stages[LANDED]
     variable = ROOT if leaving and kappa > 1.0 else INDENTATION
-    span = (
-        -w[size + 1]
-        if variable == ROOT
-        else _border_indentation(problem, state, stop, direction) - scratch.start_motion[stop, 0]
-    )
+    span = -w[size + 1] if variable == ROOT else _knot(problem, state, stop, direction) - scratch.start_motion[stop, 0]
     _step(problem, tables, state, scratch, variable, stop, span)
     landed, share = x[size], _error_share(problem, tables, state, scratch, variable, stop)
     time_rounding = surface_tolerance(problem, stop, state.x) / abs(rate)  # the distance may be rounding
@@ -439,7 +433,7 @@ def land(problem, tables, state, scratch, stop, direction, time_to_border):
             other = TOO_LONG
     if other != CLEAR:
         return max(other, -1)
-    level = _border_indentation(problem, state, stop, direction)
+    level = _knot(problem, state, stop, direction)
     accepted = _accept(problem, tables, state, scratch, variable, stop, level, span)
     return stop if accepted else -1
 
@@ -503,10 +497,7 @@ def _guess_before_opening(problem, tables, state, scratch, stop, border, guess):
     end, sign = _event_function(problem, tables, state, scratch, stop, border, scratch.stages[LANDED], sticks)
     largest = max(abs(begin), abs(scratch.margin[border]))
     rounding = slider[STIFFNESS] * xi_tolerances(problem, stop, state.now[T], state.x)[0]
-    scratch.largest[stop, border], scratch.noise[stop, border] = (
-        largest,
-        max(_ROUNDING * largest, 2.0 * rounding),
-    )
+    scratch.largest[stop, border], scratch.noise[stop, border] = largest, max(_ROUNDING * largest, 2.0 * rounding)
     if sticks > 0.0 and end < 0.0 and begin > _ON_BORDER * largest:
         begin, _ = _event_function(problem, tables, state, scratch, stop, border, w, sign)
         return u * (1.0 - (end / (end - begin)) ** (1.0 / _margin_power(tables, stop))), sign
@@ -585,10 +576,7 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
     If another border is crossed before, ``scratch.landed`` holds its element and number; its first entry is -1 if there
     is none, `UNRESOLVED` if a shorter step must tell.
     """
-    limit, largest = (
-        _longest_landing(problem, tables, state, scratch),
-        scratch.bend_values[scratch.bend_values.size - 1],
-    )
+    limit, largest = _longest_time(problem, tables, state, scratch), scratch.bend_values[scratch.bend_values.size - 1]
     tolerance, sign = 1e-10 * largest, 0.0
     if border >= 0:  # if it were missed by more, the next step might cross it in the wrong direction
         largest, tolerance = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]

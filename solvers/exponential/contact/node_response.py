@@ -111,9 +111,7 @@ class Scratch(NamedTuple):
         Any, "G, 4, S"
     ]  # ξ, ξ̇ and F_t at the nodes, then eight numbers for use within a function; see `circles.friction`
     row_slopes: Annotated[Any, "9*G, 2, S"]  # of forces on the rows of an element with friction, by these
-    row_directions_at_nodes: Annotated[
-        Any, "6*G, S"
-    ]  # ∂δ/∂y and ∂ξ/∂y of each of its rows at the nodes, for Newton's method
+    node_directions: Annotated[Any, "6*G, S"]  # ∂δ/∂y and ∂ξ/∂y of each of its rows at the nodes, for Newton's method
     point: Annotated[  # motion of an element with friction, now and extrapolated, see `compiled.sliding`
         Any, "2, 6"
     ]  # motion of an element with friction in a state and a time later, see `compiled.sliding`

@@ -36,7 +36,7 @@ from solvers.exponential.responses import propagate
 
 _PANEL_RADIANS = 3.0  # up to which the energy of a damped block is off by 5e-11 ζ of its own, and its motion by less
 _INTEGRALS = 2  # first row of `Tables.gauss` with a_qr, one per r
-_TIME_WEIGHT = S  # row of `Scratch.between` with dt of the panel's points, behind polynomials, before forces
+_DT = S  # row of `Scratch.between` with dt of the panel's points, behind polynomials, before forces
 
 
 @inner
@@ -84,7 +84,7 @@ def _panel_points(tables, scratch, node_set, h, begin, width):
     for q in range(S):
         sigma = begin + width * tables.gauss[0, q]
         pace = h * raised(sigma, time_exponent - 1.0)
-        scratch.trial[q], scratch.clipped[q], between[_TIME_WEIGHT, q] = (
+        scratch.trial[q], scratch.clipped[q], between[_DT, q] = (
             sigma,
             pace * sigma - start,
             width * time_exponent * pace,
@@ -105,14 +105,11 @@ def _forces(problem, tables, state, scratch, node_set):
     for u in range(scratch.force.shape[0]):
         if u < problem.gap.size and not acts(problem, state, u):
             continue
-        weighted, row = (
-            enters(problem, node_set, u) and tables.weight_exponent[node_set] > 0.0,
-            between[_TIME_WEIGHT + 1 + u],
-        )
+        weighted, row = enters(problem, node_set, u) and tables.weight_exponent[node_set] > 0.0, between[_DT + 1 + u]
         scales, value = tables.lagrange[node_set, 1 if weighted else 0], splat8(0.0)
         for j in range(S):
             value += splat8(scales[j] * scratch.force[u, j]) * load8(between[j], 0)
-        store8(row, 0, value * load8(between[_TIME_WEIGHT], 0))
+        store8(row, 0, value * load8(between[_DT], 0))
         for q in range(S if weighted else 0):
             row[q] *= scratch.trial[q] ** tables.weight_exponent[node_set]
 
@@ -139,7 +136,7 @@ def _pull_back(problem, state, scratch, b, moves):
     for u in range(scratch.force.shape[0]):
         if u >= problem.gap.size or acts(problem, state, u):
             push = push_of(problem, u)
-            force = load8(scratch.between[_TIME_WEIGHT + 1 + u], 0)
+            force = load8(scratch.between[_DT + 1 + u], 0)
             p += splat8(push[b]) * force
             v += splat8(push[n + b]) * force
     alpha, beta = load8(moves[2], 0), load8(moves[3], 0)
@@ -179,7 +176,7 @@ def _add_works(problem, tables, state, scratch, row):
             if rubs(problem, s):
                 account = problem.friction[s, 1]
                 work, impulse, friction_work, friction_impulse, slip_distance = work_within_rubbing(
-                    problem, tables, scratch, s, _TIME_WEIGHT + 1
+                    problem, tables, scratch, s, _DT + 1
                 )
                 row[account], row[account + 1] = row[account] + friction_work, row[account + 1] + friction_impulse
                 row[account + 2] += slip_distance
@@ -187,12 +184,12 @@ def _add_works(problem, tables, state, scratch, row):
                 row[size + 3 + 2 * s] += impulse
                 continue
             if is_circle(problem, s):
-                work, impulse = work_within_circle(problem, tables, scratch, s, _TIME_WEIGHT + 1)
+                work, impulse = work_within_circle(problem, tables, scratch, s, _DT + 1)
                 row[size + 2 + 2 * s] += work
                 row[size + 3 + 2 * s] += impulse
                 continue
             combine(scratch.along, problem.read_rate[r], size, None, scratch.trial)
-            impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_TIME_WEIGHT + 1 + r], 0)
+            impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_DT + 1 + r], 0)
             row[size + 2 + 2 * s] += sum8(impulses * load8(scratch.trial, 0))
             row[size + 3 + 2 * s] += sum8(impulses)
 
@@ -201,13 +198,11 @@ def _add_works(problem, tables, state, scratch, row):
 def _add_powers(problem, tables, scratch, row):
     """Add work of the loads and damping over the panel to ``row``."""
     n, own, rows = problem.k.size, int(tables.own_blocks), tables.loss_rows
-    weights, pace = load8(tables.gauss[1], 0), load8(scratch.between[_TIME_WEIGHT], 0)
+    weights, pace = load8(tables.gauss[1], 0), load8(scratch.between[_DT], 0)
     for load in range(tables.power_rows.shape[0]):
         combine(scratch.along, tables.power_rows[load], 2 * n, None, scratch.trial)
         combine(scratch.along, tables.signal_rows[load], 2 * n, None, scratch.clipped)
-        signal = load8(scratch.between[_TIME_WEIGHT + 1 + problem.gap.size + load], 0) + pace * load8(
-            scratch.clipped, 0
-        )
+        signal = load8(scratch.between[_DT + 1 + problem.gap.size + load], 0) + pace * load8(scratch.clipped, 0)
         row[2 * n] += sum8(weights * signal * load8(scratch.trial, 0))
     for r in range(rows.shape[0]):
         if rows.shape[0] > own:  # damping that couples the blocks
