@@ -262,9 +262,7 @@ def beside(point: Point, grazing: Grazing, sign: float, wanted: tuple[int, int |
 
 
 def _indicators(point: Point, grazing: Grazing) -> tuple[Array, Array, float]:
-    """Derivatives of the numbers that change sign at a grazing orbit, by first state and parameter; their offset beside
-    it.
-    """
+    """Derivatives, by first state and parameter, of the numbers that change sign at a grazing orbit; their offset."""
     rows, aside = [], _OFFSETS[0] * float(point.orbit.contacts.peak_indentation.max(initial=0.0))
     chain, n = grazing.chain, point.orbit.system.size
     size = chain.x.shape[1]

@@ -57,7 +57,5 @@ def _point_at(a: Point, parameter: float) -> tuple[Point, float]:
     guess = np.append(np.concatenate(states[-len(shots) :]), parameter)
     chain, error, iterations = corrected(a, guess, True, True)
     off = np.append(chain.x.ravel(), parameter) - a.unknowns
-    ahead = np.append(
-        np.zeros(len(off) - 1), off[-1]
-    )  # latched numbers may change the direction of the tangent, not that of the branch
+    ahead = np.append(np.zeros(len(off) - 1), off[-1])  # latched numbers must not reverse the branch
     return point_of(a.problem, chain, error, iterations, a.metric, ahead), math.sqrt(off @ a.metric @ off)

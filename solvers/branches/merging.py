@@ -24,9 +24,7 @@ _SAME = 1e-7  # relative difference of rates up to which they are the same
 
 
 def led(point: Point, grazing: Grazing, floor: float | None) -> Grazing:
-    """The grazing orbit continued in steps to another rate, if that is None to that of the contact before; raises
-    OrbitError.
-    """
+    """The grazing orbit continued to another rate, if None to that of the contact before; raises OrbitError."""
     known, factor = [grazing], _FACTORS[1]
     for _ in range(_MOST_STEPS):
         last = known[-1]

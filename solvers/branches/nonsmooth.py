@@ -129,9 +129,7 @@ def _in_order(log: ContactLog, stop: int) -> Any:
 
 
 def _after(orbit: Orbit, mine: Any, i: int) -> list[float]:
-    """An open time after a stop's i-th contact, if slower contacts follow, which another floor would affect; else
-    empty.
-    """
+    """An open time after a stop's i-th contact, if slower ones follow, which another floor would affect."""
     log, rest = orbit.contacts, mine[i + 1 :]
     slower = rest[log.speed_in[rest] < log.speed_in[mine[max(i - 1, 0)]]]
     if not len(slower):

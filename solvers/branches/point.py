@@ -94,8 +94,9 @@ def cubic(a: Point, b: Point, length: float, s: float) -> Array:
 
 
 def corrected(a: Point, guess: Array, straight: bool, slope: bool = False) -> tuple[Chain, float, int]:
-    """The branch near a guess: at its parameter if ``straight``, else at right angles to a's tangent; raises
-    OrbitError.
+    """The branch near a guess: at its parameter if ``straight``, else at right angles to a's tangent.
+
+    Raises OrbitError.
     """
     condition = None if straight else ArclengthCondition(a.metric, a.tangent)
     return newton(a.problem, guess[:-1].reshape(a.chain.x.shape), float(guess[-1]), condition, slope, _MOST_ITERATIONS)

@@ -284,8 +284,9 @@ class Walk:
 
 
 def _jumped(a: Point, b: Point, marks: list[str]) -> bool:
-    """Whether b lies on another branch: the parameter turns, a multiplier passes 1, or contacts change, without a
-    special point.
+    """Whether b lies on another branch.
+
+    Then the parameter turns, a multiplier passes 1, or contacts change, without a special point.
     """
     turned = a.share * b.share < 0.0 and not {"fold", "floor", "stick"} & {*marks}
     first, second = (indicators_at(point)["branch point"] for point in (a, b))

@@ -192,9 +192,7 @@ def force_at(problem, s, delta, delta_dot, entry_rate, batch):
 
 @inlined
 def off_knots(problem, stop, segment, delta):
-    """δ, but of a knot, up to rounding, a point beside it within the segment, because the force may jump at the
-    knot.
-    """
+    """δ, but for a knot, up to rounding, a point beside it in the segment: the force may jump at the knot."""
     lower, upper = problem.knots[stop, segment - 1], problem.knots[stop, segment]
     rounding = _DELTA_ROUNDING * abs(problem.gap[row_of(problem, stop)])
     if lower > 0.0 and abs(delta - lower) <= rounding + _ON_KNOT * lower:
@@ -336,9 +334,7 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
 
 @inner
 def _add_element_with_friction(problem, s, t, segment, entry_rate, x, rate, batch):
-    """Add the forces of an element with friction to the state's rate, and their power; returns the number of
-    law calls.
-    """
+    """Add the forces of an element with friction to the state's rate, and their power; number of law calls."""
     if segment == 0:
         no_friction(problem, s, rate)
         return 0
@@ -460,9 +456,7 @@ def add_friction(problem, s, t, rows, normal, rate):
 
 @inner
 def _add_to_rows(problem, s, u, w, normal, tangential, rate):
-    """Add N and F_t of a stop with friction to the state's rate; u and w are the displacements of its first two
-    rows.
-    """
+    """Add N and F_t of a stop with friction, whose first two rows are at u and w, to the state's rate."""
     first, size, radius = row_of(problem, s), 2 * problem.k.size, radius_of(problem, s)
     if radius == 0.0:
         for i in range(size):
@@ -526,9 +520,7 @@ def indentation_and_rate(problem, s, x):
 
 @part(RADIAL_MOTION, types.UniTuple(REAL, 2), types.int64, VECTOR)
 def radial_motion(problem, s, x):
-    """(δ, m, δ̇, m/s) of a circular clearance; at the centre, where every way leads outward, δ̇ is that of going
-    outward.
-    """
+    """(δ, m, δ̇, m/s) of a circular clearance; at the centre δ̇ is that of going outward."""
     square, product, speed, size = 0.0, 0.0, 0.0, 2 * problem.k.size
     for r in range(row_of(problem, s), row_of(problem, s) + 2):
         u = dot(problem.read[r], x, size) - problem.gap[r]

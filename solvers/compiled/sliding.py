@@ -173,8 +173,9 @@ def normal_rate(problem, s, rate, acceleration, entry_rate):
 
 @inner
 def slider_margins(problem, s, segment, entry_rate, point, out):
-    """Margins of a slider's segment at a point: of its own border, N or in slip m/s, then N in slip if N may fall to
-    zero.
+    """Margins of a slider's segment at a point: of its own border, N or in slip m/s; then N in slip.
+
+    The second one exists if N may fall to zero before the contact opens.
     """
     slider, two_borders = slider_of(problem, s), problem.border_count[s] > PRESSES
     code = slider[CODE]
@@ -207,8 +208,9 @@ def _latch_stick_or_slip(slider, xi, xi_rate, growth):
 
 @inner
 def begin_slider(problem, s, t, x, entry_rate, under_way):
-    """Latch stick, slip or freedom of a slider as a contact begins; one ``under_way`` as the run begins sticks or is
-    free.
+    """Latch stick, slip or freedom of a slider as a contact begins.
+
+    A contact ``under_way`` as the run begins sticks or is free.
     """
     slider, growth = slider_of(problem, s), math.inf
     (xi, xi_rate), rate = xi_and_rate_at(problem, s, t, x), indentation_rate(problem, s, x)

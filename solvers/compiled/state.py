@@ -149,9 +149,7 @@ def latch_entry(problem, state, s, t, delta_dot):
 
 @kernel
 def begin_contacts(problem, state):
-    """Find the segment of every stop at the start, on a knot the one it moves into, and begin the contacts
-    under way.
-    """
+    """Find the segment of every stop at the start, on a knot the one it moves into; begin contacts under way."""
     for s in range(problem.law.size):
         delta, rate = indentation_and_rate(problem, s, state.x)
         segment, tolerance = 0, surface_tolerance(problem, s, state.x)
@@ -225,9 +223,7 @@ def end_event(problem, state, s, row):
 
 @kernel
 def slider_row(problem, state, s, t, row):
-    """Write into a row of the log the work, impulse and path of the friction of stop s, as its contact begins
-    or ends.
-    """
+    """Write work, impulse and path of the friction of stop s by now into a row of the log."""
     account = problem.friction[s, 1]
     row[at.ELEMENT], row[at.TIME], row[at.GUARD], row[at.FROM], row[at.TO] = s, t, at.FRICTION, 1.0, 1.0
     row[at.DELTA], row[at.RATE] = angle_of(problem, s, state.x), xi_and_rate_at(problem, s, t, state.x)[1]

@@ -255,9 +255,7 @@ def _check_passive(system: System) -> bool:
 
 @lru_cache(maxsize=64)
 def _layout(**known: int) -> Layout:
-    """Shapes and places of the arrays of `State` and `Scratch`; ``pool`` is its number of pairs of rows, 0 for few
-    rows.
-    """
+    """Shapes and places of the arrays of `State` and `Scratch`; ``pool`` counts its pairs of rows, 0 for few rows."""
     blocks, pool, inputs = known["N"], known["pool"], known["R"] + known["L"]
     own, many = padded(blocks), blocks if pool else 0
     width = 2 * blocks + 2 + 2 * known["E"] + ACCOUNTS * known["F"]

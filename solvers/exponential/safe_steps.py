@@ -60,9 +60,7 @@ _GROUP = 8  # cells that one bound covers: with more the bound grows, with fewer
 
 @inner
 def _bound_signals(problem, cell, count, bounds):
-    """Bounds of |s| on ``count`` cells: each Bézier coefficient of a quintic is at most |s| + 2h/5 |s'| + h²/20
-    |s''|.
-    """
+    """Bounds of |s| on ``count`` cells by Bézier coefficients, each at most |s| + 2h/5 |s'| + h²/20 |s''|."""
     for j in range(problem.table_dt.size):
         first, bounds[j] = problem.table_start[j] + cell, 0.0
         slope, curving = 0.4 * problem.table_dt[j], 0.05 * problem.table_dt[j] ** 2
@@ -93,8 +91,7 @@ def _target(tables, t, first, second, t_end):
 
 @inner
 def _sample(problem, tables, energy_tables, state, scratch, t):
-    """Write the outputs due within the step that began at t, from the blocks' motion in ``split_state[2]``, which moves
-    on.
+    """Write the outputs due within the step that began at t; ``split_state[2]``, the motion then, moves along.
 
     With sampled signals the energy balance of the state is that at t, and is integrated along; otherwise
     `account_output` computes it.
@@ -208,8 +205,9 @@ def _cross_cells(problem, tables, energy_tables, state, scratch, most):
 
 @inlined
 def _safe_span(problem, tables, state, scratch, span, horizon, renew_bounds):
-    """``span``, or the shorter time within which no stop can be reached; ``renew_bounds`` of |δ̈| for the ``horizon``
-    first.
+    """``span``, or the shorter time within which no stop can be reached.
+
+    ``renew_bounds`` of |δ̈| for the ``horizon`` first.
     """
     if renew_bounds:
         energy_norms(problem, state.x, scratch.norms)
@@ -226,9 +224,7 @@ def _safe_span(problem, tables, state, scratch, span, horizon, renew_bounds):
 
 @merged
 def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell, dt_cell):
-    """Move by up to ``span``: Taylor step with a search for roots, whole cell, or tabulated step. (time, stop
-    or -1).
-    """
+    """Move by up to ``span``: Taylor step with a search for roots, whole cell, or table. (time, stop or -1)."""
     size, now, stop, x = 2 * problem.k.size, state.now, -1, scratch.split_state
     sampled, shortest = problem.table_dt.size > 0, tables.flight_step[tables.flight_step.size - 1]
     if span < shortest:

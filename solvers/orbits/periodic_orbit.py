@@ -129,9 +129,7 @@ def _in_order(values: Any) -> Any:
 
 
 def _eigenvalues(matrix: Array) -> Any:
-    """Eigenvalues; those that singular values show to be zero are exactly 0, since rounding would spread
-    multiple ones.
-    """
+    """Eigenvalues; those that singular values show to be zero are set to 0, as rounding spreads multiple ones."""
     from scipy.linalg import matrix_balance
 
     with np.errstate(invalid="ignore"):  # scales beyond the range of integers

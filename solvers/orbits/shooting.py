@@ -118,9 +118,7 @@ def _from_zero(orbit: Orbit) -> Orbit:
 
 
 def _check_isolated(problem: PeriodicProblem, chain: Chain) -> None:
-    """Refuse an orbit whose neighbours are orbits, too, to rounding; latched numbers that are never renewed do not
-    count.
-    """
+    """Refuse an orbit whose neighbours are orbits, too, apart from those with other latched numbers."""
     W, matrix = weights(*problem.make(chain.parameter)), chain.monodromy()
     if chain.coordinates < len(matrix):
         size = float(np.linalg.norm(chain.x[0, : chain.coordinates] @ W.T)) or 1.0  # at rest it has none

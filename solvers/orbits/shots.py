@@ -98,8 +98,7 @@ class PeriodicProblem:
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Results of the shots from x (m, N): residuals (m, N), their derivatives (m, N, N), and those by the parameter (m,
-    N).
+    """Results of the shots from x (m, N): residuals (m, N), their derivatives (m, N, N) and by the parameter.
 
     N = 2n + l counts [q, q̇] and latched numbers, see `whole_state`.
     """
@@ -113,9 +112,7 @@ class Chain:
     has_slope: bool = True  # whether ``by_parameter`` is known
 
     def jacobian(self) -> Array:
-        """Derivative (m N, m N) of the residuals by all states; latched numbers that are never renewed are held
-        constant.
-        """
+        """Derivative (m N, m N) of the residuals by all states; latched numbers never renewed are held constant."""
         m, size = self.residual.shape
         matrix = np.zeros((m, size, m, size))
         for i in range(m):

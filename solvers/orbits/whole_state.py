@@ -120,8 +120,9 @@ def _reals(law: Any) -> Array:
 
 
 def _slopes(law: Any, row: Array, border: int = -1, delta: float = 0.0, rate: float = 0.0) -> Array:
-    """Derivatives (l, 2 + l) of a renewal by δ, δ̇ and the latched numbers; border -1 is none: identity, zero for
-    codes.
+    """Derivatives (l, 2 + l) of a renewal by δ, δ̇ and the latched numbers.
+
+    Border -1 is none: the identity, with zeros for codes.
     """
     count = len(law.memory)
     out = np.zeros((count, 2 + count))

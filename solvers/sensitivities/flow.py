@@ -216,9 +216,7 @@ class Flow:
         return float(self.force(times, s, acting)[0]), float(slopes @ self.rates(t, s, acting)), changed
 
     def fly(self, start: float, end: float, samples: Array) -> Array:
-        """Move on while nothing acts and parameters drive nothing; derivatives by the parameters at samples, (q, 2n,
-        d).
-        """
+        """Move over a flight that parameters do not drive; derivatives by the parameters at samples, (q, 2n, d)."""
         over = propagator(self.k, self.c, np.append(samples, end) - start)
         found = moved(self.k, self.c, over, self.y[:, None])
         self.y = found[:, -1]
@@ -240,8 +238,9 @@ class Flow:
     def pass_panels(
         self, panels: Panels, acting: Acting, samples: Array
     ) -> tuple[Array, dict[int, tuple[Array, Array]]]:
-        """Where elements act; derivatives at samples (q, 2n, d), and changes at nodes of N (P, S, columns) and of the
-        forces on the rows (P, m, S, columns).
+        """Move over panels in which elements act; derivatives at samples (q, 2n, d), and changes of forces.
+
+        These are at the nodes, of N (P, S, columns) and of the forces on the rows (P, m, S, columns).
 
         f = A y + B with y at the start of a panel; y ← (E + K A) y + K B + drive at its end.
         """
@@ -272,8 +271,7 @@ class Flow:
         return panels.within(states, samples), changes
 
     def _forces(self, panels: Panels, acting: Acting, drive: Array | None, pushes: list[Array]) -> Any:
-        """Changes of all R forces on rows at the nodes, by the state at the start of a panel (P, R S, 2n), and by the
-        rest.
+        """Changes of all R forces on rows at the nodes by the state at a panel's start (P, R S, 2n), and by the rest.
 
         Likewise those of N of each element; None if it is the force on its only row.
         """
@@ -314,9 +312,7 @@ class Flow:
         return np.einsum("dbps,dbpsn->psn", normal, seen) + pull @ forces[0], other
 
     def _drive(self, t: Array, acting: Acting) -> Array | None:
-        """Rates (2n, P, S, d) of the blocks by the parameters at times (P, S), at fixed state and forces; None if all
-        are 0.
-        """
+        """Rates (2n, P, S, d) of the blocks by the parameters at times (P, S), at fixed state and forces, or None."""
         by, system = self.by, self.system
         if not (by.forced or by.turned):
             return None

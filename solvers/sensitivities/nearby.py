@@ -82,8 +82,9 @@ def combined(weights: tuple[float, ...], values: list[Any]) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class ElementChange:
-    """Derivatives of an element's data by d parameters: its rows (d, m, n) and their offsets (d, m), see `elements`;
-    |c|; μ, k_t and R Ω, (d,) each.
+    """Derivatives of an element's data by d parameters.
+
+    Its rows (d, m, n) and their offsets (d, m), see `elements`; |c|, μ, k_t and R Ω, (d,) each.
     """
 
     rows: Array
@@ -138,8 +139,9 @@ def _surface(contact: Any) -> float:
 
 
 class Change:
-    """Derivatives of the data by d parameters: matrices (d, n, n), elements, loads' vectors (d, L, n); signals and laws
-    that change, of each parameter.
+    """Derivatives of the data by d parameters.
+
+    Matrices (d, n, n), elements, loads' vectors (d, L, n); signals and laws that change, of each parameter.
     """
 
     def __init__(self, system: System, nearby: Sequence[Nearby], duration: float) -> None:
@@ -177,9 +179,7 @@ class Change:
         return self.over_laws(s, lambda law: 0.0 if border == 0 else law.knots[border - 1])
 
     def over_laws(self, s: int, read: Callable[[Any], Any]) -> Any:
-        """(..., d) derivatives of what ``read`` returns of the law of an element; zeros (d,) if the law does not
-        change.
-        """
+        """(..., d) derivatives of what ``read`` returns of an element's law; zeros (d,) if the law does not change."""
         found = [
             0.0
             if (known := laws[s]) is None

@@ -1,6 +1,4 @@
-"""A run divided at its events: which elements act in between, with which latched numbers, and where the motion is
-needed.
-"""
+"""A run divided at its events: which elements act in between, with which latched numbers, on which panels."""
 
 from __future__ import annotations
 
@@ -99,9 +97,7 @@ def acting_at_start(system: System, x: Array, rows: Array, memory: Sequence[Any]
 
 
 def rises(row: Array) -> bool:
-    """Whether a knot or the surface is crossed inwards; at rest on a surface the segments tell it, as δ̇ = 0
-    does not.
-    """
+    """Whether a knot or the surface is crossed inwards, by the segments, or if they are equal by δ̇."""
     before, behind = row[at.FROM], row[at.TO]
     return bool(behind > before if behind != before else row[at.RATE] > 0.0)
 

@@ -191,8 +191,7 @@ def _extrapolated(known, time):
 
 @inner
 def _falls_from_zero(known, theta):
-    """θ at which a margin that begins at zero, and is negative at θ, falls below zero: at once, or later if it rises
-    first.
+    """θ at which a margin that begins at zero, and is negative at ``theta``, falls below zero: 0, or later.
 
     A stick that begins just before a contact opens is over before the first node that would show it; if all of it is
     rounding it lasts to θ, since its margin has no slope where slip has ended. A slider at its limit may move back by

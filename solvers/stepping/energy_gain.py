@@ -24,9 +24,7 @@ _TRIED = np.geomspace(1e-9, 1e3, 241)  # m or rad, to either side, where a law t
 
 @kernel
 def gains(problem, state, space):
-    """Whether the energy exceeds twice the initial energy plus all input for `STEPS_OF_GAIN` steps, or by far for
-    fewer.
-    """
+    """Whether the energy exceeds twice the initial one plus all input for `STEPS_OF_GAIN` steps, or by far sooner."""
     ledger = 2 * problem.k.size
     watch = space.watch
     watch[MOST_INPUT] = max(watch[MOST_INPUT], state.x[ledger])
@@ -45,9 +43,7 @@ def gains(problem, state, space):
 
 @inner
 def modal_gains(problem, state, space):
-    """The same on decoupled modes. Damping that couples them has another form of the energy, which the engine
-    checks.
-    """
+    """The same on decoupled modes; False with damping that couples them, which the engine checks."""
     if problem.loss.shape[0] > 0:
         return False
     n, energy = problem.k.size, 0.0
@@ -58,9 +54,7 @@ def modal_gains(problem, state, space):
 
 
 def watched(system: System, motion: Array, least: float) -> Array:
-    """Initial entries of `Space.watch`: energy now, at the start, negligible, J; steps that gained; most input, held by
-    stops.
-    """
+    """Initial entries of `Space.watch`: energy now, at the start, negligible, J; steps; input; held by stops, J."""
     q, q_dot = np.split(motion, 2)
     stored = abs(float(system.energy(q, q_dot)))
     known = system.about_laws.get("dissipative", lambda: [_only_takes(contact) for contact in system.contacts])
@@ -72,9 +66,7 @@ def watched(system: System, motion: Array, least: float) -> Array:
 
 
 def _only_takes(contact: Contact) -> bool:
-    """Whether a contact returns at most the energy it holds; of one that acts on both sides, if its force leads back to
-    0.
-    """
+    """Whether a contact returns at most the energy it holds; if it acts on both sides, whether F δ >= 0 at rest."""
     law: Any = contact.law
     if not is_dissipative(law):
         return False

@@ -128,9 +128,7 @@ def _peak_value(known, theta):
 
 @inner
 def first_kink(problem, state, space):
-    """θ of the first kink inside the step, where a law is cut at zero or a damper of approach begins or ends; else
-    NONE.
-    """
+    """θ of the first kink inside the step: a law is cut at zero, or a damper of approach begins or ends; else NONE."""
     first, batch = NONE, space.work[0]
     for s in range(problem.law.size):
         if state.segment[s] == 0 or space.kinks[s] == 0:
@@ -220,9 +218,7 @@ def land(step, problem, state, space, h, longest, stop, direction, level, border
 
 @shared
 def _if_accurate(h, error):
-    """Duration h of a landing, or minus the step to try: where a law bends, a shorter step may have the larger
-    error.
-    """
+    """Duration h of a landing, or minus the step to try: across a bend the shorter step may have the larger error."""
     return h if error <= 1.0 else -max(0.2, 0.9 * error**-0.125) * h if np.isfinite(error) else -0.2 * h
 
 

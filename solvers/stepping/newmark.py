@@ -253,9 +253,7 @@ class _Family(ConstantStep):
         return system.sparse or system.blocks.loss.size > 0
 
     def critical(self, M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Array]:
-        """The oscillator that limits a step on matrices: a contact couples the modes even where they are stepped one by
-        one.
-        """
+        """The oscillator that limits a step on matrices, since contacts couple the modes."""
         _, _, beta, gamma = self.constants
         return newmark_oscillator(beta, gamma, M, C, K, G)
 

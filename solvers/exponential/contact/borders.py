@@ -217,10 +217,10 @@ def _crossing_time(problem, tables, state, scratch, s, j, node_set, h):
     """Time after the start of the step at which a margin falls below zero, by its values at the nodes and ends, or inf.
 
     It is 0 if the margin is negative from the start on. A margin that begins at zero may have risen before the first
-    node: then half the time to that node is returned, for a shorter step to tell. A landing may have missed its border
-    by more than the rounding of this step: then the margin begins slightly below zero and rises, and only a later fall
-    counts. Slip that begins against its own force, as dashpots can make it, has a strongly negative margin and ends at
-    once.
+    node: then half the time to that node is returned, for a shorter step to decide. A landing may have missed its
+    border by more than the rounding of this step: then the margin begins slightly below zero and rises, and only a
+    later fall counts. Slip that begins against its own force, as dashpots can make it, has a strongly negative margin
+    and ends at once.
     """
     noise, before, t = scratch.noise[s, j], scratch.ends[ENDS * j], 0.0
     tolerance = max(_ON_BORDER * scratch.largest[s, j], noise)

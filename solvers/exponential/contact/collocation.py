@@ -79,9 +79,7 @@ _FADED, _MOST_RADIANS = 100.0, 1e5  # e^-100 counts as zero; more radians in a r
 
 @merged
 def _single_power_law(problem, tables, state):
-    """The stop in contact, if it is the only one, on a line, without friction and with a tabulated power law;
-    else -1.
-    """
+    """The stop in contact, if it is the only one, on a line, frictionless, with a tabulated power law; else -1."""
     alone, count = -1, 0
     for s in range(state.segment.size):
         if state.segment[s] > 0:
@@ -299,9 +297,7 @@ def _undamped_part(problem, tables, scratch, node_set, h, s):
 
 @merged
 def _sum_errors(problem, tables, scratch, node_set, t, h):
-    """Errors of the rates of all rows, m/s, by the unresolved impulses of forces and signals, into
-    ``scratch.per_row``.
-    """
+    """Errors of the rates of all rows, m/s, by unresolved forces and signals, into ``scratch.per_row``."""
     rows, error = problem.gap.size, scratch.per_row
     for r in range(rows):
         error[r] = 0.0
@@ -317,11 +313,10 @@ def _sum_errors(problem, tables, scratch, node_set, t, h):
 
 @merged
 def _hidden_kink(problem, state, scratch, s, largest):
-    """Largest difference, N, of law and polynomial at the ends of a smooth step, if the last coefficients do not
-    explain it.
+    """Largest difference, N, of law and polynomial at the ends of a smooth step; 0 if the coefficients explain it.
 
-    Then the law has a kink between that end and the next node, within a fiftieth of the step, as with clamp=True; or it
-    saturates within that time, as hysteresis of a knee that is small beside the motion does after a border.
+    Otherwise the law has a kink between that end and the next node, within a fiftieth of the step, as with clamp=True;
+    or it saturates within that time, as hysteresis of a knee that is small beside the motion does after a border.
     """
     delta, rate = scratch.clipped[0:2], scratch.trial[0:2]
     delta[0], rate[0] = indentation_and_rate(problem, s, scratch.x_new)

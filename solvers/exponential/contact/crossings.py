@@ -47,9 +47,7 @@ from solvers.exponential.flight import energy_norms
 RATE, FORCE = 1.0, 2.0  # kinds of bends in Tables.bend, named by their event function; 0 for a law without one
 CLEAR, TOO_LONG = -1, -2  # results of `before_landing`: no other event, or one that requires shorter steps
 _ON_BEND = 1e-9  # event function, in units of its largest on the step, up to which a stop counts as on its bend
-_TOGETHER = (  # the same, relative to its value at the start, by which a bend may be crossed as another stop lands
-    1e-6  # the same, relative to its value at the start, by which a stop may cross its bend when another stop lands
-)
+_TOGETHER = 1e-6  # the same, relative to its value at the start, by which a bend may be crossed as another stop lands
 _ROUNDING = 1e-11  # the same, in units of its largest on the step, up to which a node may be on the wrong side
 
 
@@ -130,9 +128,7 @@ def _bound_rates(problem, tables, state, scratch, h):
 
 @merged
 def _cannot_reach(problem, state, scratch, s, h):
-    """Whether a stop out of contact cannot be reached on the step by this bound; its motion is set to that at the
-    start.
-    """
+    """Whether a stop out of contact cannot be reached on the step; its motion is set to that at the start."""
     if is_circle(problem, s):
         return stays_in_circle(problem, state, scratch, s, h)
     delta, rate, row = scratch.start_motion[s, 0], scratch.start_motion[s, 1], row_of(problem, s)

@@ -32,9 +32,7 @@ LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN, BALANCED = range(7)
 last; level of the next step; 1 once the run has begun; 1 if it keeps the energy balance."""
 ENTRY, SEGMENT = 1, 2  # values of NEW: first step of a contact, or of a segment of its law; 0: any other step
 _LEAST_SPEED = 1e-60  # m/s: lower bound of a reference speed, and of the speed of an impact
-_PRESSED_SHARE = (  # of `pressed_speed` as a reference speed: a stop at rest under a force moves by rounding
-    1e-3  # the least in units of the speed which the force would give: what presses at rest moves by rounding
-)
+_PRESSED_SHARE = 1e-3  # of `pressed_speed` as a reference speed: a stop at rest under a force moves by rounding
 
 
 @part(BEGIN, types.void, types.int64)

@@ -73,9 +73,7 @@ def _force(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batc
 
 @merged
 def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, out, batch):
-    """Derivative of the unknowns w = [state, t, u] by the variable, times ``span``, into ``out``; returns the law
-    calls.
-    """
+    """Write d[state, t, u]/d(variable) × ``span`` at w = [state, t, u] into ``out``; returns the law calls."""
     n, calls, pace = problem.k.size, 0, np.nan
     size, t = 2 * n, width_of(problem)
     for b in range(n):
@@ -121,8 +119,7 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
 
 @part(LANDING_STEP, types.int64, *_CHOICE, REAL, VECTOR, INTEGERS, VECTOR, VECTOR, MATRIX)
 def landing_step(problem, tables, with_energy, short, variable, stop, span, w, segment, entry_rate, side, work):
-    """One DOP853 step of length ``span`` in the variable from ``w`` to ``work[LANDED]``; returns the number of law
-    calls.
+    """One DOP853 step of length ``span`` in the variable from ``w`` to ``work[LANDED]``; number of law calls.
 
     The stages stay in ``work``. A ``short`` step is one of the midpoint rule, which leaves them as they are.
     """

@@ -82,9 +82,7 @@ def free_block_motion(problem, tables, scratch, node_set, level, x):
 
 @inner
 def _sum_pushes(problem, tables, state, scratch, force, node_set, group):
-    """Sum the state rates of the blocks by one group of inputs at the nodes into ``scratch.block_force``; False if none
-    acts.
-    """
+    """Rates of the blocks by one group of inputs at the nodes, into ``scratch.block_force``; False if none acts."""
     rows, size, own, found = problem.gap.size, problem.k.size, tables.block_response.shape[3] // 2, False
     for u in range(force.shape[0]):
         if (u >= rows) != (group == SIGNALS) or (u < rows and not acts(problem, state, u)):

@@ -19,9 +19,7 @@ MOST_ITERATIONS = 16
 
 @inner
 def linearise(problem, tables, state, scratch, node_set, level):
-    """Write J = 1 - ∂law/∂(δ, δ̇) ∂(δ, δ̇)/∂F at the nodes of all rows in contact into ``scratch.jacobian``;
-    its size.
-    """
+    """Write J = 1 - ∂law/∂(δ, δ̇) ∂(δ, δ̇)/∂F, over nodes and rows in contact, into ``scratch.jacobian``; its size."""
     for s in range(problem.law.size):
         if state.segment[s] > 0:
             motion, slope = motion_of(problem, scratch, s), scratch.slope[s]
@@ -102,9 +100,7 @@ def _store_rate_slopes(state, scratch):
 
 @part(NEWTON, types.boolean, types.int64, types.int64)
 def newton(problem, tables, state, scratch, node_set, level):
-    """Solve for the forces by Newton's method; returns whether it converged. Used where fixed-point iteration
-    diverges.
-    """
+    """Solve for the forces by Newton's method, where fixed-point iteration diverges; whether it converged."""
     for _ in range(MOST_ITERATIONS):
         place = 0
         respond_all(problem, tables, state, scratch, node_set, level)

@@ -44,9 +44,7 @@ balance; the state at the start of a landing, or at the end of a run within a st
 DELTAS, RATES, FORCES, KNOWN = range(4)
 """Rows of `Scratch.local_motion`: m, m/s, N at points around a node, and the values they are interpolated from."""
 RTOL, REACH = range(2)  # places in Scratch.accuracy
-_KINK_JUMP = (  # jump of a third derivative, in units of signal/dt³, that is a kink; smooth ones are ten times smaller
-    1e-2  # jump of a third derivative, in units of signal/dt³, that is a kink; smooth signals have at most a tenth
-)
+_KINK_JUMP = 1e-2  # jump of a third derivative, over signal/dt³, that is a kink; smooth signals have a tenth
 STRAIGHT = 1e-9  # change of a law's slope on a step, in units of the slope, that is rounding
 _WORK_TOLERANCE = 10.0  # part of a force, in units of rtol × the largest force, that a step may leave out for its work
 _ROUNDINGS = 4.0  # rounding of the coefficients of a force, in units of that of its values
@@ -74,9 +72,7 @@ class Scratch(NamedTuple):
     clipped: Annotated[Any, "S"]  # indentations of one stop at the nodes, not below 0
     free: Annotated[Any, "R, 2, S"]  # the same without contact forces
     force: Annotated[Any, "R+L, S"]  # forces on the rows, then values of the signals
-    law_force: Annotated[  # forces on the rows by the laws, for the present motion; then radial ones of circles
-        Any, "R+A, S"
-    ]  # forces on the rows by the laws, for the present motion; then the radial forces of circles
+    law_force: Annotated[Any, "R+A, S"]  # forces on the rows by the laws for the present motion, then the radial ones
     trial: Annotated[Any, "S"]  # eight numbers for use within a function
     summary: Annotated[Any, "R+A, 8"]  # of forces, see Tables.summary
     previous: Annotated[Any, "R, S"]  # forces of the last accepted step
@@ -90,43 +86,31 @@ class Scratch(NamedTuple):
     force_tolerance: Annotated[Any, "E"]  # N: change of a force in an iteration below which it counts as converged
     unresolved: Annotated[Any, "R"]  # N s: impulse that the polynomials of a step leave out
     guess: Annotated[Any, "R, S"]  # forces from which the iterations begin
-    viscous: Annotated[  # N s/m: slope of a force by its rate, from the last Newton iteration; 0 if not needed
-        Any, "E"
-    ]  # N s/m: slope of a force by its rate, from the last Newton iteration; 0 if that was not needed
+    viscous: Annotated[Any, "E"]  # N s/m: slope of a force by its rate, from the last Newton iteration; 0 if not needed
     local_motion: Annotated[Any, "4, 3*S"]  # rows as named above, see `peaks`
     side: Annotated[Any, "E"]  # +1 or -1: sign of the event function of each stop's bend, see `crossings`
     side_at_begin: Annotated[Any, "E"]  # the same at the start of the step tried
     bend_values: Annotated[Any, "S+2"]  # event function of a bend at the nodes and at the end, then its largest size
     accuracy: Annotated[Any, "2"]  # rtol; radians of the fastest block that a landing may take
-    stiffened: Annotated[  # rad/s: frequency of the structure as stiffened by the contacts, for derivatives
-        Any, "1"
-    ]  # rad/s: frequency of the structure stiffened by the contacts, for steps of the derivative
+    stiffened: Annotated[Any, "1"]  # rad/s: frequency of the structure as stiffened by the contacts, for derivatives
     duration: Annotated[Any, "1"]  # s: estimate for the contact begun last, as if nothing else acted on the body
     energy_sums: Annotated[Any, "2+L, numbers"]  # see `energy.flight_balance` and `contact_balance`
     energy: Annotated[Any, "3"]  # J, see `energy.check`
     control: Annotated[Any, "int 7"]  # integers of the step control, places named in `first_step`
     start_motion: Annotated[Any, "E, 2"]  # δ and δ̇ at the start of the step
     node_time: Annotated[Any, "S"]  # s, of the nodes of the step tried
-    slid: Annotated[  # ξ, ξ̇ and F_t at the nodes, then numbers for use within a function; see `circles.friction`
-        Any, "G, 4, S"
-    ]  # ξ, ξ̇ and F_t at the nodes, then eight numbers for use within a function; see `circles.friction`
+    slid: Annotated[Any, "G, 4, S"]  # ξ, ξ̇ and F_t at the nodes, then scratch; see `circles.friction`
     row_slopes: Annotated[Any, "9*G, 2, S"]  # of forces on the rows of an element with friction, by these
     node_directions: Annotated[Any, "6*G, S"]  # ∂δ/∂y and ∂ξ/∂y of each of its rows at the nodes, for Newton's method
-    point: Annotated[  # motion of an element with friction, now and extrapolated, see `compiled.sliding`
-        Any, "2, 6"
-    ]  # motion of an element with friction in a state and a time later, see `compiled.sliding`
+    point: Annotated[Any, "2, 6"]  # motion of an element with friction, now and extrapolated, see `compiled.sliding`
     numbers: Annotated[Any, "S"]  # for a law call
     margin: Annotated[Any, "B*S"]  # margins of an element's borders at points, row by row; see `borders`
-    ends: Annotated[  # margins of an element's borders at the ends of a step or landing; see `borders`
-        Any, "6*B"
-    ]  # margins of an element's borders at the ends of a step or landing, six for each; see `borders`
+    ends: Annotated[Any, "6*B"]  # margins of an element's borders at the ends of a step or landing; see `borders`
     fired: Annotated[Any, "B"]  # margins of an element's borders in one state
     largest: Annotated[Any, "E, B"]  # largest margins on the step tried last
     noise: Annotated[Any, "E, B"]  # their rounding
     border: Annotated[Any, "int 1"]  # border that the step tried last crosses first, -1 if it is a bend
-    landed: Annotated[  # element and border that a landing would cross before its end, see `landing`; else -1
-        Any, "int 2"
-    ]  # element and border that a landing would cross before it ends, see `landing`; else -1
+    landed: Annotated[Any, "int 2"]  # element and border that a landing would cross first, see `landing`; else -1
     block_motion: Annotated[Any, "2*M, S"]  # p and v at the nodes; as the next two see `many_stops`
     block_force: Annotated[Any, "2*M, S"]  # state rates of the blocks by the forces at the nodes
     pair_weights: Annotated[Any, "M8"]  # products of a read row with the push of another row
@@ -181,11 +165,10 @@ def error_of_work(problem, state, scratch, s, unresolved, largest, slopes):
 
 @inner
 def unresolved_signal(problem, tables, scratch, node_set, j, t, h):
-    """Estimate of the part of sampled signal j that its polynomial leaves out on a step; on an entry step at half the
-    order.
+    """Estimate of the part of sampled signal j that its polynomial leaves out; on an entry step at half the order.
 
     What lies between the nodes, such as a short pulse, does not show in the coefficients: there the table is compared.
-    Where the table has kinks, the coefficients decay too slowly to tell: there the difference is integrated.
+    Where the table has kinks, the coefficients decay too slowly to show it: there the difference is integrated.
     """
     values, c = scratch.force[problem.gap.size + problem.table_load[j]], scratch.trial
     largest, dt, start = largest_size(values), problem.table_dt[j], problem.table_start[j]
@@ -230,9 +213,7 @@ def _has_kinks(problem, j, first, beyond, largest):
 
 @inner
 def _missed_impulse(problem, tables, values, node_set, j, t, h):
-    """|mean| of the signal less its polynomial over the step; on a smooth step also that of the product with
-    2τ/h - 1.
-    """
+    """|mean| over the step of signal less polynomial; on a smooth step also of the difference times 2τ/h - 1."""
     dt, impulse, moment = problem.table_dt[j], 0.0, 0.0
     last = min(int((t + h) / dt), problem.table_start[j + 1] - problem.table_start[j] - 2)
     for cell in range(min(int(t / dt), last), last + 1):
@@ -353,9 +334,7 @@ def ripple_of_stop(problem, tables, s, alias, x):
 
 @reordered
 def ripple_of(ripple_weight, alias, x, n):
-    """Bound, m, of the error between the nodes of a row's displacement, by blocks that oscillate too fast for the
-    nodes.
-    """
+    """Bound, m, of the error of a row's displacement between the nodes, by blocks too fast for the nodes."""
     error = 0.0
     for b in range(n):
         error += ripple_weight[b] * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))

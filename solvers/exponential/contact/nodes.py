@@ -32,9 +32,7 @@ MONOMIALS = np.ascontiguousarray(np.linalg.inv(np.vander(LOCAL, increasing=True)
 
 @kernel
 def lagrange(nodes, weights, sigma, out):
-    """Write Π_{i≠j} (σ - σ_i) times the weight of j for every node j: Lagrange polynomials at σ, with weights 1/Π (σ_j
-    - σ_i).
-    """
+    """Lagrange polynomials at σ: Π_{i≠j} (σ - σ_i) × weight j, 1 at their node if that is 1/Π (σ_j - σ_i)."""
     for j in range(nodes.size):
         value = weights[j]
         for i in range(nodes.size):
@@ -76,8 +74,7 @@ def gauss_jacobi(beta: float) -> Any:
 
 
 class _NodeSet(NamedTuple):
-    """Nodes σ of one kind of contact step, t = h σ^κ, F = σ^λ × polynomial, with κ the time exponent, λ that of the
-    weight.
+    """Nodes σ of one kind of contact step, t = h σ^κ, F = σ^λ × polynomial; κ and λ are its exponents.
 
     ∫F dt = h Σ weights F; ``spectrum`` gives the Jacobi coefficients of the polynomial from the values of F.
     """
@@ -171,9 +168,7 @@ def node_sets_of(series: tuple[tuple[float, float], ...]) -> NodeSets:
 
 
 def _summary(node_set: _NodeSet) -> Any:
-    """(S, 8) last four coefficients, values at start and end, slopes dF/dσ there, from the values of a force at the
-    nodes.
-    """
+    """(S, 8) last four coefficients, values and slopes dF/dσ at start and end, from node values of a force."""
     rows = np.zeros((8, S))
     rows[:4] = node_set.spectrum[-4:]
     rows[4:6] = _interpolation(node_set.nodes, np.array([0.0, 1.0]))
@@ -192,9 +187,7 @@ def _plain_weights(node_set: _NodeSet) -> Any:
 
 
 def _work_weights(nodes: Any) -> Any:
-    """(S, S + 1) weights of ∫ F dδ = Σ F_i weight_ij (δ_j - δ₀); F is interpolated in the nodes, δ also in both
-    ends.
-    """
+    """(S, S + 1) weights of ∫ F dδ = Σ F_i weight_ij (δ_j - δ₀); nodes interpolate F, nodes and ends δ."""
     points, weights = gauss(S)
     places = np.append(nodes, [1.0, 0.0])
     slopes = _interpolation(places, points) @ _differentiation(places)

@@ -1,6 +1,4 @@
-"""Outputs of a contact step: work, impulse, peaks and state at its end, samples inside it, its row of the event
-record.
-"""
+"""Outputs of a contact step: works, peaks and state at its end, samples inside it, its event record."""
 
 from __future__ import annotations
 

@@ -49,9 +49,7 @@ def _evaluate(coefficients, x):
 
 @merged
 def _parabola_vertex(values, place):
-    """Vertex of the parabola through a point of `LOCAL` and its neighbours, then these; an end point is its own
-    vertex.
-    """
+    """Vertex of the parabola through a point of `LOCAL` and its neighbours, and these; at an end the point itself."""
     if place == 0 or place == S - 1:
         return LOCAL[place], LOCAL[max(place - 1, 0)], LOCAL[min(place + 1, S - 1)]
     low, b, high = LOCAL[place - 1], LOCAL[place], LOCAL[place + 1]
@@ -193,9 +191,7 @@ def state_peaks(problem, state, scratch, x):
 
 @inner
 def pressed_speed(problem, tables, state, s, batch):
-    """Speed, m/s, that the force of a stop in contact would give over a distance δ: √(|F δ|/m); 0 if the stop
-    is open.
-    """
+    """Speed, m/s, that the force of a stop in contact would give over a distance δ, √(|F δ|/m); 0 if it is open."""
     delta = indentation(problem, s, state.x)
     if state.segment[s] == 0 or abs(delta) <= surface_tolerance(problem, s, state.x):
         return 0.0

@@ -19,9 +19,7 @@ from solvers.exponential.contact.node_response import LANDED
 
 @part(LAND, types.UniTuple(types.int64, 2), types.int64, types.int64, REAL)
 def land_first(problem, tables, state, scratch, stop, direction, time_to_border):
-    """Land on the border reached first, be it that of another stop; (stop, direction), or (-1, 0) if it is not
-    possible.
-    """
+    """Land on the border reached first, be it that of another stop; (stop, direction), or (-1, 0) on failure."""
     for _ in range(problem.law.size + 1):
         landed = land(problem, tables, state, scratch, stop, direction, time_to_border)
         if landed == stop or landed < 0:
@@ -36,7 +34,7 @@ def first_end(problem, tables, state, scratch, node_set, level, is_new):
     """(time after the start of the step just tried, stop) of the first bend or border that it crosses, or (inf, -1).
 
     ``scratch.border`` gets the number of the border, -1 of a bend. The stop is `UNRESOLVED` if the step is too long to
-    tell.
+    decide.
     """
     first, stop = first_bend(problem, tables, state, scratch, node_set, level, is_new)
     time, element, border = border_ahead(problem, tables, state, scratch, node_set, level)
@@ -66,9 +64,7 @@ def land_in_time(problem, tables, state, scratch, stop, first):
 
 @part(GO_BEYOND, types.void, types.int64, types.boolean)
 def go_beyond(problem, state, scratch, stop, alone):
-    """Begin what follows a bend or border: the other side, or the numbers latched on it and, unless ``alone``, on
-    others.
-    """
+    """Begin what follows a bend, or a border and, unless ``alone``, others reached with it."""
     border = scratch.border[0]
     if border < 0:
         scratch.side[stop] = -scratch.side[stop]

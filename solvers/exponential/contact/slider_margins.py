@@ -85,8 +85,9 @@ def _rate_on_side(problem, scratch, s, rate):
 
 @part(RUB_IN, types.void, types.int64, types.float64, VECTOR, types.float64, VECTOR)
 def slider_margins_in(problem, state, scratch, s, t, x, later, out):
-    """Margins of element s in the state x at time t, extrapolated by ``later``; ``scratch.point`` is left with its
-    motion.
+    """Margins of element s in the state x at time t, or extrapolated by ``later``, s.
+
+    ``scratch.point`` is left with its motion in both.
     """
     point, moved = scratch.point[0], scratch.point[1]
     if later != 0.0 or (slider_of(problem, s)[CODE] != 0.0 and _rate_dependent(problem, s)):
@@ -129,9 +130,7 @@ def _slopes(problem, tables, state, s, delta, rate, normal, slope):
 
 @inner
 def _margins_at(problem, tables, state, scratch, s, delta, rate, xi_rates, forces, accelerations):
-    """Margins at S points into ``scratch.margin``, from N in ``scratch.numbers``, δ, δ̇, ξ̇ (speeds), F_t (forces) and
-    δ̈.
-    """
+    """Margins at S points into ``scratch.margin``, from N in ``scratch.numbers``, δ, δ̇, ξ̇, F_t and δ̈."""
     slider, margin, normal, slope = slider_of(problem, s), scratch.margin, scratch.numbers, scratch.slope[s]
     slips, mu = _slips(slider), slider[MU]
     if slips and mu > 0.0:
@@ -212,8 +211,7 @@ def _margin_slopes(problem, tables, state, scratch, s):
 
 @part(RUB_MARGINS, types.void, *[types.int64] * 3)
 def slider_margins_on_step(problem, tables, state, scratch, s, node_set, level):
-    """Margins at the nodes and ends of the step just tried, their largest values and rounding, as `borders` has them of
-    laws.
+    """Margins at the nodes and ends of the step just tried, their largest values and rounding, as in `borders`.
 
     The motion at the start stays in ``scratch.point[0]``.
     """
@@ -334,9 +332,7 @@ def peak_of_friction(problem, tables, state, scratch, node_set, h, s, limit):
 
 @merged
 def _maximum_outside(tables, scratch, node_set, s, highest, known):
-    """Whether |F_t| has no maximum inside the step near its highest node, an end node, as its slope at the end
-    tells.
-    """
+    """Whether |F_t| rises out of the step at its highest node, an end node, so that no maximum is inside."""
     forces, slopes = scratch.slid[s, TANGENTIAL], scratch.trial
     combine(tables.summary[node_set], forces, S, None, slopes)
     sign = 1.0 if forces[highest] > 0.0 else -1.0

@@ -79,9 +79,7 @@ _ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # ratio of the errors of two steps whose le
 
 @part(PRESSED, types.boolean)
 def _switch_pressed(problem, state):
-    """Switch every stop at rest on its surface that is pressed into it by other stops' forces; returns whether
-    any was.
-    """
+    """Switch every stop at rest on its surface that other stops' forces press into it; whether there was any."""
     switched = False
     for s in range(problem.law.size):
         if state.segment[s] > 0 or abs(indentation(problem, s, state.x)) > surface_tolerance(problem, s, state.x):
@@ -270,7 +268,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
         error, first, crossing = _attempt(problem, tables, state, scratch, node_set, level)
         if error <= 1.0 and (crossing < 0 or not rubs(problem, crossing)):
             break
-        landed, landed_on = first == 0.0 and scratch.border[0] >= 0, crossing  # it begins on the border and goes across
+        landed, landed_on = first == 0.0 and scratch.border[0] >= 0, crossing  # the step begins on the border
         if crossing >= 0 and not landed:
             landed_on, landed = land_in_time(problem, tables, state, scratch, crossing, first)
         if landed:

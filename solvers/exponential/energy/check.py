@@ -93,10 +93,9 @@ def _pulls(contact: Any) -> bool:
 def has_gained(
     system: System, energy: Any, sampled: Any, duration: float, exchanged: Callable[[], Any], rtol: float
 ) -> bool:
-    """Whether a run without balance ends with more energy than it can have been given; ``sampled`` has its sampled
-    loads.
+    """Whether a run without balance ends with more energy than it can have been given.
 
-    ``exchanged`` as in `tolerated_energy`, computed only if it decides.
+    ``sampled`` has its sampled loads; ``exchanged`` is as in `tolerated_energy`, computed only if it decides.
     """
     first, last, allowed = energy.tolist()
     if not last > FACTOR * allowed or system.blocks.loss.size:

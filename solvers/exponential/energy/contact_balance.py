@@ -107,9 +107,7 @@ def _sum_of_tones(row, scratch, n, size):
 
 @merged
 def _block_forces(problem, tables, state, scratch, node_set, b, y):
-    """Write a block's plain forces, that of the stop that enters, and its state into ``y``; returns its signal at the
-    nodes.
-    """
+    """Write a block's plain forces, that of the stop that enters, and its state into ``y``; its signal at the nodes."""
     size, signal, plain, entering = problem.k.size, splat8(0.0), splat8(0.0), splat8(0.0)
     for u in range(problem.gap.size):
         if acts(problem, state, u):

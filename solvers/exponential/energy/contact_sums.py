@@ -86,9 +86,7 @@ class Sums:
         return slice(self.first + S * head, self.first + S * (head + 1))
 
     def of(self, steps: Steps) -> Any:
-        """(j, y, columns) forms of all steps: S per head damping, S per load work, then damping and work of the
-        tones.
-        """
+        """(j, y, columns) forms of all steps: S per head damping, S per load work, then those of the tones."""
         out = np.zeros((len(steps.weights), *self.shape))
         work = [self._work(steps, load) for load in range(len(self.power))]
         for i, u in enumerate(self.heads.tolist()):

@@ -49,8 +49,9 @@ def start_account(problem, state, scratch):
 
 @inner
 def fly_within(problem, tables, scratch, place, t, span, accounted, energy_tables, row):
-    """Move p and v at index ``place`` of ``split_state`` by ``span`` within a cell; if ``accounted``, the balance of
-    ``row``.
+    """Move p and v at index ``place`` of ``split_state`` by ``span`` within a cell.
+
+    If ``accounted``, the balance of ``row`` is integrated along.
     """
     x = scratch.split_state[place]
     while tables.fastest * span > SERIES_REACH:
@@ -119,8 +120,7 @@ def _time_rounding(problem, energy_tables, t):
 
 @part(ACCOUNT_STEP, _EXCHANGED, types.int64, REAL, types.int64)
 def account_step(problem, tables, energy_tables, scratch, level, t, place):
-    """Work and damping, J, of a tabulated step or whole cell from t on, of the state at index ``place`` of
-    ``split_state``.
+    """Work and damping, J, of a tabulated step or whole cell from t on, of state ``place`` of ``split_state``.
 
     The derivatives of the signals at the start of a tabulated step are in ``scratch.signal_terms``.
     """
@@ -175,9 +175,7 @@ def _exchange_of_signals(pairs, given, count):
 
 @merged
 def _exchange_of_state(rows, plain, given, count, x):
-    """Work and damping of the state x with the drivers and signals, and damping of the structure's blocks by
-    themselves.
-    """
+    """Work and damping of the state x with drivers and signals, and damping of the blocks by themselves."""
     width, gains, losses = x.shape[1], splat8(0.0), splat8(0.0)
     for i in range(0, width, WIDTH):
         p, v = load8(x[0], i), load8(x[1], i)

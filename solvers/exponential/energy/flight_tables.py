@@ -41,9 +41,7 @@ _REACH = 200.0  # radians of the fastest block up to which contact steps have ta
 
 
 class EnergyTables(NamedTuple):
-    """Numbers of the energy balance, read by kernels only; l counts flight steps, then the cell; j counts contact
-    steps.
-    """
+    """Numbers of the energy balance, read by kernels only; l counts flight steps and the cell, j contact steps."""
 
     active: Annotated[float, "number"]  # whether there is a balance
     closed: Annotated[float, "number"]  # whether there are forms for flight
@@ -93,9 +91,7 @@ def energy_tables_for(problem: Problem, tables: Tables, spacing: float) -> Packe
     driver = np.flatnonzero(_drives(problem, tables))
     power = np.zeros((len(problem.load), padded(len(problem.k))))
     power[:, : len(problem.k)] = tables.power_rows[:, len(problem.k) :]
-    step = (
-        problem.table_dt[0] if len(problem.table_dt) else spacing
-    )  # a cell, which is crossed whole even without forms
+    step = problem.table_dt[0] if len(problem.table_dt) else spacing  # cells are crossed whole even without forms
     energy_tables = energy_tables._replace(power=power, spacing=step)
     size, signals = 2 * len(problem.k), len(problem.table_dt)
     if (len(tables.flight_step) + 1) * (len(driver) + 6 * signals) * 2 * padded(size) <= _MOST_NUMBERS:
@@ -206,9 +202,7 @@ def _brief_forms(problem: Problem, powers: Any, h: Any) -> Forms:
 
 
 def _doubled_forms(problem: Problem, powers: Any, h: Any, octave: int, propagator: Any, signal: Any) -> Iterator[Forms]:
-    """(octave, 2, Y, Y) forms of falling steps, each twice as long as that ``octave`` places later; shortest steps
-    first.
-    """
+    """(octave, 2, Y, Y) forms of falling steps, each twice as long as that ``octave`` places later; shortest first."""
     shorter = 0
     fastest = float((np.sqrt(problem.k) + problem.c).max())
     brief = h[-octave:]

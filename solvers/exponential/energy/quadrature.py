@@ -76,9 +76,7 @@ def _plain_loss(n, own, c, steady_rate, x):
 
 @merged
 def _panel_points(tables, scratch, node_set, h, begin, width):
-    """Points of a panel of σ: σ into ``trial``, times after its start into ``clipped``, dt and polynomials into
-    ``between``.
-    """
+    """Points of a panel: σ into ``trial``, times after its start into ``clipped``, polynomials, dt into ``between``."""
     time_exponent, between, nodes = tables.time_exponent[node_set], scratch.between, tables.nodes[node_set]
     start = h * raised(begin, time_exponent)
     for q in range(S):
@@ -129,9 +127,7 @@ def _panel_propagators(problem, scratch, length):
 
 @merged
 def _pull_back(problem, state, scratch, b, moves):
-    """Write the push of a block at the points, moved back to the panel's start, into ``scratch.trial`` and
-    ``clipped``.
-    """
+    """Rates of a block at the points, moved back to the panel's start, into ``scratch.trial`` and ``clipped``."""
     n, p, v = problem.k.size, splat8(0.0), splat8(0.0)
     for u in range(scratch.force.shape[0]):
         if u >= problem.gap.size or acts(problem, state, u):
