@@ -267,8 +267,9 @@ def first_bend(problem, tables, state, scratch, node_set, level, is_new):
 def before_landing(problem, tables, state, scratch, stop, bends, w, x):
     """Whether anything but the landing of ``stop`` happens between the states w and x, which end in times.
 
-    Returns `CLEAR`, `TOO_LONG`, or another stop that has crossed a border of its segment. With ``bends`` a maximum of δ
-    of ``stop`` counts, too. No peak may lie inside a landing, which has no dense output.
+    Returns `CLEAR`, `TOO_LONG`, or another stop that has crossed a border of its segment. ``bends`` tells that the
+    landing is on a bend or border; then a maximum of δ of ``stop`` counts, too. No peak may lie inside a landing, which
+    has no dense output.
     """
     size, width = 2 * problem.k.size, state.x.size
     d = x[width] - w[width]

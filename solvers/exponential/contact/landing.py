@@ -89,7 +89,7 @@ _STAGNATION = 1e-10  # margin, in units of its largest, below which trials that 
 _MOST_VERTICES = 6  # parabolas to the maximum of |F_t| inside a landing
 _MOST_BORDER_TRIALS = 40  # the same on a border: its margin may change only near the start, which bisection must find
 _ERROR_SHARE = 0.1  # part of the embedded difference that counts as the error
-_ERROR_SHARE_FOURTH_ROOT = 1e-2  # the same with u = δ^{1/4}: the step is exact for t² = u⁸, its difference is not
+_ERROR_SHARE_FOURTH_ROOT = 1e-2  # the same with u = δ^{1/4}: terms t² = u⁸, exact in the step, make up the difference
 _DERIVATIVE_SHARE, _MOST_FACTOR = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
 _ROUNDING = 1e-11  # rounding of a margin, in units of its largest
 _LAST_STEP = 0.09  # indentation, in units of the deepest, below which a landing on δ = 0 is tried
@@ -291,7 +291,7 @@ def _accept(problem, tables, state, scratch, variable, stop, level, span):
     """Move the state to the landing in ``scratch.stages[LANDED]``, or to the end of the run if that is earlier.
 
     Samples that are due in between are written. ``level`` is the indentation at which the landing ends, inf for a bend
-    or border. Returns False, with the state as it was, if the step to an output time is not found.
+    or border. Returns False, without moving the state, if the step to an output time is not found.
     """
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
     landed, t, t_end = x[size], state.now[T], state.now[T_END]

@@ -102,7 +102,9 @@ def _fill_basis(nodes, weights, weight_exponent, points, begin, width, basis):
 
 @inner
 def _propagated(k, c, x, p, v):
-    """State of a block a time x later, or earlier if x < 0: the inverse of α I + β A has det exp(A x) = e^{-cx}."""
+    """State of a block a time x later, or earlier if x < 0, by the inverse of α I + β A with the determinant
+    e^{-cx}.
+    """
     alpha, beta = _propagator_of(k, c, x)
     return alpha * p + beta * v, alpha * v - beta * (k * p + c * v)
 
