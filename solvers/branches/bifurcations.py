@@ -8,12 +8,12 @@ A special point is a sign change of its test function along the arclength. With 
     branch point     Π (1 - μ_i) / (1 + |μ_i|), where there is no fold
     grazing          number of contacts within the period changes
     stick            number of borders that laws with memory pass changes: a phase of slip, stick or yielding is born
-    floor            a contact's entry rate less its law's floor, below which the law does not see it
+    floor            a contact's entry rate less its law's floor, below which the law does not depend on it
 
 μ_i are the transverse ones: those of a family of orbits are 1 all along. All but the grazings and sticks are continuous
-along the branch, so that Brent's method finds their zeros in a few orbits. A
-multiplier that jumps over the unit circle at a grazing or a floor is reported as that, not as a flip too. Points where
-Newton's method fails because the return map is not smooth are located before, by `nonsmooth`.
+along the branch, so that Brent's method finds their zeros in a few orbits. A multiplier that jumps over the unit circle
+at a grazing or a floor is reported as that, not also as a flip. Points where Newton's method fails because the return
+map is not smooth are located before, by `nonsmooth`.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from solvers.branches.point import Point, corrected, cubic, is_straight, tangent
 from solvers.orbits import Chain, Orbit, OrbitError, orbit_of
 from solvers.problem import Array
 
-ROUNDING = 1e-9  # of the test functions: what is at a special point all along is marked nowhere
-_SHARP = 1e-10  # of the parameter, or of the arclength between the points: how sharply a point is located
-_AT = 1e-4  # distance from the unit circle of the multiplier at what passes for a special point
-_NUDGES = 0.0, 1e-7, -1e-7, 1e-6, -1e-6  # of the arclength: at some guesses rounding keeps the residual too large
+ROUNDING = 1e-9  # of the test functions: a test function that is zero all along marks nothing
+_SHARP = 1e-10  # tolerance of a special point, in units of the parameter, or of the arclength between the points
+_AT = 1e-4  # distance of a multiplier from its value at a special point up to which it is one
+_NUDGES = 0.0, 1e-7, -1e-7, 1e-6, -1e-6  # of the arclength: for some guesses rounding keeps residuals too large
 
 
 def indicators(orbit: Orbit, tangent: Array) -> dict[str, float]:
@@ -51,12 +51,12 @@ def indicators(orbit: Orbit, tangent: Array) -> dict[str, float]:
 
 @lru_cache(maxsize=16)
 def _pairs(count: int) -> Any:
-    """Numbers (2, pairs) of all pairs of multipliers."""
+    """Indices (2, pairs) of all pairs of multipliers."""
     return np.triu_indices(count, 1)
 
 
 def indicators_at(point: Point) -> dict[str, float]:
-    """Test functions of a point, which is asked on both of its sides; kept there."""
+    """Test functions of a point, computed once."""
     if not point.tests:
         point.tests.update(indicators(point.orbit, point.tangent))
     return point.tests
@@ -68,7 +68,7 @@ def _product(values: Any, shift: float) -> float:
 
 
 def _is_at(orbit: Orbit, name: str) -> bool:
-    """Whether a multiplier is where a special point has it."""
+    """Whether a multiplier has the value of a special point."""
     mu = orbit.transverse
     if name == "neimark-sacker":
         turning = np.abs(mu.imag) > 1e-6 * np.abs(mu)
@@ -151,7 +151,7 @@ def between(a: Point, b: Point, length: float, before: tuple[Point, float] | Non
 
 
 def _roots(arc: Arc, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
-    """(arclength, orbit) of all zeros of test functions that the signs at both ends tell of."""
+    """(arclength, orbit) of the zeros of all test functions that change their sign from begin to end."""
     before, after = arc.indicators(begin), arc.indicators(end)
     names = [name for name in before if before[name] * after[name] < 0.0]
     names = [name for name in names if min(abs(before[name]), abs(after[name])) > ROUNDING]
@@ -164,7 +164,7 @@ def _roots(arc: Arc, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
 
 
 def _dips(arc: Arc, before: tuple[Point, float] | None) -> Iterator[tuple[float, Orbit]]:
-    """(arclength, orbit) where a test function changes its sign twice between two points, by a parabola."""
+    """(arclength, orbit) where a test function may change its sign twice between two points, by a parabola."""
     if before is None:
         return
     first, begin, end = (indicators_at(point) for point in (before[0], arc.a, arc.b))
@@ -182,6 +182,6 @@ def _dips(arc: Arc, before: tuple[Point, float] | None) -> Iterator[tuple[float,
 
 
 def _root(arc: Arc, begin: float, end: float, name: str) -> tuple[float, Orbit] | None:
-    """(arclength, orbit) where a test function is zero; None where it only jumps."""
+    """(arclength, orbit) where a test function is zero; None if it only jumps."""
     pair = zero(arc, begin, end, lambda s: arc.indicators(s)[name])
     return (pair[0], replace(pair[1], mark=name)) if pair is not None and _is_at(pair[1], name) else None

@@ -3,7 +3,7 @@
 Each step predicts a point, on the tangent or on the cubic through the last two points, corrects it by Newton's method
 (Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems, 1977), and sets the next step by the error
 of the prediction. A branch may fold; it has corners where contacts graze, and jumps where two contacts become one.
-`walk` controls the steps, `point` takes one, `bifurcations` locates the special points passed, `nonsmooth` leads across
+`walk` controls the steps, `point` takes one, `bifurcations` locates the special points in between, `nonsmooth` crosses
 corners and jumps.
 """
 
@@ -40,7 +40,7 @@ from solvers.problem import System, counted
 class Branch:
     """Orbits along a parameter, computed as they are asked for: iterate over it, or call `run`; made by `branch`.
 
-    Interrupt an iteration and start another: it gives what is known, then goes on from there.
+    An iteration may be interrupted: the next one yields the known orbits, then continues.
     """
 
     walks: list[Walk]
@@ -51,7 +51,7 @@ class Branch:
 
     @property
     def orbits(self) -> list[Orbit]:
-        """What is known so far, from one end of the branch to the other; special ones carry a ``mark``."""
+        """The orbits known so far, from one end of the branch to the other; special ones carry a ``mark``."""
         behind = self.walks[1].orbits[:0:-1] if len(self.walks) > 1 else []
         return behind + self.walks[0].orbits
 
@@ -63,7 +63,7 @@ class Branch:
 
     @property
     def endings(self) -> tuple[str, ...]:
-        """How each direction ended, in words, with where that is not the end of the span ahead."""
+        """How each direction ended, in words, and where, unless that is the end of the span."""
         return tuple(ending(walk) for walk in self.walks[: len(self.status)])
 
     @property

@@ -14,11 +14,11 @@ from solvers.problem import Array
 if TYPE_CHECKING:
     from solvers.branches.bifurcations import Arc
 
-_AT = 1e-4  # entry rate less the floor, in units of it, at what passes for a point of this
+_AT = 1e-4  # entry rate less the floor, in units of the floor, up to which an orbit is at the floor
 _MOST_TRIALS = 25
-_SAME = 1e-6  # relative difference of states that are the same
-_MOST_TRIALS_OF_GRAZING = 60  # more than halving alone takes: with rounding left in an indentation, no secant is of use
-_MOST_GRAZINGS = 4  # looked for between two points
+_SAME = 1e-6  # relative difference of states up to which they are the same
+_MOST_TRIALS_OF_GRAZING = 60  # more than bisection alone needs: with rounding in an indentation no secant helps
+_MOST_GRAZINGS = 4  # located between two points
 
 
 def zero(arc: Arc, begin: float, end: float, value: Callable[[float], float]) -> tuple[float, Orbit] | None:
@@ -86,7 +86,7 @@ def _floors(arc: Arc, begin: float, end: float) -> Iterator[tuple[float, Orbit]]
 
 
 def _over_floor(orbit: Orbit) -> Array:
-    """Entry rate less the floor, in units of it, of every contact in the order of stops and time; 1 where none acts."""
+    """Entry rate over its floor less 1, of every contact in the order of stops and time; 1 without a floor."""
     log, over = orbit.contacts, np.ones(len(orbit.contacts))
     for stop in latching_stops(orbit.system):
         mine, floor = log.stop == stop, orbit.system.contacts[stop].law.entry_rate_floor
@@ -98,10 +98,10 @@ def _over_floor(orbit: Orbit) -> Array:
 def _grazing(
     arc: Arc, begin: float, first: Orbit, log: str = "contacts"
 ) -> tuple[float, float, Orbit, float, Orbit] | None:
-    """Where the number of contacts changes first after a place: place before, place, orbit, place and orbit behind.
+    """First change of the number of contacts after a place: (place before, place, orbit, place and orbit behind).
 
-    There the shallowest contact's indentation goes to zero, or the flight between two contacts that become one; of
-    "transitions" the time between two.
+    The distance that vanishes there is the shallowest contact's indentation, or the flight between two contacts that
+    become one; of "transitions" the time between two.
     """
     last, behind = arc.b.orbit, arc.length
     more = _count(last, log) > _count(first, log)  # whether contacts are added on the way
@@ -150,7 +150,7 @@ def _parted(a: Orbit, b: Orbit) -> bool:
 
 
 def _distance(more: Orbit, less: Orbit) -> Callable[[Orbit], float]:
-    """What goes to zero where an orbit loses a contact another has."""
+    """The distance that vanishes where an orbit loses a contact that another one has."""
     a, b = more.contacts, less.contacts
     apart = (a.t_in[:, None] > b.t_out) | (a.t_out[:, None] < b.t_in) | (a.stop[:, None] != b.stop)
     return _shallowest if np.any(np.all(apart, axis=1)) else _shortest_flight
@@ -162,7 +162,7 @@ def _shallowest(orbit: Orbit) -> float:
 
 
 def _shortest_phase(orbit: Orbit) -> float:
-    """Square of the shortest time between two transitions of a contact: it vanishes like a root."""
+    """Square of the shortest time between two transitions of a contact, s²: the time vanishes like a square root."""
     log, shortest = orbit.transitions, orbit.period
     for contact in np.unique(log.contact):
         times = np.unique(log.t[log.contact == contact])
@@ -171,7 +171,7 @@ def _shortest_phase(orbit: Orbit) -> float:
 
 
 def _shortest_flight(orbit: Orbit) -> float:
-    """Square of the shortest time between two contacts of one stop: it vanishes like a root."""
+    """Square of the shortest time between two contacts of one stop, s²: the time vanishes like a square root."""
     log, shortest = orbit.contacts, orbit.period
     for stop in np.unique(log.stop):
         mine = log.stop == stop

@@ -9,7 +9,7 @@ from solvers.branches.walk import BranchStatus, Walk
 
 
 def ending(walk: Walk) -> str:
-    """The status as a sentence, with the parameter where that is not the end of the span ahead."""
+    """The status as a sentence, with the parameter unless that is the end of the span."""
     word, values, ahead = walk.status.value, [orbit.parameter for orbit in walk.orbits], walk.first.share > 0.0
     if walk.status in (BranchStatus.LOST, BranchStatus.JUMP):
         return f"{word}; the last orbit, at {values[-1]:.9g}, {_about(walk)}"
@@ -19,7 +19,7 @@ def ending(walk: Walk) -> str:
 
 
 def _about(walk: Walk) -> str:
-    """What may be why no orbit follows on the last one."""
+    """What may be the reason that no orbit was found beyond the last one."""
     orbit, near = walk.point.orbit, nonsmooth_near(walk.point.orbit)
     meets = f" and is near a {near[0].kind} of contact {near[0].first[1]}" if near else ""
     return f"has multipliers up to {np.abs(orbit.multipliers).max():.3g}{meets}"

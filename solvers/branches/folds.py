@@ -23,12 +23,12 @@ from solvers.orbits import Chain, Orbit, OrbitError, PeriodicProblem, is_cut, or
 from solvers.problem import Array, SolverError, System
 
 Make = Callable[[float, float], tuple[System, float]]
-ALONG = 1e-4  # of the motion's size: distance of the runs that give the derivative of g
-CLOSED, SINGULAR = 1e-10, 1e-8  # largest residual, relative to the motion, and |g| that count as none
-MOST, STRAIGHT = 8, 0.8  # iterations of a point, and the least cosine between two tangents
+ALONG = 1e-4  # distance, in units of the motion, of the runs that give the derivative of g
+CLOSED, SINGULAR = 1e-10, 1e-8  # largest residual, relative to the motion, and |g| that count as zero
+MOST, STRAIGHT = 8, 0.8  # most iterations for a point, and least cosine between two tangents
 LONGEST, SHORTEST = 0.2, 1e-4  # steps along the curve, in units of both spans and of the motion
 SHARP = 1e-9  # arc length to which a cusp is located
-POINTS = 400  # in one direction
+POINTS = 400  # at most, in one direction
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ class _Equations:
     back: Array = field(default_factory=lambda: np.eye(0))
 
     def measured_by(self, x: Array, at: tuple[float, float]) -> Array:
-        """Take the motion x (m, N) for the unit; its unknowns."""
+        """Take the motion x (m, N) as the unit of length; returns its unknowns."""
         problem = self._problems(*at)[0]
         metric = metric_of(problem, problem.evaluate(x, at[0], False), self.widths[0])[:-1, :-1]
         self.shape, self.lift = x.shape, np.asarray(np.linalg.cholesky(metric).T, dtype=float)
@@ -79,7 +79,7 @@ class _Equations:
         return np.concatenate((self.lift @ x.ravel(), np.array(at) / self.widths))
 
     def _problems(self, first: float, second: float) -> tuple[PeriodicProblem, PeriodicProblem]:
-        """Along each parameter; the last are kept, with their systems."""
+        """Periodic problems along each parameter; the last ones are kept, with their systems."""
         if self.last is None or self.last[0] != (first, second):
             options = {"method": self.method, "fractions": self.fractions}
             along = PeriodicProblem(lambda value: self.make(value, second), step=1e-6 * self.widths[0], **options)
@@ -88,7 +88,7 @@ class _Equations:
         return self.last[1]
 
     def at(self, y: Array) -> tuple[Chain, PeriodicProblem, Array, Array]:
-        """Runs of the period, the residual (k,) and its derivative (k, k + 2)."""
+        """(chain of the period, problem, residual (k,), its derivative (k, k + 2))."""
         first, second = (float(value) for value in y[-2:] * self.widths)
         x = (self.back @ y[:-2]).reshape(self.shape)
         along, across = self._problems(first, second)
@@ -101,7 +101,7 @@ class _Equations:
         return chain, along, self.lift @ chain.residual.ravel(), jacobian
 
     def singular(self, y: Array, jacobian: Array, borders: tuple[Array, Array]) -> tuple[float, Array, Any]:
-        """g, its derivative (k + 2,), and v and w."""
+        """g, its derivative (k + 2,), and (w, v) as unit vectors."""
         size = len(jacobian)
         bordered = np.block([[jacobian[:, :size], borders[0][:, None]], [borders[1][None], np.zeros((1, 1))]])
         unit = np.append(np.zeros(size), 1.0)
@@ -112,7 +112,7 @@ class _Equations:
         return float(v[-1]), change, (_unit(w[:size]), _unit(v[:size]))
 
     def solved(self, guess: Array, row: Array, borders: tuple[Array, Array], along: Array) -> _Point:
-        """The fold near a guess, from which it moves at right angles to ``row``; raises OrbitError."""
+        """The fold near a guess, on the plane through it at right angles to ``row``; raises OrbitError."""
         y = guess
         for _ in range(MOST):
             chain, problem, residual, jacobian = self.at(y)
@@ -196,7 +196,7 @@ def fold_curve(
 def _walk(
     equations: _Equations, point: _Point, span: tuple[float, float], longest: float
 ) -> tuple[list[tuple[_Point, str]], str]:
-    """Points in one direction with their marks, and how they end."""
+    """Points in one direction with their marks, and how the curve ended."""
     points: list[tuple[_Point, str]] = []
     ends, step = np.array(span) / equations.widths[1], 0.2 * longest
     while len(points) < POINTS:
@@ -232,7 +232,7 @@ def _moved(equations: _Equations, point: _Point, step: float, ends: Array) -> _P
 
 
 def _cusp(equations: _Equations, a: _Point, b: _Point) -> _Point:
-    """Where p turns between two points."""
+    """The point between two others at which p turns."""
     known: dict[float, _Point] = {}
 
     def pace(s: float) -> float:

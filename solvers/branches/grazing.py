@@ -33,11 +33,11 @@ from solvers.orbits import (
 )
 from solvers.problem import Array, System
 
-_MOST = 8  # iterations of Newton's method
+_MOST_ITERATIONS = 8  # of Newton's method
 _CLOSE = 1e-7  # arclength of its last step
-_AT_ONCE = 1e-7  # what least squares may leave of the equations, in units of the states: more, and not all are met
-_ASIDE = 1e-6, 1e-2  # how far beside the branch's direction is seen, in units of the peak indentation and of the rate
-_OFF = 1e-8, 1e-7, 1e-6, 1e-5  # arclengths beside it at which an orbit is tried
+_AT_ONCE = 1e-7  # residual of least squares, in units of the states, above which not all equations hold
+_OFFSETS = 1e-6, 1e-2  # from a grazing orbit to one beside it, in units of the peak indentation, of the rate
+_ARCLENGTHS = 1e-8, 1e-7, 1e-6, 1e-5  # arclengths beside it at which an orbit is tried
 _STEEP = 0.2  # parameter's share of the tangent above which the parameter is held fixed
 
 
@@ -141,7 +141,7 @@ def solved(
 ) -> Grazing:
     """The grazing orbit near a guess, by Newton's method with steps of at most ``within``; raises OrbitError."""
     problem, size = point.problem, len(point.orbit.whole)
-    for _ in range(_MOST):
+    for _ in range(_MOST_ITERATIONS):
         fractions = _with_meetings(fractions, stops, unknowns)
         states, parameter = np.split(unknowns, [len(stops) * size])[0], float(unknowns[len(stops) * size])
         if not np.all(np.diff((*fractions, fractions[0] + 1.0)) > 0.0):
@@ -157,11 +157,11 @@ def solved(
         if distance < _CLOSE and at_once:
             return Grazing(stops, speed, floor, _with_meetings(fractions, stops, unknowns), unknowns, chain)
     met = ", ".join(str(stop) for stop in stops if stop is not None)
-    raise OrbitError(f"no orbit that meets stop {met} at {speed:g} m/s was found in {_MOST} iterations")
+    raise OrbitError(f"no orbit that meets stop {met} at {speed:g} m/s was found in {_MOST_ITERATIONS} iterations")
 
 
 def _with_meetings(fractions: tuple[float, ...], stops: Sequence[int | None], unknowns: Array) -> tuple[float, ...]:
-    """The fractions of the period at the shots' begins, those of the meetings from the unknowns."""
+    """The fractions of the period at which shots begin, with those of the meetings from the unknowns."""
     places, changed = _places(stops), list(fractions)
     for place, fraction in zip(places, unknowns[-len(places) :].tolist(), strict=True):
         changed[place] = fraction
@@ -196,7 +196,7 @@ def _gap_slope(problem: PeriodicProblem, parameter: float, stop: int) -> float:
 
 
 def _rate(chain: Chain, place: int) -> Array:
-    """Of the state at the end of the shot before a place, per second; what is latched stays."""
+    """Rate, per s, of the state at the end of the shot before a place; latched numbers stay."""
     rate = chain.solutions[place - 1].rate
     assert rate is not None
     return np.concatenate((rate, np.zeros(chain.x.shape[1] - len(rate))))
@@ -236,7 +236,8 @@ def signature(orbit: Orbit) -> tuple[int, int]:
 def beside(point: Point, grazing: Grazing, sign: float, wanted: tuple[int, int | None]) -> Point:
     """An orbit very near a grazing orbit on one side: indentation at t*, or rate at entry, above or below it.
 
-    Its tangent points away from the grazing orbit. It has the wanted signature; None: any. Raises OrbitError.
+    Its tangent points away from the grazing orbit. It has the ``wanted`` signature, where None is any. Raises
+    OrbitError.
     """
     problem, size = point.problem, len(point.orbit.whole)
     by_state, by_parameter, aside = _indicators(point, grazing)
@@ -249,7 +250,7 @@ def beside(point: Point, grazing: Grazing, sign: float, wanted: tuple[int, int |
     tangent = tangent_of(problem.evaluate(x, grazing.parameter), point.metric, along)
     tangent *= sign * np.sign(by_state[0] @ tangent[:size] + by_parameter[0] * tangent[-1])
     launch = replace(point, tangent=tangent)
-    for s in _OFF:
+    for s in _ARCLENGTHS:
         try:
             found = moved(launch, ends + s * tangent, abs(launch.share) > _STEEP)
         except OrbitError:
@@ -261,8 +262,8 @@ def beside(point: Point, grazing: Grazing, sign: float, wanted: tuple[int, int |
 
 
 def _indicators(point: Point, grazing: Grazing) -> tuple[Array, Array, float]:
-    """Derivatives of what changes sign at a grazing orbit, by first state and parameter; how far aside to look."""
-    rows, aside = [], _ASIDE[0] * float(point.orbit.contacts.peak_indentation.max(initial=0.0))
+    """Derivatives, by first state and parameter, of the numbers that change sign at a grazing orbit; their offset."""
+    rows, aside = [], _OFFSETS[0] * float(point.orbit.contacts.peak_indentation.max(initial=0.0))
     chain, n = grazing.chain, point.orbit.system.size
     size = chain.x.shape[1]
     columns = np.eye(size, size + 1)
@@ -278,7 +279,7 @@ def _indicators(point: Point, grazing: Grazing) -> tuple[Array, Array, float]:
             by_rate = w @ columns[n : 2 * n] + turning @ columns[:n]
             acceleration = w @ rate[n : 2 * n] + turning @ rate[:n]
             rows.append(by_rate - acceleration / grazing.speed * row if grazing.speed else row)
-    aside = _ASIDE[1] * grazing.speed or aside or _ASIDE[0] * float(np.abs(chain.x[0, :n]).max())
+    aside = _OFFSETS[1] * grazing.speed or aside or _OFFSETS[0] * float(np.abs(chain.x[0, :n]).max())
     return np.array(rows)[:, :-1], np.array(rows)[:, -1], aside
 
 

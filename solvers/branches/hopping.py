@@ -1,8 +1,9 @@
 """Continuation past corners of a branch where a law with memory begins or ceases to latch.
 
-A number that is never latched within the period keeps its value: the orbit is one of a family. Where its border is met
-it begins to change, gradually with the parameter or by a jump to another branch. The motion itself tells which: it is
-simulated from the last orbit for some periods at a slightly larger parameter, and Newton's method starts from there.
+A number that is never latched within the period keeps its value: the orbit is one of a family. Where its border is
+reached, the number begins to change, gradually with the parameter or by a jump to another branch. Simulation decides:
+the motion from the last orbit is integrated for some periods at a slightly larger parameter, and Newton's method starts
+from there.
 """
 
 from __future__ import annotations
@@ -15,16 +16,16 @@ from solvers.branches.point import Point, corrected, point_of
 from solvers.orbits import OrbitError, state_after
 from solvers.problem import SolverError
 
-_SHARES = 1e-5, 1e-4, 1e-3, 1e-2  # of the span: how far the parameter goes
-_PERIODS = 30  # of the motion there
-_PART, _MOST = 0.25, 0.6  # of the way, and the distance there in units of the whole: more, and it is another branch
+_SHARES = 1e-5, 1e-4, 1e-3, 1e-2  # of the span, changes of the parameter that are tried
+_PERIODS = 30  # periods of that run
+_CHECKED_SHARE, _MOST_DISTANCE = 0.25, 0.6  # share of a hop checked; its largest share of the distance on one branch
 
 
 def hopped(a: Point, span: tuple[float, float], last: float) -> Point | None:
-    """The first point found behind a corner near a point, None without laws with memory and where none is found.
+    """The first point found behind a corner near a point; None without laws with memory, or if none is found.
 
-    ``last`` is the share of the span that another hop has just gone, 0 if none has: then one ten times as far is tried
-    first. An orbit that pushes what it latches ahead, so that a border is just met, has a corner everywhere.
+    ``last`` is the share of the span of the hop just before, 0 if there was none; then ten times that share is tried
+    first: where an orbit keeps moving what it latches, so that a border is just reached, every point is a corner.
     """
     shares = sorted(_SHARES, key=lambda share: abs(math.log(share / (10.0 * last)))) if last > 0.0 else _SHARES
     for share in shares if a.orbit.memory else ():
@@ -36,18 +37,18 @@ def hopped(a: Point, span: tuple[float, float], last: float) -> Point | None:
 
 
 def _behind(a: Point, share: float, span: tuple[float, float]) -> Point:
-    """The point at a parameter farther by a share of the span; raises OrbitError among others."""
+    """The point at a parameter farther by a share of the span; raises OrbitError and others."""
     shift = math.copysign(share * (span[1] - span[0]), a.share)
     parameter = min(max(a.chain.parameter + shift, span[0]), span[1])
     point, distance = _point_at(a, parameter)
-    near = a.chain.parameter + _PART * (parameter - a.chain.parameter)
-    if not 0.0 < _point_at(a, near)[1] < _MOST * distance:
+    near = a.chain.parameter + _CHECKED_SHARE * (parameter - a.chain.parameter)
+    if not 0.0 < _point_at(a, near)[1] < _MOST_DISTANCE * distance:
         raise OrbitError("the motion goes over to another branch")
     return point
 
 
 def _point_at(a: Point, parameter: float) -> tuple[Point, float]:
-    """The point that the motion leads to, and its distance; raises OrbitError among others."""
+    """The point that the motion leads to, and its distance; raises OrbitError and others."""
     shots, x = a.problem.shots(parameter), a.chain.x[0]
     states = []
     for number in range(_PERIODS * len(shots) if a.orbit.stable else len(shots)):
@@ -56,5 +57,5 @@ def _point_at(a: Point, parameter: float) -> tuple[Point, float]:
     guess = np.append(np.concatenate(states[-len(shots) :]), parameter)
     chain, error, iterations = corrected(a, guess, True, True)
     off = np.append(chain.x.ravel(), parameter) - a.unknowns
-    ahead = np.append(np.zeros(len(off) - 1), off[-1])  # what is latched may turn the tangent, not the branch
+    ahead = np.append(np.zeros(len(off) - 1), off[-1])  # latched numbers must not reverse the branch
     return point_of(a.problem, chain, error, iterations, a.metric, ahead), math.sqrt(off @ a.metric @ off)

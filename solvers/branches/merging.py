@@ -20,11 +20,11 @@ from solvers.problem import Array, SolverError
 
 _MOST_STEPS = 60  # of the rate
 _FACTORS = 1.02, 1.5, 4.0  # least, first and largest ratio of successive rates
-_SAME = 1e-7  # relative difference of rates that are the same
+_SAME = 1e-7  # relative difference of rates up to which they are the same
 
 
 def led(point: Point, grazing: Grazing, floor: float | None) -> Grazing:
-    """The grazing orbit with another rate, None: that of the contact before it, reached in steps; raises OrbitError."""
+    """The grazing orbit continued to another rate, if None to that of the contact before; raises OrbitError."""
     known, factor = [grazing], _FACTORS[1]
     for _ in range(_MOST_STEPS):
         last = known[-1]
@@ -44,7 +44,7 @@ def led(point: Point, grazing: Grazing, floor: float | None) -> Grazing:
 
 
 def _ahead(known: list[Grazing], rate: float) -> Array:
-    """Guess of the unknowns at a rate: the polynomial in its logarithm through the ones known (Lagrange)."""
+    """Guess of the unknowns at a rate: Lagrange's polynomial in its logarithm through the known ones."""
     places = np.log([grazing.floor for grazing in known])
     weights = [np.prod([(math.log(rate) - b) / (a - b) for b in places if b != a]) for a in places]
     guess: Array = sum(w * grazing.unknowns for w, grazing in zip(weights, known, strict=True))

@@ -1,7 +1,7 @@
-"""Nonsmooth points of a branch, where its return map has a corner or a jump, and the way across them.
+"""Nonsmooth points of a branch, where its return map has a corner or a jump, and how they are crossed.
 
     grazing   a contact appears or vanishes: a flight comes to touch, or a contact's entry rate goes to zero
-    floor     a contact's entry rate passes its law's floor, below which the law does not see it
+    floor     a contact's entry rate passes its law's floor, below which the law does not depend on it
     merging   the flight between two contacts of a law that latches the entry rate vanishes, see `merging`
 
 The Jacobian jumps at each, so that Newton's method from one side fails on the other, and the branch may turn back with
@@ -25,8 +25,8 @@ from solvers.orbits.open_times import open_intervals
 from solvers.problem import ContactLog, SolverError
 
 _SLOW = 4.0  # entry rate, in units of the floor, below which a contact may be about to pass it
-_SHALLOW = 0.1  # indentation, or distance, in units of the deepest peak that may be about to vanish
-_AS_NEAR = 1e-3  # relative difference of the distances of points that may come at once, and its square of the scale
+_SHALLOW = 0.1  # indentation, or distance, in units of the deepest peak, below which a contact may vanish or appear
+_AS_NEAR = 1e-3  # relative difference of distances up to which points may come at once; absolute: its square
 _SAMPLES = 600  # of a period
 ERRORS = SolverError, np.linalg.LinAlgError, ValueError, ArithmeticError, IndexError
 
@@ -67,7 +67,7 @@ def nonsmooth_near(orbit: Orbit) -> list[NonsmoothPoint]:
 
 
 def _with_joint(found: Sequence[tuple[float, NonsmoothPoint]]) -> Iterator[NonsmoothPoint]:
-    """The nonsmooth points; several of one sort at equal distance are preceded by the joint one, met at once."""
+    """The nonsmooth points; several of one sort at equal distance are preceded by one in which all are met at once."""
     rest = list(found)
     while rest:
         nearest, first = rest[0]
@@ -129,7 +129,7 @@ def _in_order(log: ContactLog, stop: int) -> Any:
 
 
 def _after(orbit: Orbit, mine: Any, i: int) -> list[float]:
-    """An open time after a stop's i-th contact, if slower ones follow, which another floor would reach."""
+    """An open time after a stop's i-th contact, if slower ones follow, which another floor would affect."""
     log, rest = orbit.contacts, mine[i + 1 :]
     slower = rest[log.speed_in[rest] < log.speed_in[mine[max(i - 1, 0)]]]
     if not len(slower):
@@ -141,7 +141,7 @@ def _after(orbit: Orbit, mine: Any, i: int) -> list[float]:
 
 
 def met(point: Point, nonsmooth: NonsmoothPoint, within: float) -> Grazing:
-    """The nonsmooth point within an arclength of a point, exactly; raises one of ERRORS."""
+    """Locate a nonsmooth point within an arclength of a point; raises one of ERRORS."""
     orbit, (time, stop) = point.orbit, nonsmooth.first
     log, floor = orbit.contacts, orbit.system.contacts[stop].law.entry_rate_floor
     if nonsmooth.kind != "merging" or nonsmooth.sign > 0:
@@ -160,7 +160,7 @@ def before(point: Point, nonsmooth: NonsmoothPoint, grazing: Grazing) -> Point:
 def behind(point: Point, nonsmooth: NonsmoothPoint, grazing: Grazing) -> Point:
     """The first point of the branch on the other side, its tangent on the way; raises one of ERRORS."""
     contacts, clipped = signature(point.orbit)
-    if nonsmooth.kind == "merging":  # other contacts too change by the jump, and may pass the floor
+    if nonsmooth.kind == "merging":  # other contacts change by the jump, too, and may pass the floor
         floor = point.orbit.system.contacts[nonsmooth.first[1]].law.entry_rate_floor
         far = led(point, grazing, None if nonsmooth.sign > 0 else floor)
         return beside(point, far, nonsmooth.sign, (contacts + nonsmooth.change[0], None))

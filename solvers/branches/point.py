@@ -16,21 +16,21 @@ import numpy as np
 from solvers.orbits import ArclengthCondition, Chain, Orbit, PeriodicProblem, extended, newton, orbit_of, weights
 from solvers.problem import Array
 
-_STEEP = 0.02  # parameter's share of the tangent below which the parameter is not what is held fixed
-_LATCHED = 1e-10  # arclength of what is latched, in units of its own size: keeps the metric regular
-_MOST = 9  # iterations of Newton's method on the way
+_STEEP = 0.02  # parameter's share of the tangent below which the parameter is not held fixed
+_LATCHED = 1e-10  # arclength of latched numbers, in units of their own size: only keeps the metric regular
+_MOST_ITERATIONS = 9  # of Newton's method for a point
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """An orbit on the branch with what it takes to go on from it."""
+    """An orbit on the branch, with all that a step from it needs."""
 
     orbit: Orbit
     problem: PeriodicProblem
     chain: Chain
     tangent: Array
     metric: Array
-    tests: dict[str, float] = field(default_factory=dict, init=False, repr=False)  # test functions, once asked for
+    tests: dict[str, float] = field(default_factory=dict, init=False, repr=False)  # test functions, once computed
 
     @cached_property
     def unknowns(self) -> Array:
@@ -52,7 +52,7 @@ class Point:
 def metric_of(problem: PeriodicProblem, chain: Chain, width: float) -> Array:
     """Matrix of the arclength over [states, parameter].
 
-    What is latched hardly counts: it jumps while it does not act, and acts on the state where it does.
+    Latched numbers hardly count: they may jump while they do not act, and act on the state where they do.
     """
     W, x, (m, whole) = weights(*problem.make(chain.parameter)), chain.x[:, : chain.coordinates], chain.x.shape
     size = float(np.linalg.norm(x @ W.T, axis=1).max()) or 1.0  # an orbit at rest has none
@@ -94,12 +94,12 @@ def cubic(a: Point, b: Point, length: float, s: float) -> Array:
 
 
 def corrected(a: Point, guess: Array, straight: bool, slope: bool = False) -> tuple[Chain, float, int]:
-    """The branch near a guess: where the parameter is the guess's if ``straight``, else at right angles to a's tangent.
+    """The branch near a guess: at its parameter if ``straight``, else at right angles to a's tangent.
 
     Raises OrbitError.
     """
     condition = None if straight else ArclengthCondition(a.metric, a.tangent)
-    return newton(a.problem, guess[:-1].reshape(a.chain.x.shape), float(guess[-1]), condition, slope, _MOST)
+    return newton(a.problem, guess[:-1].reshape(a.chain.x.shape), float(guess[-1]), condition, slope, _MOST_ITERATIONS)
 
 
 def moved(a: Point, guess: Array, straight: bool) -> Point:
@@ -108,6 +108,6 @@ def moved(a: Point, guess: Array, straight: bool) -> Point:
 
 
 def is_straight(*shares: float) -> bool:
-    """Whether the parameter's shares of some tangents tell that no fold is near."""
+    """Whether no fold is near, by the parameter's shares of some tangents."""
     least, most = min(np.abs(shares)), max(np.abs(shares))
     return bool(least > max(_STEEP, 0.3 * most) and abs(np.sign(shares).sum()) == len(shares))

@@ -1,8 +1,8 @@
 """Shots of a branch that begin later, because a contact has come near one of their starts.
 
 A contact whose law depends on the entry rate must not be under way there. One whose force jumps must not begin or end
-there: the state at a fixed time has a corner where the jump passes it, which Newton's method does not cross. Nor may
-a law with memory pass a border there: what it has latched at a fixed time jumps where the border passes it.
+there: the state at a fixed time has a corner where the jump passes it, which Newton's method does not cross. Nor may a
+law with memory reach a border there: its latched numbers at a fixed time jump where the border passes it.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from solvers.branches.point import Point, point_of
 from solvers.orbits import Chain, OrbitError, delayed, latching_stops, newton, open_starts, state_after
 from solvers.problem import Array, ContactLog, System
 
-_MARGIN = 0.1  # of the longest open interval that must lie on both sides of a shot's start
+_MARGIN = 0.1  # part of the longest open interval that must lie on both sides of a shot's start
 
 
 def _to_keep_clear_of(system: System, log: ContactLog) -> Any:
@@ -54,12 +54,12 @@ def reshot(point: Point) -> Point:
     except OrbitError:
         return point
     found = point_of(problem, chain, error, iterations, point.metric, _carried(point, chain, begins))
-    leads_back = bool(orbit.memory) and found.share * point.share < 0.0  # one of a family, a border just not met
+    leads_back = bool(orbit.memory) and found.share * point.share < 0.0  # one of a family, its border just not reached
     return point if leads_back else found
 
 
 def _carried(point: Point, chain: Chain, begins: list[float]) -> Array:
-    """The tangent seen from later begins."""
+    """The tangent transported to later starts of shots."""
     shift, n2 = begins[0], chain.x.shape[1]
     there = replace(point.problem, fractions=(point.problem.fractions[0],))
     make = there.make

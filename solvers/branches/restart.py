@@ -1,4 +1,4 @@
-"""A branch made again from records of its orbits, to go on with."""
+"""A branch restored from records of its orbits, to be continued."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def restarted(
     step: float,
     method: Any = None,
 ) -> Branch:
-    """A branch from records of its orbits per direction, to go on with.
+    """A branch restored from records of its orbits per direction.
 
     A record has parameter, state (as `Orbit.whole`), phase, mark, iterations.
     """
@@ -38,7 +38,7 @@ def restarted(
 def _restarted_walk(
     make: Any, span: tuple[float, float], records: list[dict[str, Any]], status: BranchStatus, step: float, method: Any
 ) -> Walk:
-    """One direction; orbits are integrated once more, their states are not changed."""
+    """One direction; orbits are integrated again, their states are not changed."""
     points: list[Point] = []
     system, period = make(records[0]["parameter"])
     method, width = checked(system, period, method, 1), span[1] - span[0]

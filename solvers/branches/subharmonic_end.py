@@ -33,7 +33,7 @@ class Scaled:
 
 
 def subharmonic_end(a: Point, b: Point, fold: Orbit) -> Orbit | None:
-    """The flip of half the period that a fold between two points of a branch is; None if it is a plain fold."""
+    """The flip of half the period that a fold between two points of a branch really is; None if it is a plain fold."""
     if why_not_periodic(fold.system, 0.5 * fold.period) or a.problem.fractions != b.problem.fractions:
         return None
     before, after = (_half_apart(point.orbit) for point in (a, b))
@@ -46,7 +46,7 @@ def subharmonic_end(a: Point, b: Point, fold: Orbit) -> Orbit | None:
 
 
 def _half_apart(orbit: Orbit) -> Array:
-    """d(x) of an orbit."""
+    """d(x) of an orbit, its change over half a period."""
     return state_after(delayed(orbit.system, orbit.phase), orbit.whole, 0.5 * orbit.period, orbit.method) - orbit.whole
 
 

@@ -19,20 +19,20 @@ from solvers.orbits import Orbit, OrbitError, is_cut
 from solvers.problem import Array
 
 MOST_ORBITS = 2000
-_CORNER = 1e-5  # arclength step at which a corner is looked for with laws with memory
-_SMALLEST = 1e-8  # arclength step at which a branch counts as lost
+_CORNER = 1e-5  # arclength step below which, with laws with memory, a corner is looked for
+_SMALLEST = 1e-8  # arclength step below which a branch counts as lost
 _GOOD = 0.06, 0.1  # distance of a good guess from the branch, in units of the step: on a cubic, on the tangent
-_MANY = 6  # Newton iterations that ask for shorter steps
-_SHARPEST = 0.8  # cosine of the largest turn between two orbits
-_THERE = 3e-6  # arclength within which a nonsmooth point may lie behind
+_MANY = 6  # Newton iterations from which on steps are halved
+_SHARPEST = 0.8  # least cosine between the tangents of two orbits
+_COINCIDENT = 3e-6  # arclength up to which a nonsmooth point may lie behind
 _NEAR_NONSMOOTH = 1e-4  # arclength step below which a fold may hide behind a nonsmooth point
-_NEAR = 1e-4  # arclength from where a branch is lost within which a nonsmooth point may be why
-_AROUND = 3.0  # arclength, in units of a failed step, within which a nonsmooth point is looked for
-_AGAIN = 0.03  # part of a step after whose failure nonsmooth points are looked for again
+_NEAR = 1e-4  # arclength from where a branch is lost within which a nonsmooth point may be the reason
+_SEARCH = 3.0  # arclength, in units of a failed step, within which a nonsmooth point is looked for
+_RETRY = 0.03  # share of a failed step at which nonsmooth points are looked for again
 _MOST_NONSMOOTH = 6  # tried at a time
-_LAST = 3e-7  # arclength step below which any turn counts as a nonsmooth point
+_LAST_STEP = 3e-7  # arclength step below which any turn counts as a nonsmooth point
 _FARTHEST = 20.0  # distance of an orbit from the one before, in steps, beyond which it belongs to another branch
-_BEHIND = 0.003  # first step behind a nonsmooth point, in units of the largest
+_FIRST_STEP = 0.003  # first step behind a nonsmooth point, in units of the largest
 
 
 class BranchStatus(Enum):
@@ -50,7 +50,7 @@ class BranchStatus(Enum):
 
 @dataclass(eq=False)
 class Walk:
-    """One direction of a branch, walked as far as it has been asked for."""
+    """One direction of a branch, as far as it has been computed."""
 
     point: Point
     span: tuple[float, float]
@@ -59,9 +59,9 @@ class Walk:
     status: BranchStatus = BranchStatus.RUNNING
     step: float = 0.0
     before: tuple[Point, float] | None = None  # the point before and the arclength from it
-    tried: float = math.inf  # step after whose failure nonsmooth points were looked for
+    tried: float = math.inf  # step at whose failure nonsmooth points were last looked for
     hop: float = 0.0  # share of the span of the last hop, 0 after a longer step
-    at_jump: bool = False  # whether one of them is a jump that could not be crossed
+    at_jump: bool = False  # whether a jump ahead could not be crossed
     passed: list[Point] = field(default_factory=list)
     values: list[float] = field(default_factory=list)  # of the parameter there
 
@@ -83,7 +83,7 @@ class Walk:
                 first, point = False, hopped(self.point, self.span, self.hop)
                 if point is not None:
                     return self._hop(point)
-            if following is None and (self.step < _SMALLEST or h < _AGAIN * self.tried):
+            if following is None and (self.step < _SMALLEST or h < _RETRY * self.tried):
                 nonsmooth, self.tried = self._nonsmooth_ahead(h), h
                 if nonsmooth is not None and (nonsmooth[0] is None or self._taken(nonsmooth[0])):
                     return self._cross(*nonsmooth)
@@ -96,12 +96,12 @@ class Walk:
         return None
 
     def _taken(self, following: Point) -> bool:
-        """Whether the next orbit is good; it and the special points before it are kept, up to a subharmonic end."""
+        """Whether the next orbit is accepted; it is kept with the special points before it, up to a subharmonic end."""
         a = self.point
         distance = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
         special = between(a, following, distance, self.before)
         marks = [orbit.mark for orbit in special]
-        if distance > _THERE and _jumped(a, following, marks):
+        if distance > _COINCIDENT and _jumped(a, following, marks):
             self.status, self.step = BranchStatus.RUNNING, 0.2 * distance
             return False
         for place, fold in enumerate(special):
@@ -121,7 +121,7 @@ class Walk:
         self.at_jump = False
         for nonsmooth in nonsmooth_near(a.orbit)[:_MOST_NONSMOOTH]:
             try:
-                grazing = met(a, nonsmooth, _AROUND * reach)
+                grazing = met(a, nonsmooth, _SEARCH * reach)
                 last = self._last_before(nonsmooth, grazing, reach)
                 if last is not None:
                     self.at_jump = self.at_jump or nonsmooth.kind == "merging"
@@ -136,31 +136,31 @@ class Walk:
         a = self.point
         off = unknowns_at(a, grazing) - a.unknowns
         distance, whole = float(a.tangent @ a.metric @ off), math.sqrt(off @ a.metric @ off)
-        if not -_THERE < distance < reach or whole > 2.0 * abs(distance) + _THERE:
+        if not -_COINCIDENT < distance < reach or whole > 2.0 * abs(distance) + _COINCIDENT:
             return None
         try:
             last = before(a, nonsmooth, grazing)
         except ERRORS:
-            return a if 0.0 < distance <= _LAST else None  # a itself is near enough
+            return a if 0.0 < distance <= _LAST_STEP else None  # a itself is near enough
         if not a.tangent @ a.metric @ last.tangent > 0.0:
             return None
         return last if distance > _SMALLEST else a
 
     def _cross(self, last: Point | None, point: Point, found: list[Orbit]) -> None:
-        """Go on behind a nonsmooth point."""
+        """Continue behind a nonsmooth point."""
         a = last or self.point
         inside = self._inside(point.unknowns)  # a jump may lead out of the span
         self.orbits[len(self.orbits) - (last is not None) :] = found if inside else found[:-1]
         self._pass(a)
         self._pass(point)
-        self.point, self.before, self.step = reshot(point), None, _BEHIND * self.largest
+        self.point, self.before, self.step = reshot(point), None, _FIRST_STEP * self.largest
         if not inside:
             self.status = BranchStatus.END
         elif len(self.orbits) >= MOST_ORBITS:
             self.status = BranchStatus.LIMIT
 
     def _hop(self, point: Point) -> None:
-        """Go on behind a corner of laws with memory, marked if the number of transitions changes there."""
+        """Continue behind a corner due to laws with memory, marked if the number of transitions changes there."""
         same = len(point.orbit.transitions) == len(self.point.orbit.transitions)
         distance = abs(point.chain.parameter - self.point.chain.parameter)
         self._cross(None, point, [point.orbit if same else replace(point.orbit, mark="stick")])
@@ -183,7 +183,7 @@ class Walk:
         strayed = math.sqrt(max(float(off @ a.metric @ off) - distance**2, 0.0))
         sharp = aligned < _SHARPEST or strayed > 0.5 * distance
         across = signature(a.orbit) != signature(b.orbit) or len(a.orbit.transitions) != len(b.orbit.transitions)
-        hops = h < (_THERE if across else _LAST) and distance > 0.0 and strayed < _FARTHEST * h
+        hops = h < (_COINCIDENT if across else _LAST_STEP) and distance > 0.0 and strayed < _FARTHEST * h
         if (sharp and not hops) or is_cut(b.chain, b.orbit.system):  # one not located is stepped over
             self.step *= 0.2 if len(a.orbit.contacts) != len(b.orbit.contacts) else 0.5
             return None
@@ -230,7 +230,7 @@ class Walk:
         return bool(self.span[0] <= unknowns[-1] <= self.span[1])
 
     def _at_edge(self, beyond: Array) -> Point:
-        """The point at the end of the span on the way to a place beyond it."""
+        """The point at the end of the span, on the way to unknowns beyond it."""
         a = self.point
         edge = self.span[0] if beyond[-1] < self.span[0] else self.span[1]
         share = (edge - a.chain.parameter) / (beyond[-1] - a.chain.parameter)
@@ -239,12 +239,12 @@ class Walk:
         return moved(a, guess, True)
 
     def _pass(self, point: Point) -> None:
-        """Remember a point."""
+        """Remember a point as passed."""
         self.passed.append(point)
         self.values.append(point.chain.parameter)
 
     def _finish_or_go_on(self, point: Point) -> None:
-        """Recognise orbits passed before and the limit."""
+        """End at an orbit passed before or at the limit, else move on to the point."""
         met = self._met(point)
         if met is not None:
             self.status = BranchStatus.CLOSED if met == 0 else BranchStatus.RETURNED
@@ -255,12 +255,14 @@ class Walk:
             if abs(point.chain.parameter - self.point.chain.parameter) > self.hop * (self.span[1] - self.span[0]):
                 self.hop = 0.0
             held = len(point.chain.frozen) > len(self.point.chain.frozen)
-            if held and self.point.share * point.share < 0.0:  # a family in what is latched has no way of its own
+            if (
+                held and self.point.share * point.share < 0.0
+            ):  # along a family of latched numbers the branch has no direction of its own
                 point, self.before = replace(point, tangent=-point.tangent), None
             self.point = reshot(point)
 
     def _met(self, point: Point) -> int | None:
-        """Number of an orbit passed before that lies on the way just gone; 0 is the first."""
+        """Index of an orbit passed before that lies on the arc just computed; 0 is the first; None if there is none."""
         a = self.point
         self._pass(point)
         if point.problem.fractions != a.problem.fractions:
@@ -282,7 +284,10 @@ class Walk:
 
 
 def _jumped(a: Point, b: Point, marks: list[str]) -> bool:
-    """Whether b lies on another branch: the parameter turns, a multiplier passes one, or contacts come, all unseen."""
+    """Whether b lies on another branch.
+
+    Then the parameter turns, a multiplier passes 1, or contacts change, without a special point.
+    """
     turned = a.share * b.share < 0.0 and not {"fold", "floor", "stick"} & {*marks}
     first, second = (indicators_at(point)["branch point"] for point in (a, b))
     passed = first * second < 0.0 and min(abs(first), abs(second)) > ROUNDING
@@ -291,7 +296,7 @@ def _jumped(a: Point, b: Point, marks: list[str]) -> bool:
 
 
 def _same_contacts(a: Orbit, b: Orbit) -> bool:
-    """Whether each contact of an orbit has one of another near it: none nearer to the next."""
+    """Whether every contact of an orbit has one of the other near it, nearer than half the time to the next."""
     if len(a.contacts) != len(b.contacts):
         return False
     for stop in np.unique(a.contacts.stop):
@@ -303,7 +308,7 @@ def _same_contacts(a: Orbit, b: Orbit) -> bool:
 
 
 def _is_passed(known: Point, a: Point, b: Point) -> bool:
-    """Whether an orbit lies on the branch between two points, which others near it do not."""
+    """Whether a known orbit lies on the branch between two points, by correcting a guess at its parameter."""
     distance = float(a.tangent @ a.metric @ (b.unknowns - a.unknowns))
     share = (known.chain.parameter - a.chain.parameter) / (b.chain.parameter - a.chain.parameter)
     alike = _same_contacts(known.orbit, a.orbit) or _same_contacts(known.orbit, b.orbit)

@@ -4,17 +4,18 @@ The state is x = [p (n), v (n), energy balance (2 + 2E + 3F)], with b the push a
 
     p' = v + b^p·F,   v' = -k p - c v + b^v·F + l·s(t),   δ_s = r_s·[p, v] - g_s
 
-Two ranges of indices: *elements* s, the stops and what else exerts forces, E in number, have laws and what these know;
-*rows* r, R in number, the coordinates on which they act, have vectors and motion. Element s has the rows from
-``first[s]`` to before ``first[s + 1]``. Of a stop on a line the indentation is the displacement on the first of them,
-and there it pushes. The first two rows of a circular clearance, which has a ``radius`` c, read the vector u from the
-place to the centre, r = |u|:
+Two ranges of indices: *elements* s, E in number, are the stops and whatever else exerts forces; they have laws and what
+these latch. *Rows* r, R in number, are the coordinates on which elements act; they have vectors and motion. Element s
+has the rows from ``first[s]`` to before ``first[s + 1]``. On a line, the indentation is the displacement on the first
+of them, where the force pushes. The first two rows of a circular clearance, which has a ``radius`` c, read the vector u
+from the place to the centre, r = |u|:
 
     δ = r - c,  δ̇ = u·u̇/r,  force on the rows N u/r;    of an outer one, where c is kept negative: δ = |c| - r, -N u/r
 
 The entries of the energy balance are the integrals of input power and damping power, then for every stop of force ×
-indentation rate (work done on the stop, J) and of force (impulse, N s). Behind them there are three for each with
-friction: of F_t ξ̇, of F_t, and of σ ξ̇ in slip, corrected by the spring to the way of the slider.
+indentation rate (work done on the stop, J) and of force (impulse, N s). Then come three for each element with friction:
+the integrals of F_t ξ̇ (J), of F_t (N s), and the path of its slider (m), ∫ σξ̇ dt in slip corrected by the change of
+the spring's stretch.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from solvers.compiled.decorators import entry as entry  # re-exported for files 
 from solvers.compiled.decorators import inlined, inner, kernel, reordered
 from solvers.compiled.decorators import merged as merged
 from solvers.compiled.fields import packed_type
-from solvers.compiled.friction import friction_force, slide, slip_of, speed_of, way_of
+from solvers.compiled.friction import friction_force, slip_sign, xi_and_rate_of, xi_of, xi_rate_of
 from solvers.compiled.packed import PackedType
 from solvers.compiled.parts import RADIAL_ACCELERATION, RADIAL_MOTION, RADIAL_PUSH, part
 from solvers.compiled.shortcuts import known_by_type
@@ -46,7 +47,7 @@ class Problem(NamedTuple):
 
     k: Annotated[Any, "N"]  # block stiffness, 1/s²
     c: Annotated[Any, "N"]  # block damping, 1/s
-    loss: Annotated[Any, "2*N, 2*N"]  # damping power zᵀ loss z in W, or (0, 0): then Σ c v²
+    loss: Annotated[Any, "2*N, 2*N"]  # damping power zᵀ loss z in W, or (0, 0): then the power is Σ c v²
     push: Annotated[Any, "R, 2*N"]  # state rate per newton on a row
     read: Annotated[Any, "R, 2*N"]  # displacement = read·z - gap, m
     read_rate: Annotated[Any, "R, 2*N"]  # its rate = read_rate·z, m/s
@@ -178,8 +179,8 @@ def call_renewal_gradient(typingctx, address, border, delta, delta_dot, entry_ra
     return signature, codegen
 
 
-_ROUNDING = 1e-14  # of an indentation, in units of the gap it is measured from
-_ON_KNOT = 1e-11  # share of a knot within which laws take the motion for on it, see `contacts.kernels`
+_DELTA_ROUNDING = 1e-14  # rounding of an indentation, in units of its gap
+_ON_KNOT = 1e-11  # distance from a knot, in units of its δ, up to which laws count as on it, see `contacts.kernels`
 
 call_force = _c_function(1)
 call_gradient = _c_function(3)
@@ -187,7 +188,7 @@ call_gradient = _c_function(3)
 
 @inlined
 def contact_forces(problem, stop, delta, delta_dot, entry_rate, force):
-    """Forces, N, of one stop at ``delta.size`` indentations and rates; those below its surface are raised to it."""
+    """Forces, N, of one stop at ``delta.size`` indentations and rates; ``delta`` below its surface is raised to it."""
     for i in range(delta.size):
         delta[i] = max(delta[i], problem.knots[stop, 0])
     law_forces(problem, stop, delta.size, delta, delta_dot, entry_rate, force)
@@ -203,12 +204,12 @@ def force_at(problem, s, delta, delta_dot, entry_rate, batch):
 
 @inlined
 def off_knots(problem, stop, segment, delta):
-    """δ; where that is a knot to rounding, a point of the segment beside it: the force may jump at the knot."""
+    """δ, but for a knot, up to rounding, a point beside it in the segment: the force may jump at the knot."""
     lower, upper = problem.knots[stop, segment - 1], problem.knots[stop, segment]
-    near = _ROUNDING * abs(problem.gap[row_of(problem, stop)])
-    if lower > 0.0 and abs(delta - lower) <= near + _ON_KNOT * lower:
+    rounding = _DELTA_ROUNDING * abs(problem.gap[row_of(problem, stop)])
+    if lower > 0.0 and abs(delta - lower) <= rounding + _ON_KNOT * lower:
         return lower * (1.0 + 2.0 * _ON_KNOT)
-    if upper < np.inf and abs(delta - upper) <= near + _ON_KNOT * upper:
+    if upper < np.inf and abs(delta - upper) <= rounding + _ON_KNOT * upper:
         return upper * (1.0 - 2.0 * _ON_KNOT)
     return delta
 
@@ -221,7 +222,7 @@ def law_forces(problem, stop, n, delta, delta_dot, entry_rate, force):
 
 @inner
 def contact_gradient(problem, stop, delta, delta_dot, entry_rate, by_delta, by_rate, by_entry):
-    """Derivatives of the forces by indentation, rate and entry rate; those below its surface are raised to it."""
+    """Derivatives of the forces by δ, δ̇ and entry rate; ``delta`` below the surface is raised to it."""
     for i in range(delta.size):
         delta[i] = max(delta[i], problem.knots[stop, 0])
     results = (by_delta, by_rate, by_entry)
@@ -237,7 +238,7 @@ def copy(source, target, n):
 
 @inlined
 def raised(x, exponent):
-    """X to the power of a whole number that is given as a real one, 0 to 4 as a rule."""
+    """X to the power of a whole number given as a float, usually 0 to 4."""
     result = 1.0
     for _ in range(int(exponent)):
         result *= x
@@ -281,7 +282,7 @@ def table_value(problem, j, t):
 
 @inner
 def add_loads(problem, t, x, rate):
-    """Add all loads at time t to the state's rate and their power to the energy balance."""
+    """Add all loads at time t to the state's rate, and their power to the rate of the energy balance."""
     size = 2 * problem.k.size
     for i in range(problem.tone_omega.size):
         angle = problem.tone_omega[i] * t
@@ -294,7 +295,7 @@ def add_loads(problem, t, x, rate):
 
 @inner
 def _add_load(problem, load, value, size, x, rate):
-    """Add the load of one signal of a given value."""
+    """Add the load of a signal with a given value, and its power."""
     for i in range(size):
         rate[i] += problem.load[load, i] * value
     rate[size] += value * dot(problem.power[load], x, size)
@@ -331,7 +332,7 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
         rate[size + 2 + 2 * s] = 0.0
         rate[size + 3 + 2 * s] = 0.0
         if rubs(problem, s):
-            calls += _add_rubbing(problem, s, t, segment[s], entry_rate[s], x, rate, batch)
+            calls += _add_element_with_friction(problem, s, t, segment[s], entry_rate[s], x, rate, batch)
         elif segment[s] > 0:
             delta, delta_dot = indentation_and_rate(problem, s, x)
             delta = off_knots(problem, s, segment[s], delta)
@@ -344,8 +345,8 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
 
 
 @inner
-def _add_rubbing(problem, s, t, segment, entry_rate, x, rate, batch):
-    """Add what an element with friction does to the state's rate, and its power; number of law calls."""
+def _add_element_with_friction(problem, s, t, segment, entry_rate, x, rate, batch):
+    """Add the forces of an element with friction to the state's rate, and their power; number of law calls."""
     if segment == 0:
         no_friction(problem, s, rate)
         return 0
@@ -359,7 +360,7 @@ def _add_rubbing(problem, s, t, segment, entry_rate, x, rate, batch):
 
 @inlined
 def width_of(problem):
-    """Numbers of a state: of the blocks, of the energy balance, of friction."""
+    """Length of a state: blocks, energy balance, friction."""
     width = 2 * problem.k.size + 2 + 2 * problem.law.size
     if is_planar(problem):
         for s in range(problem.friction.shape[0]):
@@ -370,7 +371,7 @@ def width_of(problem):
 
 @inlined
 def row_of(problem, s):
-    """First row of an element, which is the element itself where all have one."""
+    """First row of an element: its own index if all have one row."""
     return problem.first[s] if is_planar(problem) else s
 
 
@@ -382,7 +383,7 @@ def element_of(problem, r):
 
 @inlined
 def place_of(problem, s):
-    """Place of an element's δ and force at the nodes, see `Problem.own`."""
+    """Index of an element's δ and force in arrays at the nodes, see `Problem.own`."""
     return problem.own[s] if is_planar(problem) else s
 
 
@@ -395,13 +396,13 @@ def rubs(problem, s):
 
 @merged
 def slider_of(problem, s):
-    """The numbers of a slider, see `problem.friction`."""
+    """The numbers of a slider among the element's parameters, see `problem.friction`."""
     return problem.parameters[s, problem.friction[s, 0] :]
 
 
 @inner
 def rows_at(problem, s, x):
-    """Motion of the rows of an element with friction: u, u̇, w, ẇ, and of the third one with its sign turned."""
+    """Motion of the rows of an element with friction: u, u̇, w, ẇ, and of a third row with its sign changed, else 0."""
     first, size, turned, turning = row_of(problem, s), 2 * problem.k.size, 0.0, 0.0
     u, u_dot = dot(problem.read[first], x, size) - problem.gap[first], dot(problem.read_rate[first], x, size)
     w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
@@ -421,15 +422,15 @@ def delta_of(radius, rows):
 
 
 @inner
-def slide_of(problem, s, t, x):
+def xi_and_rate_at(problem, s, t, x):
     """ξ and ξ̇ of a stop with friction in a state."""
     u, u_dot, w, w_dot, turned, turning = rows_at(problem, s, x)
-    return slide(radius_of(problem, s), slider_of(problem, s), t, u, u_dot, w, w_dot, turned, turning)
+    return xi_and_rate_of(radius_of(problem, s), slider_of(problem, s), t, u, u_dot, w, w_dot, turned, turning)
 
 
 @inner
 def angle_of(problem, s, x):
-    """Angle, rad, at which a place is in its circle; NaN of a stop on a line."""
+    """Angle, rad, from the centre of a circle to the place; NaN of a stop on a line."""
     if not is_circle(problem, s):
         return math.nan
     first, size = row_of(problem, s), 2 * problem.k.size
@@ -440,7 +441,7 @@ def angle_of(problem, s, x):
 
 @inlined
 def accelerations_at(problem, s, rate):
-    """Second derivatives of the displacements that `rows_at` has, from the state's rate."""
+    """ü, ẅ and the second derivative of the third row with its sign changed, from the state's rate; see `rows_at`."""
     first, size, turning = row_of(problem, s), 2 * problem.k.size, 0.0
     u_twice, w_twice = dot(problem.read_rate[first], rate, size), dot(problem.read_rate[first + 1], rate, size)
     if first + 2 < row_of(problem, s + 1):
@@ -450,44 +451,44 @@ def accelerations_at(problem, s, rate):
 
 @inlined
 def no_friction(problem, s, rate):
-    """Nothing rubs: no power."""
+    """Set the rates of a slider's three integrals to zero."""
     account = problem.friction[s, 1]
     rate[account], rate[account + 1], rate[account + 2] = 0.0, 0.0, 0.0
 
 
 @inner
 def add_friction(problem, s, t, rows, normal, rate):
-    """Add what a stop with friction in contact does to the state's rate under a force N, and the power of friction."""
+    """Add N and F_t of a stop in contact to the state's rate, and what its slider's integrals grow by."""
     u, u_dot, w, w_dot, turned, turning = rows
-    own, radius, account = slider_of(problem, s), radius_of(problem, s), problem.friction[s, 1]
-    way = way_of(radius, own, t, u, w, turned) if own[CODE] == 0.0 else 0.0
-    speed, force = speed_of(radius, own, u, u_dot, w, w_dot, turning), friction_force(radius, own, way, normal)
+    slider, radius, account = slider_of(problem, s), radius_of(problem, s), problem.friction[s, 1]
+    xi = xi_of(radius, slider, t, u, w, turned) if slider[CODE] == 0.0 else 0.0
+    xi_rate, force = xi_rate_of(radius, slider, u, u_dot, w, w_dot, turning), friction_force(radius, slider, xi, normal)
     _add_to_rows(problem, s, u, w, normal, force, rate)
-    rate[account], rate[account + 1], rate[account + 2] = force * speed, force, slip_of(own) * speed
+    rate[account], rate[account + 1], rate[account + 2] = force * xi_rate, force, slip_sign(slider) * xi_rate
 
 
 @inner
 def _add_to_rows(problem, s, u, w, normal, tangential, rate):
-    """Add what N and F_t of a stop with friction do to the state's rate; u and w are the displacements of its rows."""
+    """Add N and F_t of a stop with friction, whose first two rows are at u and w, to the state's rate."""
     first, size, radius = row_of(problem, s), 2 * problem.k.size, radius_of(problem, s)
     if radius == 0.0:
         for i in range(size):
             rate[i] += problem.push[first, i] * normal - problem.push[first + 1, i] * tangential
         return
     square = u * u + w * w
-    share, press = tangential * abs(radius) / square, math.copysign(normal, normal * radius) / math.sqrt(square)
-    along, aside = press * u - share * w, press * w + share * u
+    share_t, share_n = tangential * abs(radius) / square, math.copysign(normal, normal * radius) / math.sqrt(square)
+    first_force, second_force = share_n * u - share_t * w, share_n * w + share_t * u
     for i in range(size):
-        rate[i] += problem.push[first, i] * along + problem.push[first + 1, i] * aside
+        rate[i] += problem.push[first, i] * first_force + problem.push[first + 1, i] * second_force
     if first + 2 < row_of(problem, s + 1):
-        turns = math.copysign(1.0, slider_of(problem, s)[ARM]) * tangential
+        third_force = math.copysign(1.0, slider_of(problem, s)[ARM]) * tangential
         for i in range(size):
-            rate[i] -= problem.push[first + 2, i] * turns
+            rate[i] -= problem.push[first + 2, i] * third_force
 
 
 @inner
-def add_sideways(problem, s, force, x, rate):
-    """Add what a tangential force F_t of stop s does to the state's rate."""
+def add_tangential(problem, s, force, x, rate):
+    """Add a tangential force F_t of stop s to the state's rate."""
     u, _, w, _, _, _ = rows_at(problem, s, x)
     _add_to_rows(problem, s, u, w, 0.0, force, rate)
 
@@ -501,7 +502,7 @@ def is_circle(problem, s):
 
 @inlined
 def radius_of(problem, s):
-    """Its radius, as in `Problem`; 0 of a stop on a line."""
+    """Radius of a stop as in `Problem`; 0 of a stop on a line."""
     return problem.radius[s] if problem.radius.size > 0 else 0.0
 
 
@@ -516,7 +517,7 @@ def indentation(problem, s, x):
 
 @inlined
 def indentation_rate(problem, s, x):
-    """Its rate, m/s."""
+    """Indentation rate of stop s, m/s."""
     if is_circle(problem, s):
         return radial_motion(problem, s, x)[1]
     return dot(problem.read_rate[row_of(problem, s)], x, 2 * problem.k.size)
@@ -524,7 +525,7 @@ def indentation_rate(problem, s, x):
 
 @inlined
 def indentation_and_rate(problem, s, x):
-    """Both: of a circle for the cost of one."""
+    """(δ, δ̇) of stop s; of a circle for the cost of one."""
     if is_circle(problem, s):
         return radial_motion(problem, s, x)
     row, size = row_of(problem, s), 2 * problem.k.size
@@ -533,7 +534,7 @@ def indentation_and_rate(problem, s, x):
 
 @part(RADIAL_MOTION, types.UniTuple(REAL, 2), types.int64, VECTOR)
 def radial_motion(problem, s, x):
-    """Indentation, m, and its rate, m/s, of a circular clearance; at the centre the rate is that of going outward."""
+    """(δ, m, δ̇, m/s) of a circular clearance; at the centre δ̇ is that of going outward."""
     square, product, speed, size = 0.0, 0.0, 0.0, 2 * problem.k.size
     for r in range(row_of(problem, s), row_of(problem, s) + 2):
         u = dot(problem.read[r], x, size) - problem.gap[r]
@@ -552,7 +553,7 @@ def radial(square, product, speed, radius):
 
 @inlined
 def radial_acceleration(radius, u, u_dot, u_twice, w, w_dot, w_twice):
-    """δ̈ from the motion of both rows, of a stop on a line from the first."""
+    """δ̈ from the motion of the first two rows; of a stop on a line from the first."""
     if radius == 0.0:
         return u_twice
     square, product = u * u + w * w, u * u_dot + w * w_dot
@@ -575,7 +576,7 @@ def _radial_acceleration(problem, s, x, rate):
 
 @part(RADIAL_PUSH, types.void, types.int64, REAL, VECTOR, VECTOR)
 def _add_radial_push(problem, s, force, x, rate):
-    """Add what a radial force does to the state's rate."""
+    """Add a radial force to the state's rate."""
     square, first, size = 0.0, row_of(problem, s), 2 * problem.k.size
     for r in range(first, first + 2):
         square += (dot(problem.read[r], x, size) - problem.gap[r]) ** 2
@@ -596,7 +597,7 @@ def acceleration_of(problem, s, x, rate):
 
 @inlined
 def add_push(problem, s, force, x, rate):
-    """Add what a force of stop s does to the state's rate."""
+    """Add a force of stop s along its indentation to the state's rate."""
     if is_circle(problem, s):
         _add_radial_push(problem, s, force, x, rate)
         return
@@ -607,5 +608,5 @@ def add_push(problem, s, force, x, rate):
 
 @merged
 def push_of(problem, u):
-    """State rate per unit of an input: of a row, or behind the rows of a load."""
+    """State rate per unit of an input: of a row's force, or with indices behind the rows of a load's signal."""
     return problem.push[u] if u < problem.gap.size else problem.load[u - problem.gap.size]

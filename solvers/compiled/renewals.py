@@ -1,8 +1,8 @@
-"""Borders of laws with memory: their margins, and what is latched and logged where one is met.
+"""Borders of laws with memory: their margins, and what is latched and logged when one is reached.
 
-A law tells by margins b_j(δ, δ̇) how far the borders of its segment are; all are positive inside. Where one falls to
-zero the law renews the numbers it latches, which stand among its parameters, and another segment begins. Those of
-friction depend on more than δ and δ̇, see `sliding`.
+A law has margins b_j(δ, δ̇), its event functions, which are positive inside the present segment. When one falls to
+zero, the law *renews* the numbers that it latches, which are among its parameters, and another segment begins. The
+margins of friction depend on more than δ and δ̇, see `sliding`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from solvers.problem.friction import STIFFNESS
 
 @inlined
 def margins(problem, state, s, n, delta, rate, out):
-    """Margins of the borders of element s at n points, row by row."""
+    """Margins of the borders of element s at n points, row by row into ``out``."""
     call_force(problem.borders[s], n, delta, rate, state.entry_rate[s], problem.parameters[s], (out,))
 
 
@@ -50,7 +50,7 @@ def margins_in(problem, state, s, x, batch, out):
 
 @inner
 def margins_before(problem, state, s, delta, rate, time, batch, out):
-    """Margins a time before the present state, whose rates are known, from where it is now; after it if negative."""
+    """Margins at a time before the present state, which is extrapolated with its acceleration; after it if negative."""
     acceleration = acceleration_of(problem, s, state.x, state.rate)
     batch[0] = delta - time * (rate - 0.5 * time * acceleration)
     batch[1] = rate - time * acceleration
@@ -59,7 +59,7 @@ def margins_before(problem, state, s, delta, rate, time, batch, out):
 
 @inner
 def renew(problem, state, s, j, delta, rate):
-    """Renew what element s latches on its border j, in a state whose rate is known; a row of the log tells of it."""
+    """Renew what element s latches on its border j, in a state whose rate is known, and log it."""
     t, row = state.now[T], state.log[state.count[LOGGED]]
     if state.event_record.shape[0]:
         write_event(state, RENEWAL, t, t, 0.0, s, j, state.x)
@@ -81,8 +81,8 @@ def renew(problem, state, s, j, delta, rate):
 
 
 @inlined
-def note_event(state):
-    """Count events at one instant."""
+def count_event(state):
+    """Count the events at one instant."""
     t = state.now[T]
     state.count[AT_ONCE] = state.count[AT_ONCE] + 1 if t == state.now[LAST_EVENT] else 0
     state.now[LAST_EVENT] = t
@@ -90,7 +90,7 @@ def note_event(state):
 
 @inlined
 def most_rows(problem):
-    """How many rows of the log the events of one instant may take."""
+    """The most rows of the log that the events of one instant take."""
     rows = problem.law.size + problem.friction.shape[0]
     for count in problem.border_count:
         rows += count

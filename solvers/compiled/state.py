@@ -1,4 +1,4 @@
-"""The arrays a run changes, the change of a stop's segment with its latched rate, and the event list."""
+"""The arrays a run changes, the change of a stop's segment with its latched entry rate, and the event list."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from solvers.compiled.kernels import (
     kernel,
     row_of,
     rubs,
-    slide_of,
     slider_of,
+    xi_and_rate_at,
 )
 from solvers.compiled.parts import addresses_of
 from solvers.compiled.sliding import begin_slider, end_slider, slider_force
@@ -43,7 +43,7 @@ DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAIN
 T, H_FLIGHT, H_CONTACT, LAST_EVENT, T_END, LEFT = range(6)  # places in State.now
 STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, RECORDED = range(8)  # places in State.count
 T_IN, PEAK_DELTA, PEAK_FORCE = range(3)  # columns of State.active
-MOST_EVENTS_AT_ONCE = 100
+MOST_EVENTS_AT_ONCE = 100  # events at one instant above which a run ends with CHATTER
 STEP, PART, LANDING, EVENT, RENEWAL = 0.0, 1.0, 2.0, 3.0, 4.0  # kinds of rows of State.event_record
 KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of State.event_record: FIRST and SECOND are two
 # whole numbers whose meaning depends on the kind; from HEAD on the state at the row's start, then the nodes' forces
@@ -79,26 +79,26 @@ def new_log(elements: int) -> Any:
 
 @inlined
 def summed(total, left, part):
-    """A sum with one more part, and what rounding leaves of it, which the next part brings in.
+    """A sum with one more part, and the rounding error to be added to the next part (compensated summation).
 
-    Rounding of equal steps to the spacing of numbers at t is the same for long, so that a clock without this drifts by
-    up to half of it a step.
+    Equal steps round to the spacing of numbers at t in the same direction for long: without compensation a clock drifts
+    by up to half a spacing per step.
     """
     part += left
     found = total + part
-    kept = found - total
-    return found, (total - (found - kept)) + (part - kept)
+    added = found - total
+    return found, (total - (found - added)) + (part - added)
 
 
 @inlined
 def move_clock(now, h):
-    """Let the time h pass."""
+    """Advance the time by h."""
     now[T], now[LEFT] = summed(now[T], now[LEFT], h)
 
 
 @inner
 def surface_tolerance(problem, s, x):
-    """Distance, m, within which a stop counts as on a knot: rounding of δ."""
+    """Distance, m, from a knot up to which a stop counts as on it: rounding of δ."""
     row = row_of(problem, s)
     size = abs(problem.gap[row]) + abs_dot(problem.read[row], x, 2 * problem.k.size)
     if is_circle(problem, s):
@@ -109,7 +109,7 @@ def surface_tolerance(problem, s, x):
 
 @inner
 def rate_tolerance(problem, s, x):
-    """Indentation rate, m/s, below which a stop counts as at rest: rounding of δ̇, which coupled blocks amplify.
+    """Indentation rate, m/s, up to which a stop counts as at rest: rounding of δ̇, which coupled blocks amplify.
 
     A start at rest has velocities v of the blocks that are rounding themselves, up to 2e-15 √k |p| where dashpots
     couple the modes; without their share a stop pressed at rest would enter and leave its surface forever.
@@ -124,15 +124,15 @@ def rate_tolerance(problem, s, x):
 def _rounding_of_rate(problem, r, x):
     """The same of one row."""
     row, n = problem.read_rate[r], problem.k.size
-    transformed = 0.0
+    from_coupling = 0.0
     for b in range(n):
-        transformed += abs(row[n + b] * x[b]) * math.sqrt(problem.k[b])
-    return 1e-13 * abs_dot(row, x, 2 * n) + 4e-15 * transformed
+        from_coupling += abs(row[n + b] * x[b]) * math.sqrt(problem.k[b])
+    return 1e-13 * abs_dot(row, x, 2 * n) + 4e-15 * from_coupling
 
 
 @inner
 def write_event(state, kind, began, ended, span, first, second, x):
-    """Append a row to the event record: what happened from ``began``, in the state x, to ``ended``."""
+    """Append a row to the event record: a step or event from ``began``, in the state x, to ``ended``."""
     row = state.event_record[state.count[RECORDED]]
     row[KIND], row[BEGAN], row[ENDED], row[SPAN], row[FIRST], row[SECOND] = kind, began, ended, span, first, second
     for e in range(state.x.size):
@@ -141,24 +141,24 @@ def write_event(state, kind, began, ended, span, first, second, x):
 
 
 @inner
-def open_contact(problem, state, s, t, delta_dot):
-    """Latch the entry rate and begin a contact."""
+def latch_entry(problem, state, s, t, delta_dot):
+    """Latch the entry rate, m/s, and the time of a contact that begins; its peaks are zero."""
     state.entry_rate[s] = max(abs(delta_dot), problem.floor[s])
     state.active[s, T_IN], state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE] = t, 0.0, 0.0
 
 
 @kernel
 def begin_contacts(problem, state):
-    """Find the segment of every stop at the start, on a knot that into which it moves, and begin contacts under way."""
+    """Find the segment of every stop at the start, on a knot the one it moves into; begin contacts under way."""
     for s in range(problem.law.size):
         delta, rate = indentation_and_rate(problem, s, state.x)
-        segment, near = 0, surface_tolerance(problem, s, state.x)
-        while delta > problem.knots[s, segment] + near:
+        segment, tolerance = 0, surface_tolerance(problem, s, state.x)
+        while delta > problem.knots[s, segment] + tolerance:
             segment += 1
-            near = -abs(near) if rate > rate_tolerance(problem, s, state.x) else near
+            tolerance = -abs(tolerance) if rate > rate_tolerance(problem, s, state.x) else tolerance
         state.segment[s] = segment
         if segment > 0:
-            open_contact(problem, state, s, state.now[T], rate)
+            latch_entry(problem, state, s, state.now[T], rate)
             state.active[s, PEAK_DELTA] = delta
             if rubs(problem, s):
                 _begin_in_contact(problem, state, s, delta > surface_tolerance(problem, s, state.x))
@@ -166,37 +166,37 @@ def begin_contacts(problem, state):
 
 @inner
 def _begin_in_contact(problem, state, s, under_way):
-    """Begin the friction of a contact that is closed as the run begins, or go on with what is latched already."""
-    own = slider_of(problem, s)
-    if own[CODE] == FREE:
+    """Begin the friction of a contact that is closed as the run begins, or continue with what is latched already."""
+    slider = slider_of(problem, s)
+    if slider[CODE] == FREE:
         begin_slider(problem, s, state.now[T], state.x, state.entry_rate[s], under_way)
-    own[BEGUN] = slider_force(problem, s, state.segment[s], state.entry_rate[s], state.now[T], state.x)
-    if own[CODE] != 0.0:
-        state.x[problem.friction[s, 1] + 2] = abs(own[BEGUN]) / own[STIFFNESS]
+    slider[BEGUN] = slider_force(problem, s, state.segment[s], state.entry_rate[s], state.now[T], state.x)
+    if slider[CODE] != 0.0:
+        state.x[problem.friction[s, 1] + 2] = abs(slider[BEGUN]) / slider[STIFFNESS]
 
 
 @inlined
 def is_open(problem, s):
-    """Whether a law with memory is open, so that no force acts at any indentation at hand."""
+    """Whether a law with memory is in an open segment, where it exerts no force at any indentation."""
     place = problem.opening[s]
     return place >= 0 and problem.parameters[s, place] == 0.0
 
 
 @inlined
 def begins_and_ends(problem, s):
-    """Whether the contacts of an element begin and end; the others always act, at both signs of the indentation."""
+    """Whether the contacts of an element begin and end; other elements act always, at both signs of the indentation."""
     return problem.knots[s, 0] == 0.0 or problem.opening[s] >= 0
 
 
 @inlined
 def acting_segment(problem, state, s):
-    """Segment of the law, 0 while no force acts."""
+    """Segment of the law, 0 while it exerts no force."""
     return 0 if is_open(problem, s) else state.segment[s]
 
 
 @kernel
 def event_row(problem, state, s, t, guard, delta, delta_dot, row):
-    """Write into a row of the log what stop s meets, and what it is like just before."""
+    """Write into a row of the log which event stop s has, and its motion, force and sums just before."""
     balance = 2 * problem.k.size + 2 + 2 * s
     row[at.ELEMENT], row[at.TIME], row[at.GUARD] = s, t, guard
     row[at.FROM], row[at.TO] = acting_segment(problem, state, s), 0.0
@@ -208,10 +208,10 @@ def event_row(problem, state, s, t, guard, delta, delta_dot, row):
 
 @inner
 def end_event(problem, state, s, row):
-    """Complete the row of an event by what stop s is like after it; its contact may begin."""
+    """Complete the row of an event by the segment of stop s after it; latch what a contact that begins needs."""
     row[at.TO] = acting_segment(problem, state, s)
     if row[at.FROM] == 0.0 and row[at.TO] > 0.0:
-        open_contact(problem, state, s, row[at.TIME], row[at.RATE])
+        latch_entry(problem, state, s, row[at.TIME], row[at.RATE])
         if rubs(problem, s):
             begin_slider(problem, s, row[at.TIME], state.x, state.entry_rate[s], False)
             row[at.CODE] = slider_of(problem, s)[CODE]
@@ -223,10 +223,10 @@ def end_event(problem, state, s, row):
 
 @kernel
 def slider_row(problem, state, s, t, row):
-    """Write into a row of the log what the friction of stop s has done by now, as its contact begins or ends."""
+    """Write work, impulse and path of the friction of stop s by now into a row of the log."""
     account = problem.friction[s, 1]
     row[at.ELEMENT], row[at.TIME], row[at.GUARD], row[at.FROM], row[at.TO] = s, t, at.FRICTION, 1.0, 1.0
-    row[at.DELTA], row[at.RATE] = angle_of(problem, s, state.x), slide_of(problem, s, t, state.x)[1]
+    row[at.DELTA], row[at.RATE] = angle_of(problem, s, state.x), xi_and_rate_at(problem, s, t, state.x)[1]
     row[at.WORK], row[at.IMPULSE], row[at.FORCE] = state.x[account], state.x[account + 1], state.x[account + 2]
     row[at.DEEPEST], row[at.LARGEST], row[at.CODE] = 0.0, slider_of(problem, s)[PEAK], -1.0
     row[at.CLIPPED] = 1.0 if state.segment[s] > 0 else 0.0
@@ -234,14 +234,14 @@ def slider_row(problem, state, s, t, row):
 
 @inner
 def log_slider(problem, state, s):
-    """Add such a row to the log."""
+    """Add a `slider_row` to the log."""
     slider_row(problem, state, s, state.now[T], state.log[state.count[LOGGED]])
     state.count[LOGGED] += 1
 
 
 @kernel
 def log_begin(problem, state):
-    """Log all contacts that are under way as the run begins."""
+    """Log all contacts under way as the run begins."""
     for s in range(problem.law.size):
         if acting_segment(problem, state, s) > 0:
             row, delta = state.log[state.count[LOGGED]], state.active[s, PEAK_DELTA]
@@ -254,7 +254,7 @@ def log_begin(problem, state):
 
 @inner
 def switch(problem, state, s, direction):
-    """Move stop s one segment up or down."""
+    """Move stop s one segment up (direction 1) or down (-1), and log it."""
     t, row = state.now[T], state.log[state.count[LOGGED]]
     if state.event_record.shape[0]:
         write_event(state, EVENT, t, t, 0.0, s, direction, state.x)
@@ -270,10 +270,10 @@ def switch(problem, state, s, direction):
 
 @inlined
 def switch_on_surface(problem, state, locates):
-    """Switch every stop that is on an end of its segment and moves out of it; returns whether any did."""
+    """Switch every stop on a border of its segment that moves out of it; returns whether any did."""
     switched = False
     for s in range(problem.law.size):
-        direction = _way_out(problem, state, s, locates)
+        direction = _exit_direction(problem, state, s, locates)
         if direction != 0 and abs(indentation_rate(problem, s, state.x)) > rate_tolerance(problem, s, state.x):
             switch(problem, state, s, direction)
             switched = True
@@ -281,8 +281,8 @@ def switch_on_surface(problem, state, locates):
 
 
 @inlined
-def _way_out(problem, state, s, locates):
-    """Direction in which a stop on an end of its segment moves out of it, or 0."""
+def _exit_direction(problem, state, s, locates):
+    """Direction, 1 or -1, in which a stop on a border of its segment moves out of it, or 0."""
     delta, delta_dot = indentation_and_rate(problem, s, state.x)
     tolerance, segment = surface_tolerance(problem, s, state.x) if locates else 0.0, state.segment[s]
     if delta >= problem.knots[s, segment] - tolerance and delta_dot > 0.0:
@@ -294,7 +294,7 @@ def _way_out(problem, state, s, locates):
 
 @inlined
 def acts(problem, state, row):
-    """Whether the element that a row belongs to is in contact."""
+    """Whether the element of a row is in contact."""
     return state.segment[element_of(problem, row)] > 0
 
 

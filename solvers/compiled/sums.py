@@ -12,7 +12,7 @@ from solvers.compiled.simd import WIDTH, load8, positive8, splat8, sqrt8, store8
 
 
 def padded(size: int) -> int:
-    """The next multiple of `WIDTH`."""
+    """The smallest multiple of `WIDTH` that is not below ``size``."""
     return -(-size // WIDTH) * WIDTH
 
 
@@ -29,19 +29,19 @@ def replace_values(old, new):
 def iterate_power_law(rows, free, force, motion, stiffness, rooted, damping, viscosity):
     """One fixed-point iteration for the forces at eight nodes; returns Σ change² and Σ force², N².
 
-    ``rows`` (8, 16) is what a unit force at a node does to δ and δ̇ at all nodes. Indentations and rates are
-    free + Σ_e force[e] rows[e] and are written to ``motion`` (2, 8); the new forces K d (1 + a δ̇) + c δ̇ to ``force``
-    (8,), with d = max(δ, 0), or d^{3/2} if ``rooted``.
+    ``rows`` (8, 16) are δ and δ̇ at all nodes per unit force at a node. Motion free + Σ_e force[e] rows[e] is written
+    to ``motion`` (2, 8), the new forces K d (1 + a δ̇) + c δ̇ to ``force`` (8,), with d = max(δ, 0), or d^{3/2} if
+    ``rooted``.
     """
     old, delta, rate = load8(force, 0), load8(free[0], 0), load8(free[1], 0)
-    more, faster = splat8(0.0), splat8(0.0)  # two chains of sums run side by side in the processor
+    delta_2, rate_2 = splat8(0.0), splat8(0.0)  # two independent chains of sums run in parallel
     for e in range(0, WIDTH, 2):
         one, two = splat8(force[e]), splat8(force[e + 1])
         delta += one * load8(rows[e], 0)
         rate += one * load8(rows[e], WIDTH)
-        more += two * load8(rows[e + 1], 0)
-        faster += two * load8(rows[e + 1], WIDTH)
-    delta, rate = delta + more, rate + faster
+        delta_2 += two * load8(rows[e + 1], 0)
+        rate_2 += two * load8(rows[e + 1], WIDTH)
+    delta, rate = delta + delta_2, rate + rate_2
     store8(motion[0], 0, delta)
     store8(motion[1], 0, rate)
     deep = positive8(delta)
@@ -55,7 +55,7 @@ def iterate_power_law(rows, free, force, motion, stiffness, rooted, damping, vis
 
 @inlined
 def above(source, least, result):
-    """Eight numbers, the negative ones raised to zero if that is the least one allowed; NaN stays."""
+    """Write eight numbers, negative ones raised to zero if ``least`` is 0, unchanged if it is -inf; NaN stays."""
     store8(result, 0, positive8(load8(source, 0)) if least == 0.0 else load8(source, 0))
 
 

@@ -17,7 +17,7 @@ from solvers.exponential.contact.nodes import PHASES, NodeSets, S, gauss
 from solvers.exponential.responses import fill_free, fill_node_propagators, fill_propagators, fill_weighting
 from solvers.problem import Memo
 
-FEW = 2  # rows up to which each has tables of its own: with three both ways take the same time
+FEW = 2  # rows up to which pairs of rows have tables; with three, both ways take the same time
 MOST_BYTES = 4e9
 
 
@@ -79,7 +79,7 @@ def _shapes(rows: int, loads: int, size: int, own: int, levels: int, node_sets: 
 
 
 def _require_room(rows: int, loads: int, size: int, levels: int, node_sets: NodeSets) -> None:
-    """Refuse tables and matrices of simultaneous contacts that need more than `MOST_BYTES`."""
+    """Refuse tables, and a Jacobian of all stops in contact, that need more than `MOST_BYTES`."""
     numbers = sum(math.prod(shape) for shape in _shapes(rows, loads, size, size, levels, node_sets).values())
     wanted = 8 * (numbers + (S * rows) ** 2)
     if wanted > MOST_BYTES:
@@ -104,7 +104,7 @@ def _empty(problem: Problem, own: int, h: Any, contact_h: Any, node_sets: NodeSe
 def filled(
     tables: Blocks, problem: Problem, blocks: tuple[int, int], h: Any, contact_h: Any, node_sets: NodeSets
 ) -> Blocks:
-    """The tables, filled for the blocks from the first to before the last."""
+    """The tables, with the columns of blocks filled from the first to before the last."""
     fill_propagators(problem.k, problem.c, blocks, h, tables.flight_propagator)
     fill_propagators(problem.k, problem.c, blocks, contact_h, tables.contact_propagator)
     for i, f in enumerate(node_sets.kinds):
@@ -123,7 +123,7 @@ def filled(
 
 
 def _fill_weightings(tables: Blocks, problem: Problem, contact_h: Any, node_sets: NodeSets) -> None:
-    """Responses to forces; those of the blocks are scratch where the response of every stop is kept."""
+    """Fill the responses to forces; those of the blocks are scratch if those of every stop are kept."""
     inputs = np.ascontiguousarray(np.concatenate((problem.push, problem.load)).reshape(-1, 2 * len(problem.k)))
     own = tables.block_end_response.shape[3]
     response, ending = tables.block_response, tables.block_end_response
@@ -142,7 +142,7 @@ def _fill_weightings(tables: Blocks, problem: Problem, contact_h: Any, node_sets
 
 
 def _fill_alias(out: Any, k: Any, blocks: tuple[int, int], h: Any, alias: Any) -> None:
-    """Error of e^{iωt} between the nodes of one kind, times ω for positions, of the blocks that oscillate."""
+    """Error of the interpolant of e^{iωt} between the nodes, times ω for positions, of oscillating blocks."""
     some, size = slice(*blocks), len(k)
     omega = np.sqrt(k[some])
     error = np.interp(np.outer(h, omega), PHASES, alias, left=0.0)

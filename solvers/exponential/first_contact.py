@@ -14,7 +14,7 @@ from solvers.exponential.flight import ORDER
 
 @inlined
 def _polynomial(problem, s, terms, values):
-    """Coefficients of δ in time."""
+    """Coefficients of δ in powers of time."""
     row, factorial = row_of(problem, s), 1.0
     for i in range(ORDER + 1):
         values[i] = dot(problem.read[row], terms[i], 2 * problem.k.size) / factorial
@@ -24,7 +24,7 @@ def _polynomial(problem, s, terms, values):
 
 @inner
 def first_root(problem, terms, s, x, longest, values, slopes):
-    """First time in [0, longest] at which δ becomes positive on the Taylor polynomial; -1 if it does not.
+    """First time in [0, longest] at which δ becomes positive on the Taylor polynomial, or -1.
 
     ``values`` and ``slopes`` are scratch for the coefficients of the polynomial and of its derivative.
     """
@@ -43,11 +43,11 @@ def first_root(problem, terms, s, x, longest, values, slopes):
         for i in range(ORDER):
             slopes[i] = (i + 1.0) * values[i + 1]
         slopes[ORDER] = 0.0
-        end = _bisect(slopes, -1.0, longest, -0.5 * values[1] / values[2])
+        end = _first_sign_change(slopes, -1.0, longest, -0.5 * values[1] / values[2])
     if not _horner(values, end)[0] > 0.0:
         return -1.0
     square = values[1] * values[1] - 4.0 * values[0] * values[2]
-    return _bisect(values, 1.0, end, -2.0 * values[0] / (values[1] + math.sqrt(max(square, 0.0))))
+    return _first_sign_change(values, 1.0, end, -2.0 * values[0] / (values[1] + math.sqrt(max(square, 0.0))))
 
 
 @inlined
@@ -61,10 +61,11 @@ def _horner(coefficients, x):
 
 
 @inner
-def _bisect(coefficients, sign, b, guess):
-    """Sign change of a polynomial in [0, b], to rounding, by Newton's method with bisection as safeguard.
+def _first_sign_change(coefficients, sign, b, guess):
+    """Sign change of a polynomial in [0, b], to rounding, by Newton's method safeguarded by bisection.
 
-    A step doubles the digits, so after one of 1e-11 the error is rounding. A double root is found to 1e-8 at best.
+    Newton's method doubles the digits, so after a step of 1e-11 the error is rounding. A double root is found to 1e-8
+    at best.
     """
     a, x = 0.0, guess if 0.0 < guess < b else b
     for _ in range(60):
@@ -73,10 +74,10 @@ def _bisect(coefficients, sign, b, guess):
             b = x
         else:
             a = x
-        following = x - (f / slope if slope != 0.0 else np.inf)
-        if not a <= following <= b:
-            following = 0.5 * (a + b)
-        if abs(following - x) <= 1e-11 * x:
-            return following
-        x = following
+        next_x = x - (f / slope if slope != 0.0 else np.inf)
+        if not a <= next_x <= b:
+            next_x = 0.5 * (a + b)
+        if abs(next_x - x) <= 1e-11 * x:
+            return next_x
+        x = next_x
     return x

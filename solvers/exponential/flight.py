@@ -15,17 +15,16 @@ from solvers.compiled.simd import WIDTH, bit_pattern, load8, splat8, sqrt8, stor
 from solvers.compiled.sums import combine
 
 ORDER = 6
-_CURVED = int(0.345 * 2**50)  # error of a logarithm that is linear between powers of two, times four
+_LOG_ERROR = int(0.345 * 2**50)  # four times 0.0863, the error of a logarithm linear between powers of two
 SERIES_TERMS = 14  # terms of a series that is exact to rounding up to |λ| x = SERIES_REACH: 0.6^14/14! = 9e-15
 SERIES_REACH = 0.6
 
 
 @inlined
 def level_within(tables, span):
-    """Index of the longest tabulated step not above ``span``, which is at least the shortest one."""
-    level = (
-        (bit_pattern(tables.flight_step[0]) - bit_pattern(span) - _CURVED) >> 50
-    ) + 1  # never too high: 2^50 are a quarter octave
+    """Index of the longest tabulated step not above ``span``, or of the shortest step if that is longer."""
+    # 2^50 in the bit pattern are a quarter octave; the estimate is never too high
+    level = ((bit_pattern(tables.flight_step[0]) - bit_pattern(span) - _LOG_ERROR) >> 50) + 1
     level = min(max(level, 0), tables.flight_step.size - 1)
     while tables.flight_step[level] > span and level < tables.flight_step.size - 1:
         level += 1
@@ -34,7 +33,7 @@ def level_within(tables, span):
 
 @inner
 def cell_of(problem, t):
-    """(cell, offset) of the sampled signals' common grid."""
+    """(cell, time since its begin, s) of the sampled signals' common grid."""
     dt = problem.table_dt[0]
     last = problem.table_start[1] - problem.table_start[0] - 2
     cell = min(max(int(t / dt + 1e-9), 0), last)
@@ -99,7 +98,7 @@ def split(problem, x, parts):
 
 @inlined
 def join(problem, parts, x):
-    """The reverse of `split`."""
+    """Write these rows back into x."""
     n = problem.k.size
     for b in range(n):
         x[b], x[n + b] = parts[0, b], parts[1, b]
@@ -107,9 +106,9 @@ def join(problem, parts, x):
 
 @inlined
 def cross_cell(problem, tables, x, cell, result):
-    """Write into ``result`` p and v of the blocks a whole cell of the sampled signals after x, eight blocks at once.
+    """Write into ``result`` p and v of the blocks one whole cell of the sampled signals after x, eight blocks at once.
 
-    The signals' part is summed first: it waits for no result of the cell before.
+    The response to the signals is summed first, since it does not depend on the cell before.
     """
     width = x.shape[1]
     for i in range(0, width, WIDTH):
@@ -146,7 +145,7 @@ def taylor_terms(problem, x, t, terms, signal_terms):
 
 @inner
 def taylor_step(terms, x, span, size, weights, sums):
-    """Taylor step of the given duration; the last two arguments are scratch."""
+    """Taylor step of the duration ``span`` from its ``terms``, into x; ``weights`` and ``sums`` are scratch."""
     weights[0] = 1.0
     for i in range(ORDER):
         weights[i + 1] = weights[i] * span / (i + 1.0)
@@ -156,7 +155,7 @@ def taylor_step(terms, x, span, size, weights, sums):
 
 @inner
 def fly_series(problem, tables, x, t, span, signal_terms, terms):
-    """Move p and v of the blocks by ``span`` <= SERIES_REACH/|λ|max within a cell: the series, y⁽ⁱ⁺¹⁾ from y⁽ⁱ⁾.
+    """Move p and v of the blocks by ``span`` <= SERIES_REACH/|λ|max within a cell, by a Taylor series of 14 terms.
 
     The derivatives of p, then v, are left in the rows of ``terms``.
     """
@@ -168,7 +167,7 @@ def fly_series(problem, tables, x, t, span, signal_terms, terms):
         for order in range(SERIES_TERMS - 1):
             store8(terms[order], i, p)
             store8(terms[order], width + i, v)
-            by_p, by_v = splat8(0.0), splat8(0.0)  # of the signals, before what waits for the term before
+            by_p, by_v = splat8(0.0), splat8(0.0)  # of the signals: independent of the term before
             if order < 6:
                 for j in range(problem.table_dt.size):
                     rows, value = tables.load_rows[problem.table_load[j]], splat8(signal_terms[j, order])
@@ -210,7 +209,7 @@ def propagate_split(tables, level, x):
 
 @inlined
 def safe_time(g, v, bound):
-    """Time before which a stop at distance g, opening at v, cannot be reached; ``bound`` is that of |δ̈|."""
+    """Time before which a stop at distance g, opening at the rate v, cannot be reached; ``bound`` is that of |δ̈|."""
     if bound <= 0.0:
         return g / -v if v < 0.0 else np.inf
     root = math.sqrt(v * v + 2.0 * bound * max(g, 0.0))
@@ -219,7 +218,7 @@ def safe_time(g, v, bound):
 
 @inlined
 def motion_of_row(problem, tables, row, x):
-    """Displacement and rate of a row from the blocks' p and v."""
+    """Displacement less gap, and rate, of a row from the blocks' p and v."""
     rows, delta, rate = tables.stop_rows[row], splat8(0.0), splat8(0.0)
     for i in range(0, x.shape[1], WIDTH):
         p, v = load8(x[0], i), load8(x[1], i)

@@ -4,9 +4,9 @@ Every accepted contact step is linearised as it was taken. With Y the derivative
 
     flight   Y ← E(t) Y                                            (exact)
     entry    dt* = -dδ/δ̇,  d(entry rate) = dδ̇ + δ̈ dt*              (latched until the exit)
-    border   dt* = -db/ḃ,  dL ← m_L dL + m_δ (dδ + δ̇ dt*) + m_δ̇ (dδ̇ + δ̈ dt*)   (what a law with memory latches)
+    border   dt* = -db/ḃ,  dL ← m_L dL + m_δ (dδ + δ̇ dt*) + m_δ̇ (dδ̇ + δ̈ dt*)   (numbers L that a law latches)
     jump     Y ← Y - b ΔF dt*                                      (saltation: the law's force jumps by ΔF)
-    step     (1 - D C) dF = D (free response of Y) + ∂F/∂(entry rate) d(entry rate),   Y ← E(h) Y + kick dF
+    step     (1 - D C) dF = D (free response of Y) + ∂F/∂(entry rate) d(entry rate),   Y ← E(h) Y + response to dF
     landing  the variational equation, on the stages of the Runge–Kutta step
 
 On the first step of a power law with a broken exponent the force is t^p times a smooth function of √t, with t from the
@@ -16,8 +16,8 @@ entry, Y + f dt* with f the rate of the state, and transformed back at its end.
 A parameter adds a column. Where it changes only loads' tones, gaps and laws, Y_p = W + P(t) with P the derivative of
 the steady response to the tones, known in closed form at any time, so that W obeys the equations above with P among the
 indentations; laws contribute ∂F/∂parameter. See Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical
-Systems, 2004, Chapter 7, for saltation.
-At an entry of zero rate (to rounding) the derivative does not exist; dt* is taken as zero there.
+Systems, 2004, Chapter 7, for saltation. At an entry of zero rate (to rounding) the derivative does not exist; dt* is
+taken as zero there.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from solvers.compiled.kernels import (
     PLANAR_PROBLEM,
     acceleration_of,
     add_push,
-    add_sideways,
+    add_tangential,
     call_gradient,
     contact_forces,
     contact_gradient,
@@ -68,7 +68,7 @@ from solvers.compiled.state import (
 )
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.derivative import add_radial_change, change_of, explicit_change, is_parameter
-from solvers.exponential.circles.friction import share_of
+from solvers.exponential.circles.friction import friction_by_normal
 from solvers.exponential.circles.friction_derivative import (
     add_rubbing_change,
     begin_rubbing,
@@ -90,17 +90,17 @@ from solvers.exponential.preparation import SCRATCH, TABLES
 from solvers.exponential.responses import propagate
 from solvers.problem.friction import CODE, FREE
 
-_OFF = 1e-10  # relative distance from a knot at which a law is certainly on one side of it
+_OFF = 1e-10  # relative distance from a knot at which a law is evaluated on one side of it
 
 
-_problem = unpacker(PLANAR_PROBLEM)  # whatever it is: both types have the same fields
+_problem = unpacker(PLANAR_PROBLEM)  # of either type: both have the same fields
 _tables, _state, _scratch = unpacker(TABLES), unpacker(STATE), unpacker(SCRATCH)
 _derivatives, _variation = unpacker(DERIVATIVES), unpacker(VARIATION)
 
 
 @inner
 def _fly(problem, duration, y):
-    """Flight."""
+    """Move all columns over a flight."""
     n = problem.k.size
     for b in range(n):
         alpha, beta = propagate(problem.k[b], problem.c[b], duration)
@@ -112,10 +112,10 @@ def _fly(problem, duration, y):
 
 @merged
 def _begin(problem, ahead, behind, past, scratch, derivatives, variation):
-    """Find the segments of the stops as the run does at its start, and latch the derivatives of their rates."""
+    """Set the segments of the stops as at the start of the run, and the derivatives of the latched entry rates."""
     for s in range(problem.law.size):
         if rubs(problem, s):
-            scratch.row_ways[6 * s, 0] = slider_of(problem, s)[CODE]
+            scratch.node_directions[6 * s, 0] = slider_of(problem, s)[CODE]
     begin_contacts(problem, past)
     for s in range(problem.law.size):
         if past.segment[s] > 0:
@@ -123,13 +123,13 @@ def _begin(problem, ahead, behind, past, scratch, derivatives, variation):
             for c in range(derivatives.y.shape[0]):
                 change = change_of(problem, variation, derivatives, past.x, c, s, 1, 0.0)
                 derivatives.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
-            if rubs(problem, s) and scratch.row_ways[6 * s, 0] == FREE:
+            if rubs(problem, s) and scratch.node_directions[6 * s, 0] == FREE:
                 latch_begin(problem, ahead, behind, past, derivatives, variation, s)
 
 
 @merged
 def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, direction):
-    """A stop passes a border of its segment."""
+    """Take all columns across a border of the segment of stop s, upwards (direction 1) or downwards (-1)."""
     t = past.now[T]
     rate = indentation_rate(problem, s, past.x)
     segment = past.segment[s]
@@ -137,7 +137,7 @@ def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, directi
     border = segment if direction > 0 else segment - 1
     rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
     acceleration = acceleration_of(problem, s, past.x, derivatives.rate[0])
-    still = rate_tolerance(problem, s, past.x)
+    rate_rounding = rate_tolerance(problem, s, past.x)
     if entering:
         past.entry_rate[s] = max(abs(rate), problem.floor[s])
     below, above = problem.knots[s, border] * (1.0 - _OFF), problem.knots[s, border] * (1.0 + _OFF) + 1e-300
@@ -147,8 +147,8 @@ def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, directi
     jump *= direction
     past.now[LAST_EVENT] = t
     for c in range(derivatives.y.shape[0]):
-        moved = change_of(problem, variation, derivatives, past.x, c, s, 0, t)
-        shift = -moved / rate if abs(rate) > still else 0.0
+        d_delta = change_of(problem, variation, derivatives, past.x, c, s, 0, t)
+        shift = -d_delta / rate if abs(rate) > rate_rounding else 0.0
         derivatives.shift[c, problem.law.size] = shift
         if entering:
             floored = abs(rate) < problem.floor[s]
@@ -157,8 +157,8 @@ def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, directi
             derivatives.entry[c, s] = 0.0 if floored else change
         add_push(problem, s, -jump * shift, past.x, derivatives.y[c])
         if rubs(problem, s) and border > 0:
-            drag = share_of(slider_of(problem, s)) * jump
-            add_sideways(problem, s, -drag * shift, past.x, derivatives.y[c])
+            friction_jump = friction_by_normal(slider_of(problem, s)) * jump
+            add_tangential(problem, s, -friction_jump * shift, past.x, derivatives.y[c])
     past.segment[s] += direction
     if rubs(problem, s) and entering:
         begin_rubbing(problem, ahead, behind, past, derivatives, variation, s)
@@ -168,17 +168,17 @@ def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, directi
 
 @merged
 def _inside_segment(problem, past, s, x):
-    """Indentation, kept off the knots, where the slope of the law could be that of the next segment."""
+    """Indentation, m, kept off the knots, where the slope of the law could be that of the next segment."""
     lower, upper = problem.knots[s, past.segment[s] - 1], problem.knots[s, past.segment[s]]
     return min(max(indentation(problem, s, x), lower * (1.0 + _OFF)), upper * (1.0 - _OFF))
 
 
 @inner
-def _note_sides(problem, tables, past, scratch, x):
+def _update_sides(problem, tables, past, scratch, x):
     """Force before its cut in a state of a landing, for laws cut at zero force, into ``scratch.unresolved``.
 
-    Where a landing begins or ends the force may be zero, or rounding: the larger one tells. Returns whether the side of
-    a law is another one now.
+    Where a landing begins or ends the force may be zero, or rounding; so the force of larger size is kept. Returns
+    whether the side of a law has changed by this.
     """
     changed = False
     for s in range(problem.law.size):
@@ -206,7 +206,7 @@ def _gradient(problem, tables, past, scratch, s, batch):
 
 @merged
 def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, variation, w, factor, out):
-    """Variational equation at one stage of a landing; ``w`` is the state with its time, factor dt along the step."""
+    """Rates of all columns at one stage of a landing; ``w`` is its state and time, ``factor`` is dt along the step."""
     n, size, t, batch = problem.k.size, 2 * problem.k.size, w[past.x.size], derivatives.batch
     for c in range(derivatives.y.shape[0]):
         y = derivatives.trial[c]
@@ -250,19 +250,19 @@ def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, var
 
 @merged
 def _land(problem, ahead, behind, tables, past, scratch, derivatives, variation, row):
-    """A landing: the variational equation on the Runge–Kutta step's own stages."""
+    """Move all columns over a landing: the variational equation on the stages of its Runge–Kutta step."""
     variable, stop, size = int(row[FIRST]), int(row[SECOND]), 2 * problem.k.size
     w, width, span = scratch.stages[START], past.x.size, row[SPAN]
     start_landing(problem, tables, past, scratch, stop, variable)
     for s in range(problem.law.size):
         scratch.unresolved[s] = 0.0
-    _note_sides(problem, tables, past, scratch, past.x)
+    _update_sides(problem, tables, past, scratch, past.x)
     while True:
         landing_step(
             *(problem, tables, False, False, variable, stop, span, w, past.segment, past.entry_rate),
             *(scratch.unresolved, scratch.stages),
         )
-        if not _note_sides(problem, tables, past, scratch, scratch.stages[LANDED]):
+        if not _update_sides(problem, tables, past, scratch, scratch.stages[LANDED]):
             break
     trial = scratch.stages[STAGES + 1]
     for i in range(STAGES + 1):

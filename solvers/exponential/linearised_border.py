@@ -1,9 +1,9 @@
-"""Derivative of what a law with memory latches on a border; see `linearised`.
+"""Derivative of the numbers that a law with memory latches on a border; see `linearised`.
 
-The border b(δ, δ̇, L) = 0 is met dt* = -db/ḃ later, db at fixed time, ḃ = b_δ δ̇ + b_δ̇ δ̈; the map L' = m(L, δ, δ̇)
-then gives dL' = m_L dL + m_δ (dδ + δ̇ dt*) + m_δ̇ (dδ̇ + δ̈ dt*). A border that another one has left behind, such as that
-of a slip which begins against its force, is passed with that one: dt* is the same. Derivatives of b are differences,
-those of m the law's own.
+The border b(δ, δ̇, L) = 0 is reached dt* = -db/ḃ later, db at fixed time, ḃ = b_δ δ̇ + b_δ̇ δ̈; the map L' = m(L, δ,
+δ̇) then gives dL' = m_L dL + m_δ (dδ + δ̇ dt*) + m_δ̇ (dδ̇ + δ̈ dt*). A border that another event has left behind, such
+as that of a slip which begins against its force, is crossed with that event: dt* is the same. Derivatives of b are
+differences, those of m the law's own.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from solvers.compiled.state import LAST_EVENT, T
 from solvers.exponential.circles.derivative import change_of, is_parameter
 from solvers.exponential.circles.friction_derivative import pass_slider
 
-_BEHIND = 1e-6  # part of what a margin is made of, by which it is negative where it is not met but left behind
-_SHARE, _LEAST = 1e-7, 1e-10  # of differences: part of a number, and at least this in its unit; margins may bend
+_LEFT_BEHIND = 1e-6  # margin, in units of its terms, below which its border is not reached but left behind
+_SHARE, _LEAST = 1e-7, 1e-10  # steps of differences: relative, and least, in the unit of the number; margins may bend
 
 
 @inner
@@ -65,18 +65,18 @@ def _slopes_of_margin(problem, past, s, j, delta, rate, derivatives, out):
 
 
 @merged
-def _is_behind(problem, past, s, j, delta, rate, derivatives, by):
-    """Whether the margin of border j is negative by more than the rounding of a landing; ``by`` are its derivatives."""
+def _is_left_behind(problem, past, s, j, delta, rate, derivatives, by):
+    """Whether the margin of border j is negative by more than a landing may leave; ``by`` are its derivatives."""
     size = abs(by[0] * delta) + abs(by[1] * rate)
     for i in range(problem.latched.shape[1]):
         if problem.latched[s, i] >= 0:
             size += abs(by[2 + i] * problem.parameters[s, problem.latched[s, i]])
-    return _margin(problem, past, s, j, delta, rate, problem.parameters[s], derivatives) < -_BEHIND * size
+    return _margin(problem, past, s, j, delta, rate, problem.parameters[s], derivatives) < -_LEFT_BEHIND * size
 
 
 @merged
 def _explicit(problem, ahead, behind, past, s, j, delta, rate, derivatives, variation, out):
-    """Change of the margin, and of what is latched, per unit of a parameter of the laws; these latch it too."""
+    """Changes of the margin and of the latched numbers per unit of a parameter of the laws, which latch them, too."""
     most, width = problem.latched.shape[1], 2.0 * variation.law_step
     change = _margin(ahead, past, s, j, delta, rate, ahead.parameters[s], derivatives)
     change = (change - _margin(behind, past, s, j, delta, rate, behind.parameters[s], derivatives)) / width
@@ -92,7 +92,7 @@ def _explicit(problem, ahead, behind, past, s, j, delta, rate, derivatives, vari
 
 @merged
 def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
-    """A law with memory passes its border j: derivatives of what it latches, and of the motion if its force jumps."""
+    """Take all columns across border j of a law with memory: latched numbers, and the motion if the force jumps."""
     if rubs(problem, s):
         pass_slider(problem, ahead, behind, past, derivatives, variation, s, j)
         return
@@ -108,8 +108,8 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
     )
     latched, maps = derivatives.renewed[first + 2 + 2 * most : first + 2 + 3 * most], derivatives.renewed
     _slopes_of_margin(problem, past, s, j, delta, rate, derivatives, by)
-    pace, own = by[0] * rate + by[1] * acceleration, 0
-    at_once = past.now[LAST_EVENT] == t and _is_behind(problem, past, s, j, delta, rate, derivatives, by)
+    margin_rate, own = by[0] * rate + by[1] * acceleration, 0
+    at_once = past.now[LAST_EVENT] == t and _is_left_behind(problem, past, s, j, delta, rate, derivatives, by)
     past.now[LAST_EVENT] = t
     for i in range(most):
         own += 1 if problem.latched[s, i] >= 0 else 0
@@ -118,9 +118,9 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
     jump = force_at(problem, s, delta, rate, entry, derivatives.batch)
     call_renewal(problem.renewal[s], j, delta, rate, entry, row)
     jump = force_at(problem, s, delta, rate, entry, derivatives.batch) - jump
-    moved = 0.0
+    by_law_change = 0.0
     if variation.law_step > 0.0:
-        moved = _explicit(problem, ahead, behind, past, s, j, delta, rate, derivatives, variation, explicit)
+        by_law_change = _explicit(problem, ahead, behind, past, s, j, delta, rate, derivatives, variation, explicit)
     for c in range(derivatives.y.shape[0]):
         d_delta = change_of(problem, variation, derivatives, past.x, c, s, 0, t)
         d_rate = change_of(problem, variation, derivatives, past.x, c, s, 1, t)
@@ -128,8 +128,10 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
         for i in range(own):
             change += by[2 + i] * known[i]
         by_law = variation.law_step > 0.0 and is_parameter(variation, derivatives, c)
-        change += moved if by_law else 0.0
-        shift = -change / pace if pace < 0.0 and t > 0.0 else 0.0  # a start beyond a border passes it at once
+        change += by_law_change if by_law else 0.0
+        shift = (
+            -change / margin_rate if margin_rate < 0.0 and t > 0.0 else 0.0
+        )  # a start beyond a border passes it at once
         shift = derivatives.shift[c, stops] if at_once else shift
         derivatives.shift[c, stops] = shift
         for i in range(own):

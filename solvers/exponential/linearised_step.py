@@ -1,4 +1,4 @@
-"""The derivatives moved along a run, and the derivative of one collocated step; see `linearised`."""
+"""The arrays of derivatives that are moved along a run, and the derivative of one collocated step; see `linearised`."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ class Derivatives(NamedTuple):
     signal: Annotated[Any, "L, S"]  # slopes of the sampled signals there
     response: Annotated[Any, "R, 2, S"]  # of δ and δ̇ to these slopes
     by_parameter: Annotated[Any, "E, S"]  # ∂F/∂parameter there
-    rate: Annotated[Any, "2, X"]  # of the state at both ends of a step; after a call first that at the end
+    rate: Annotated[Any, "2, X"]  # rate of the state at both ends of a step; after a call the first is that at the end
     stages: Annotated[Any, "STAGES, columns, X"]  # of a landing
     trial: Annotated[Any, "columns, X"]
     batch: Annotated[Any, "8"]
-    latched: Annotated[Any, "columns, E*l"]  # of what laws with memory have latched, see Problem.latched
-    by_latched: Annotated[Any, "E, l*S"]  # derivatives of their forces by it, row by row
+    latched: Annotated[Any, "columns, E*l"]  # of the numbers that laws with memory have latched, see Problem.latched
+    by_latched: Annotated[Any, "E, l*S"]  # derivatives of their forces by these, row by row
     renewed: Annotated[Any, "renewed"]  # working space of l (5 + l) + 4 P + 2 B numbers
     turned: Annotated[Any, "9, 2, 1"]  # slopes of forces on the rows of a circle at one moment, see `circles`
     at_rows: Annotated[Any, "3, 2, 1"]  # motion of these rows
@@ -78,7 +78,7 @@ def by_latched(problem, past, derivatives, s, n, delta, rate):
 
 @inlined
 def change_by_latched(problem, derivatives, column, s, n, i):
-    """Change of a force at point i of n by the changes of what is latched."""
+    """Change of a force at point i of n due to the changes of latched numbers."""
     total, most = 0.0, problem.latched.shape[1]
     for place in range(most if problem.by_latched[s] != 0 else 0):
         if problem.latched[s, place] >= 0:
@@ -88,7 +88,7 @@ def change_by_latched(problem, derivatives, column, s, n, i):
 
 @merged
 def _by_parameter(ahead, behind, past, scratch, variation, derivatives, s):
-    """∂F/∂parameter at the nodes of a stop, by the difference of the law at both parameters."""
+    """∂F/∂parameter of stop s at the nodes, by the difference of the laws at both parameters."""
     for i in range(S):
         derivatives.by_parameter[s, i] = 0.0
     if variation.law_step == 0.0:
@@ -124,7 +124,7 @@ def _signal_slopes(problem, tables, past, scratch, derivatives, node_set, level,
 
 @merged
 def _solve(problem, tables, past, scratch, derivatives, variation, node_set, level, column, shift):
-    """Changes of all forces (and, in a moving frame, signals) at the nodes, one column."""
+    """Changes of all forces at the nodes in one column and, in a moving frame, of the signals."""
     place, size, rows, through = 0, 2 * problem.k.size, problem.gap.size, uses_blocks(tables)
     if through:
         free_block_motion(problem, tables, scratch, node_set, level, derivatives.y[column])
@@ -182,8 +182,8 @@ def _solve(problem, tables, past, scratch, derivatives, variation, node_set, lev
 
 
 @merged
-def _move(problem, tables, past, scratch, derivatives, node_set, level, y, part):
-    """Take one column to the end of the step, or to the ``part`` of it that lies within the run."""
+def _move_column(problem, tables, past, scratch, derivatives, node_set, level, y, part):
+    """Move one column to the end of the step, or over the ``part`` of it that lies within the run, s."""
     if part < np.inf:
         for u in range(scratch.force.shape[0]):
             copy(derivatives.force[u], scratch.force[u], S)
@@ -203,7 +203,7 @@ def _move(problem, tables, past, scratch, derivatives, node_set, level, y, part)
 
 @merged
 def linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, variation, row, modes):
-    """A collocated step, linearised as it was taken."""
+    """Move all columns over a collocated step, linearised as it was taken."""
     node_set, level, t = int(row[FIRST]), int(row[SECOND]), row[BEGAN]
     size = 2 * problem.k.size
     free_response(problem, tables, past, scratch, node_set, level)
@@ -242,9 +242,11 @@ def linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, v
         for e in range(size if moving else 0):
             y[e] += derivatives.rate[0, e] * shift
         _solve(problem, tables, past, scratch, derivatives, variation, node_set, level, c, shift)
-        _move(problem, tables, past, scratch, derivatives, node_set, level, y, part)
+        _move_column(problem, tables, past, scratch, derivatives, node_set, level, y, part)
         if moving:
             for e in range(size):
                 y[e] -= derivatives.rate[1, e] * shift
-            for b in range(modes, problem.k.size):  # tones do not change; undamped, their rounding would stay
+            for b in range(
+                modes, problem.k.size
+            ):  # tones do not change; their rounding would stay, as they are undamped
                 y[b], y[problem.k.size + b] = 0.0, 0.0

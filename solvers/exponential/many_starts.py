@@ -45,7 +45,7 @@ REACHED, EXCHANGED, ENERGY = range(3)  # columns of Outcomes.number; three of en
 _CUBE = types.Array(REAL, 3, "C")
 _RUN = types.FunctionType(ADVANCE)
 _state, _scratch = unpacker(STATE), unpacker(SCRATCH)
-_problem = unpacker(PLANAR_PROBLEM)  # whatever it is: both types have the same fields
+_problem = unpacker(PLANAR_PROBLEM)  # of either type: both have the same fields
 
 
 class Outcomes(NamedTuple):
@@ -58,7 +58,7 @@ class Outcomes(NamedTuple):
 
     @classmethod
     def of(cls, starts: int, width: int, stops: int) -> Outcomes:
-        """Those of starts that have not begun."""
+        """Outcomes of starts that have not begun."""
         count = np.zeros((starts, 2), dtype=np.int64)
         count[:, CODE] = STATUSES.index(Status.INTERRUPTED)
         x, number = np.full((starts, width), np.nan), np.zeros((starts, 5))
@@ -66,8 +66,8 @@ class Outcomes(NamedTuple):
 
 
 @inner
-def _note(stop, delta, force, count, number, peak):
-    """Count a contact and its peaks among those of its start."""
+def _count_contact(stop, delta, force, count, number, peak):
+    """Add a contact and its peaks to those of its start."""
     count[CONTACTS] += 1
     number[EXCHANGED] += abs(delta * force)
     peak[stop, 0], peak[stop, 1] = max(peak[stop, 0], delta), max(peak[stop, 1], force)
@@ -75,7 +75,7 @@ def _note(stop, delta, force, count, number, peak):
 
 @inner
 def _begin(problem, state, numbers, rest, parameters, start):
-    """The state of a run at t = 0, as `Workspace.begin` makes it, and what its laws have latched."""
+    """Set the state of a run at t = 0, as `Workspace.begin` does, and the latched numbers."""
     for s in range(problem.law.size if problem.border_count.any() else 0):
         copy(parameters[s], problem.parameters[s], parameters.shape[1])
     copy(rest, numbers, rest.size)
@@ -91,7 +91,7 @@ def _end(problem, state, scratch, code, x, count, number, peak):
         finite &= np.isfinite(value)
     for s in range(problem.law.size):
         if acting_segment(problem, state, s) > 0 and begins_and_ends(problem, s):
-            _note(s, state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE], count, number, peak)
+            _count_contact(s, state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE], count, number, peak)
     count[CODE] = DIVERGED if code == DONE and not finite else code
     number[REACHED] = state.now[T]
     copy(scratch.energy, number[ENERGY:], 3)
@@ -130,7 +130,9 @@ def advance_many(
         spent += state.count[STEPS] + state.count[REJECTED] + 1
         for row in state.log[: state.count[LOGGED]]:
             if row[at.FROM] > 0.0 and row[at.TO] == 0.0:  # a contact ends
-                _note(np.int64(row[at.ELEMENT]), row[at.DEEPEST], row[at.LARGEST], count[i], number[i], peak[i])
+                _count_contact(
+                    np.int64(row[at.ELEMENT]), row[at.DEEPEST], row[at.LARGEST], count[i], number[i], peak[i]
+                )
         state.count[LOGGED] = 0
         if code != RUNNING and code != LOG_FULL:
             _end(problem, state, scratch, code, x[i], count[i], number[i], peak[i])

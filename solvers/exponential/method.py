@@ -1,9 +1,9 @@
 """The main method: exact flight, collocated contact, every event located.
 
-A tone Re(a e^{iΩt}) of a load is subtracted as its steady response, which then is one more undamped block with
-k = Ω², c = 0 that no force pushes; so flight under tones is an autonomous linear system and exact in one
-multiplication per block. Sampled signals are quintics per cell, exact likewise. `safe_steps` proves flight steps
-safe, `contact` solves the contacts and lands on their ends.
+A tone Re(a e^{iΩt}) of a load is subtracted as its steady response, which becomes one more undamped block with k = Ω²,
+c = 0 that no force pushes; so flight under tones is an autonomous linear system and exact in one multiplication per
+block. Sampled signals are quintics per cell, and flight under them is exact, too. `safe_steps` proves flight steps free
+of contact, `contact` solves the contacts and locates their ends.
 
 Limitations
 -----------
@@ -95,7 +95,7 @@ def _advance(problem, tables_at, state_at, scratch_at, energy_at, budget):
             return RUNNING
         if state.count[AT_ONCE] > MOST_EVENTS_AT_ONCE:
             return CHATTER
-        between = in_contact(state) and not control[NEW]  # within a contact a border is met by landing on it only
+        between = in_contact(state) and not control[NEW]  # within a contact borders are reached by landings only
         if not between and switch_on_surface(problem, state, True):
             if in_contact(state):
                 begin_steps(problem, tables, state, scratch, latest_entered(state))
@@ -117,12 +117,12 @@ def _advance(problem, tables_at, state_at, scratch_at, energy_at, budget):
 
 
 def _advance_line(problem_at, tables_at, state_at, scratch_at, energy_at, budget):
-    """The loop of a `Problem`."""
+    """The loop for a `Problem`."""
     return _advance(_problem(problem_at), tables_at, state_at, scratch_at, energy_at, budget)
 
 
 def _advance_plane(problem_at, tables_at, state_at, scratch_at, energy_at, budget):
-    """That of a `PlanarProblem`."""
+    """The loop for a `PlanarProblem`."""
     return _advance(_planar_problem(problem_at), tables_at, state_at, scratch_at, energy_at, budget)
 
 
@@ -209,7 +209,7 @@ class Engine:
         return self.workspace.state
 
     def record(self, **arrays: Array) -> None:
-        """Let other arrays be those of the state that outputs go to: ``log``, ``out``, ``due``, ``event_record``."""
+        """Replace arrays of the state that outputs go to: ``log``, ``out``, ``due``, ``event_record``."""
         self.workspace.replace(**arrays)
 
     def release(self) -> None:

@@ -46,7 +46,7 @@ def _polynomial_responses(stiffnesses: bytes, dampings: bytes, load: bytes, step
     loads = len(rows)
     out = np.zeros((len(h), loads, 6, 2 * size))
     A = np.zeros((size, 2, 2))
-    speed = np.where(stiffness > 0.0, np.sqrt(stiffness), 1.0)  # unit of rates: fewer halvings, less rounding in φ
+    speed = np.where(stiffness > 0.0, np.sqrt(stiffness), 1.0)  # unit of rates, for fewer halvings, less rounding
     A[:, 0, 1], A[:, 1, 0], A[:, 1, 1] = speed, -stiffness / speed, -damping
     vectors = np.stack((rows[:, 0], rows[:, 1] / speed), axis=2)  # (L, N, 2)
     phi = _phi(h[:, None, None, None] * A)

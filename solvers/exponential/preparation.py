@@ -38,7 +38,7 @@ from solvers.problem import Array, Contact, Forcing, Memo, System, on_one_grid
 from solvers.problem.friction import ACCOUNTS
 
 TABLES, SCRATCH = packed_type(Tables), packed_type(Scratch)
-_KNOWN = "energy", "accuracy"  # arrays of the scratch that Python looks at
+_KNOWN = "energy", "accuracy"  # arrays of the scratch that Python reads or writes
 _KINDS = {"tables": TABLES, "state": STATE, "scratch": SCRATCH, "energy_tables": ENERGY_TABLES}
 
 
@@ -58,11 +58,11 @@ class Workspace:
         self.state = State._make(layout.arrays(self.block, 0))
         self.energy, self.accuracy = (layout.array(self.block, 1, Scratch._fields.index(name)) for name in _KNOWN)
         begin_state(self.state, rest)
-        self.rest, self.settings = self.numbers.copy(), (0.0, 0.0)  # of no run
+        self.rest, self.settings = self.numbers.copy(), (0.0, 0.0)  # duration and rtol of the last run
         n = rest.size // 2
         self.p, self.v = self.state.x[:blocks], self.state.x[n : n + blocks]  # of the structure's own blocks
         self.replace(log=new_log(len(self.state.segment)))
-        self.first = self.state, self.block[layout.size :].copy()  # and where its arrays are
+        self.first = self.state, self.block[layout.size :].copy()  # and the addresses of its arrays
 
     def begin(self, z: Array, duration: float, rtol: float) -> None:
         """The state of a run at t = 0 from the coordinates of the structure's own blocks."""
@@ -75,12 +75,12 @@ class Workspace:
         self.v += z[self.p.size :]
 
     def forget_outputs(self) -> None:
-        """Let the next run keep its end only, and a list of events as short as at first."""
+        """Remove the outputs of a run, so that the next one keeps its end only, and a short list of events."""
         if self.state is not self.first[0]:
             self.state, self.block[self.layout.size :] = self.first
 
     def replace(self, **arrays: Array) -> None:
-        """Let other arrays be those of the state."""
+        """Replace arrays of the state by others."""
         self.state = self.state._replace(**arrays)
         for name, array in arrays.items():
             self.layout.replace_array(self.block, 0, State._fields.index(name), array)
@@ -112,7 +112,7 @@ class Prepared(NamedTuple):
 
     @property
     def nbytes(self) -> int:
-        """Of the memory that belongs to this one only; the rest is in `_SharedTables`."""
+        """Memory that belongs to this one only; the rest is in `_SharedTables`."""
         return self.problem.nbytes + self.tables.nbytes + int(self.back.nbytes)
 
     def workspace(self) -> Workspace:
@@ -147,7 +147,7 @@ def prepare_system(system: System, forcing: Forcing) -> Prepared:
 
 
 def _shared_tables_for(system: System, forcing: Forcing, dt_cell: float) -> _SharedTables:
-    """The tables shared by systems that differ in tones, sampled values and gaps only."""
+    """The tables shared by systems that differ only in tones, sampled values and gaps."""
     about, laws = system.about_structure, system.about_laws
     about.get("passive", lambda: _check_passive(system))
     places = (part.tobytes() for part in (forcing.tone_load, forcing.table_dt, forcing.table_load))
@@ -197,7 +197,7 @@ class _SharedTables:
 
     @property
     def nbytes(self) -> int:
-        """Of problem and tables."""
+        """Memory of problem and tables."""
         return sum(getattr(array, "nbytes", 8) for part in (self.problem, self.tables) for array in part.value)
 
     def with_tones(self, forcing: Forcing, contacts: Sequence[Contact]) -> Prepared:
@@ -211,11 +211,11 @@ class _SharedTables:
         problem, tables, back = self.problem.copy(), self._tables(forcing, turn), self.back.copy()
         read_by = problem.value.read, problem.value.power, tables.value.loss_rows, back
         for rows, place in zip(read_by, self.places, strict=True):
-            _of_tones(rows, n)[:] = columns[place]
+            _columns_of_tones(rows, n)[:] = columns[place]
         problem.value.gap[:], problem.value.radius[:] = gaps_of(contacts), radii_of(contacts)
         problem.value.k[n:] = omega**2
         p, v = columns[self.places[0]].transpose(1, 0, 2)
-        rate = _of_tones(problem.value.read_rate, n)
+        rate = _columns_of_tones(problem.value.read_rate, n)
         rate[:, 0], rate[:, 1] = -v * problem.value.k[n:], p
         tables.value.power_rows[:], tables.value.steady_rate[:, :n] = problem.value.power, steady[n:].T
         fill_tones(tables.value, problem.value, self.tones, self.series)
@@ -233,7 +233,7 @@ class _SharedTables:
         return tables
 
 
-def _of_tones(rows: Array, n: int) -> Array:
+def _columns_of_tones(rows: Array, n: int) -> Array:
     """(k, 2, tones) columns of the blocks behind the first n."""
     return rows.reshape(len(rows), 2, rows.shape[1] // 2)[:, :, n:]
 
@@ -255,7 +255,7 @@ def _check_passive(system: System) -> bool:
 
 @lru_cache(maxsize=64)
 def _layout(**known: int) -> Layout:
-    """Shapes and places of the arrays of `State` and `Scratch`; ``pool`` pairs of rows, 0 for a few of them."""
+    """Shapes and places of the arrays of `State` and `Scratch`; ``pool`` counts its pairs of rows, 0 for few rows."""
     blocks, pool, inputs = known["N"], known["pool"], known["R"] + known["L"]
     own, many = padded(blocks), blocks if pool else 0
     width = 2 * blocks + 2 + 2 * known["E"] + ACCOUNTS * known["F"]

@@ -1,8 +1,8 @@
-"""Responses of the blocks to a force given at the nodes of a contact step, per step length.
+"""Responses of the blocks to a force given at the nodes of a contact step, for every step length.
 
 A block's response to the j-th node value is (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ at the nodes t_i and
 at the end. The response of stop s to the force of stop u is a sum of these over the blocks, `fill_pair`. For a few
-stops it is made beforehand, for all pairs.
+stops it is tabulated for all pairs.
 
 A *kind* is a set of nodes, one per (κ, λ); a *weighting* is a kind with or without the weight σ^λ of the force.
 """
@@ -15,7 +15,7 @@ from solvers.compiled.kernels import inner, kernel
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.nodes import S, lagrange
 
-_PANEL = 6.0  # radians of the fastest oscillation per quadrature panel of 12 points
+_PANEL = 6.0  # radians of the fastest oscillation in a quadrature panel of 12 points
 
 
 @kernel
@@ -37,7 +37,7 @@ def propagate(k, c, x):
 
 @kernel
 def fill_propagators(k, c, blocks, h, out):
-    """(len(h), 2, N): α, β of the blocks from the first to before the last."""
+    """(len(h), 2, N) α, β of the blocks from the first to before the last."""
     for i in range(h.size):
         for b in range(blocks[0], blocks[1]):
             out[i, 0, b], out[i, 1, b] = propagate(k[b], c[b], h[i])
@@ -45,7 +45,7 @@ def fill_propagators(k, c, blocks, h, out):
 
 @inner
 def _fill_basis(time_exponent, weight_exponent, nodes, weights, gauss, begin, width, out):
-    """At the points of a panel dτ/h w(σ) L_j(σ)/w(σ_j) of every node, and behind them τ/h = σ^κ."""
+    """Write dτ/h w(σ) L_j(σ)/w(σ_j) of every node at the points of a panel, and behind them τ/h = σ^κ."""
     for g in range(gauss.shape[1]):
         sigma, measure = begin + width * gauss[0, g], width * gauss[1, g]
         out[g, S] = sigma
@@ -64,7 +64,8 @@ def _fill_basis(time_exponent, weight_exponent, nodes, weights, gauss, begin, wi
 def _block_response(k, c, h, time_exponent, weight_exponent, nodes, weights, gauss, out, basis):
     """out[i, j] = (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ; i = S is the end of the step.
 
-    ``basis`` holds the polynomials between all nodes, for where one panel is enough, and has room for those of another.
+    ``basis`` holds the polynomials between neighbouring nodes, for blocks that need one panel there, and has room for
+    those of another panel.
     """
     count, rate = nodes.size, math.sqrt(k) + c
     for i in range(count + 1):
@@ -121,7 +122,7 @@ def _fill_end_response(k, c, push, ending, out):
 
 @inner
 def _fill_level(k, c, h, time_exponent, weight_exponent, nodes, weights, gauss, response, ending, work, basis):
-    """Blocks' responses on one step length, at the nodes and at the end."""
+    """Responses of the blocks for one step length, at the nodes and at the end."""
     own = ending.shape[1]
     for b in range(own):
         _block_response(k[b], c[b], h, time_exponent, weight_exponent, nodes, weights, gauss, work, basis)
@@ -152,7 +153,7 @@ def fill_weighting(
     basis,
     sums,
 ):
-    """Responses of one weighting on all step lengths: of the blocks and, for a few stops, of all pairs.
+    """Responses of one weighting for all step lengths: of the blocks and, for a few stops, of all pairs.
 
     For a few stops (``forced`` is not empty) the blocks' responses are scratch for one length.
     """
@@ -171,7 +172,7 @@ def fill_weighting(
 
 @kernel
 def fill_node_propagators(k, c, blocks, h, time_exponent, nodes, out):
-    """(J, 2, N, S): α, β of some of the blocks at the nodes of one kind."""
+    """(J, 2, N, S) α, β of some of the blocks at the nodes of one kind."""
     for level in range(h.size):
         for b in range(blocks[0], blocks[1]):
             for i in range(S):
@@ -181,7 +182,7 @@ def fill_node_propagators(k, c, blocks, h, time_exponent, nodes, out):
 
 @kernel
 def fill_free(k, c, read, read_rate, blocks, h, time_exponent, nodes, out):
-    """(J, m, 2N, 2S): δ and δ̇ of all stops at the nodes of one kind from the state of some of the blocks."""
+    """(J, m, 2N, 2S) δ and δ̇ of all stops at the nodes of one kind from the state of some of the blocks."""
     size = k.size
     for level in range(h.size):
         for b in range(blocks[0], blocks[1]):

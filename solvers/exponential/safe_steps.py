@@ -55,23 +55,23 @@ from solvers.exponential.flight import (
 )
 
 _REFRESH = 8  # flight steps between two evaluations of the bound
-_GROUP = 8  # cells that one bound covers: with more it grows, with fewer it is evaluated more often
+_GROUP = 8  # cells that one bound covers: with more the bound grows, with fewer it is computed more often
 
 
 @inner
 def _bound_signals(problem, cell, count, bounds):
-    """Bounds of |s| on some cells: each Bézier coefficient of a quintic is at most |s| + 2h/5 |s'| + h²/20 |s''|."""
+    """Bounds of |s| on ``count`` cells by Bézier coefficients, each at most |s| + 2h/5 |s'| + h²/20 |s''|."""
     for j in range(problem.table_dt.size):
         first, bounds[j] = problem.table_start[j] + cell, 0.0
-        slope, bend = 0.4 * problem.table_dt[j], 0.05 * problem.table_dt[j] ** 2
+        slope, curving = 0.4 * problem.table_dt[j], 0.05 * problem.table_dt[j] ** 2
         for row in range(first, first + count + 1):
             s, rate, curvature = problem.table[row, 0], problem.table[row, 1], problem.table[row, 2]
-            bounds[j] = max(bounds[j], abs(s) + slope * abs(rate) + bend * abs(curvature))
+            bounds[j] = max(bounds[j], abs(s) + slope * abs(rate) + curving * abs(curvature))
 
 
 @inlined
 def _acceleration_bound(problem, tables, r, norms, signal_bounds, horizon):
-    """M: bound of the acceleration of row r over the horizon, signals included."""
+    """M: bound of |δ̈| of row r over the time ``horizon``, signals included."""
     n = problem.k.size
     total = dot(tables.acceleration_weight[r], norms, n)
     for j in range(problem.table_dt.size):
@@ -83,7 +83,7 @@ def _acceleration_bound(problem, tables, r, norms, signal_bounds, horizon):
 
 @inlined
 def _target(tables, t, first, second, t_end):
-    """Where a step must end: at an output time unless that is near enough to be evaluated from the step's start."""
+    """Time at which a step must end: the end, or an output time too late to be evaluated from the step's start."""
     if tables.fastest * (first - t) > SERIES_REACH:
         return min(first, t_end)
     return t_end if tables.fastest * (second - first) <= SERIES_REACH else min(second, t_end)
@@ -91,9 +91,10 @@ def _target(tables, t, first, second, t_end):
 
 @inner
 def _sample(problem, tables, energy_tables, state, scratch, t):
-    """Write the outputs due within the step that began at t with the blocks' p and v in x = split_state[2], moved on.
+    """Write the outputs due within the step that began at t; ``split_state[2]``, the motion then, moves along.
 
-    With sampled signals the balance of the state is that at t, and goes with x; else it follows from the mark.
+    With sampled signals the energy balance of the state is that at t, and is integrated along; otherwise
+    `account_output` computes it.
     """
     size, with_energy, before = 2 * problem.k.size, energy_tables.active > 0.0, state.x
     accounted = with_energy and problem.table_dt.size > 0
@@ -110,16 +111,15 @@ def _sample(problem, tables, energy_tables, state, scratch, t):
 
 
 @inner
-def _fly_unsampled(problem, tables, state, scratch, most, budget):
-    """Tabulated steps without signals or output, until a stop is near, or the time ``most`` or the budget is used up.
+def _fly_unsampled(problem, tables, state, scratch, longest, budget):
+    """Tabulated steps without signals or output, until a stop is near, ``longest`` has passed or the budget is spent.
 
-    p and v of the blocks are in two arrays, eight numbers a vector. Returns (time flown, what rounding
-    leaves of it, steps, safe time left).
+    Returns (time flown, its rounding error for `summed`, steps, safe time left).
     """
-    x, flown, left, count = scratch.split_state[0], 0.0, 0.0, 0
+    x, flown, rounding, count = scratch.split_state[0], 0.0, 0.0, 0
     split(problem, state.x, x)
     while True:
-        span = most - flown
+        span = longest - flown
         for r in range(problem.gap.size if count % _REFRESH == 0 else 0):
             scratch.per_row[r] = weighted_norms(tables.acceleration_weight[r], tables, x)
         for s in range(problem.law.size):
@@ -133,15 +133,15 @@ def _fly_unsampled(problem, tables, state, scratch, most, budget):
             break
         level = level_within(tables, span)
         propagate_split(tables, level, x)
-        flown, left = summed(flown, left, tables.flight_step[level])
+        flown, rounding = summed(flown, rounding, tables.flight_step[level])
         count += 1
     join(problem, x, state.x)
-    return flown, left, count, span
+    return flown, rounding, count, span
 
 
 @inlined
 def _bound_cells(problem, tables, scratch, x, cell, count):
-    """Set the errors e of all stops for some cells from here; returns whether a stop may be that near already."""
+    """Bound the interpolation errors e of all rows for the next ``count`` cells; returns whether a stop may be near."""
     _bound_signals(problem, cell, count, scratch.signal_bounds)
     for r in range(problem.gap.size):
         error = weighted_norms(tables.cell_error[r], tables, x)
@@ -149,12 +149,12 @@ def _bound_cells(problem, tables, scratch, x, cell, count):
             by_signal = tables.cell_error_signal[r, problem.table_load[j]]
             error += scratch.signal_bounds[j] * (by_signal[0] + count * by_signal[1])
         scratch.per_row[r] = error
-    return _near(problem, tables, scratch, x)
+    return _is_any_near(problem, tables, scratch, x)
 
 
 @inlined
-def _near(problem, tables, scratch, x):
-    """Whether any stop is nearer than its error e, or the state is not finite."""
+def _is_any_near(problem, tables, scratch, x):
+    """Whether any stop may be reached within a cell that ends in x, by its error e; also if the state is not finite."""
     near = False
     for s in range(problem.law.size):
         row = row_of(problem, s)
@@ -167,8 +167,8 @@ def _near(problem, tables, scratch, x):
 
 @merged
 def _cross_cells(problem, tables, energy_tables, state, scratch, most):
-    """Cross whole cells as long as no stop is near; returns how many, about ``most`` at most."""
-    h, x, at, now, with_energy = problem.table_dt[0], scratch.split_state, 0, state.now, energy_tables.active > 0.0
+    """Cross whole cells while no stop is near; returns how many, ``most`` at most."""
+    h, x, current, now, with_energy = problem.table_dt[0], scratch.split_state, 0, state.now, energy_tables.active > 0.0
     begin, offset = cell_of(problem, now[T])
     end = min(int(now[T_END] / h), begin + most, problem.table_start[1] - problem.table_start[0] - 1)
     cell, bounded = begin, begin
@@ -179,23 +179,23 @@ def _cross_cells(problem, tables, energy_tables, state, scratch, most):
         while cell < end:
             if cell == bounded:
                 bounded = min(cell + _GROUP, end)
-                if _bound_cells(problem, tables, scratch, x[at], cell, bounded - cell):
+                if _bound_cells(problem, tables, scratch, x[current], cell, bounded - cell):
                     break
-            cross_cell(problem, tables, x[at], cell, x[1 - at])
-            if _near(problem, tables, scratch, x[1 - at]):
+            cross_cell(problem, tables, x[current], cell, x[1 - current])
+            if _is_any_near(problem, tables, scratch, x[1 - current]):
                 break
             cell += 1
             if state.due[state.count[SAMPLED]] < cell * h:
                 now[T] = min(cell * h, now[T_END])
-                copy_split(x[at], x[2])
+                copy_split(x[current], x[2])
                 _sample(problem, tables, energy_tables, state, scratch, (cell - 1) * h)
             if with_energy:
                 whole, begin_of_cell = tables.flight_step.size, (cell - 1) * h
-                exchanged = account_step(problem, tables, energy_tables, scratch, whole, begin_of_cell, at)
+                exchanged = account_step(problem, tables, energy_tables, scratch, whole, begin_of_cell, current)
                 add_to_balance(problem, state.x, exchanged)
-            at = 1 - at
+            current = 1 - current
         if cell > begin:
-            join(problem, x[at], state.x)
+            join(problem, x[current], state.x)
             now[T] = min(cell * h, now[T_END])
             state.count[STEPS] += cell - begin
             if with_energy:
@@ -204,12 +204,15 @@ def _cross_cells(problem, tables, energy_tables, state, scratch, most):
 
 
 @inlined
-def _safe_span(problem, tables, state, scratch, span, rest, renew):
-    """``span``, or the time within which no stop can be reached; ``renew`` the bounds of |δ̈| for the time ``rest``."""
-    if renew:
+def _safe_span(problem, tables, state, scratch, span, horizon, renew_bounds):
+    """``span``, or the shorter time within which no stop can be reached.
+
+    ``renew_bounds`` of |δ̈| for the ``horizon`` first.
+    """
+    if renew_bounds:
         energy_norms(problem, state.x, scratch.norms)
         for r in range(problem.gap.size):
-            scratch.per_row[r] = _acceleration_bound(problem, tables, r, scratch.norms, scratch.signal_bounds, rest)
+            scratch.per_row[r] = _acceleration_bound(problem, tables, r, scratch.norms, scratch.signal_bounds, horizon)
     for s in range(problem.law.size):
         if is_circle(problem, s):
             span = min(span, span_of_circle_at(problem, state, scratch, s))
@@ -221,7 +224,7 @@ def _safe_span(problem, tables, state, scratch, span, rest, renew):
 
 @merged
 def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell, dt_cell):
-    """Move by up to ``span``: Taylor step that looks for roots, whole cell, or table. (time, stop reached or -1)."""
+    """Move by up to ``span``: Taylor step with a search for roots, whole cell, or table. (time, stop or -1)."""
     size, now, stop, x = 2 * problem.k.size, state.now, -1, scratch.split_state
     sampled, shortest = problem.table_dt.size > 0, tables.flight_step[tables.flight_step.size - 1]
     if span < shortest:
@@ -257,7 +260,7 @@ def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell,
 
 @merged
 def fly(problem, tables, energy_tables, state, scratch, budget):
-    """Fly until a stop is reached (returns its index), the end (-1), or the budget is spent (-2)."""
+    """Fly until a stop is reached (returns its index), to the end (-1), or until the budget is spent (-2)."""
     now, out, due = state.now, state.out, state.due
     sampled, with_energy = problem.table_dt.size > 0, energy_tables.active > 0.0
     dt_cell, count = problem.table_dt[0] if sampled else np.inf, 0
@@ -282,7 +285,7 @@ def fly(problem, tables, energy_tables, state, scratch, budget):
             rest = max(dt_cell - offset, 1e-9 * dt_cell)
             _bound_signals(problem, cell, 1, scratch.signal_bounds)
         # --- the time within which no stop can be reached
-        if first == np.inf and not sampled:  # no output and no cell ends before
+        if first == np.inf and not sampled:  # neither outputs nor cells limit the steps
             flown, left, steps, span = _fly_unsampled(problem, tables, state, scratch, span, budget)
             now[LEFT] += left
             move_clock(now, flown)

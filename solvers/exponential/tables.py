@@ -27,12 +27,12 @@ from solvers.exponential.contact.nodes import S, gauss, node_sets_of, so_far
 from solvers.exponential.phi_functions import quintic_responses, signal_responses
 from solvers.exponential.responses import fill_propagators
 
-STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # of an inlined law
-TAYLOR_REACH = 0.02  # |λ| x up to which a Taylor step of order 6 is exact to rounding
-_MOST_RADIANS = 2000.0  # largest contact step in units of 1/|λ|
-_CONTACT_REACH = 1e-6  # smallest one in the same units, and not above
-_SLOWEST = 1e-9  # of the fastest rate: with slower ones the tables would only grow
-_SHORT = 1e-9  # s: a stop may be far stiffer than the structure
+STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # places in `Tables.power_law`
+TAYLOR_REACH = 0.02  # |λ| h up to which a Taylor step of order 6 is exact to rounding
+_MOST_RADIANS = 2000.0  # |λ| h of the largest contact step
+_CONTACT_REACH = 1e-6  # |λ| h of the smallest one, at most
+_SLOWEST = 1e-9  # rate in units of the fastest, below which blocks do not lengthen the steps in the tables
+_SHORT = 1e-9  # s, of the smallest contact step, at most: a stop may be far stiffer than the structure
 
 
 class Tables(NamedTuple):
@@ -99,7 +99,7 @@ class Tables(NamedTuple):
 
 
 def law_tables_of(contacts: Sequence[Any]) -> dict[str, Any]:
-    """Entries of `Tables` from the laws of contacts, see `problem.system.Law`. Those that always act are called."""
+    """Entries of `Tables` from the laws of contacts, see `problem.system.Law`. Laws that always act are not inlined."""
     laws = [contact.law for contact in contacts]
     inlined = [None if contact.always else getattr(contact.law, "inlined", None) for contact in contacts]
     bends = [getattr(law, "bend", None) for law in laws]
@@ -114,7 +114,7 @@ def law_tables_of(contacts: Sequence[Any]) -> dict[str, Any]:
     }
 
 
-# tables with columns for the tones
+# tables with columns for the tones' blocks
 TONE_TABLES = (
     *(
         "flight_propagator",
@@ -206,13 +206,13 @@ def fill_tones(tables: Tables, problem: Problem, tones: int, series: tuple[tuple
 
 
 def doublings(speeds: Any, tones: Any) -> int:
-    """Octaves by which the fastest tone is above the fastest block of a structure, rounded up; 0 for a slower one."""
+    """Octaves by which the fastest tone is above the fastest block of a structure, rounded up; 0 if it is slower."""
     ratio = float(tones.max(initial=0.0)) / max(float(speeds.max()), 1e-3)
     return math.ceil(math.log2(max(ratio, 1.0)))
 
 
 def _steps(omega: Any, damping: Any, tones: int) -> tuple[Any, Any]:
-    """Flight and contact steps, s: functions of the structure alone unless a tone is faster than it."""
+    """Flight and contact steps, s; functions of the structure alone unless a tone is faster than it."""
     own = omega.size - tones
     times = doublings((omega + damping)[:own], omega[own:])
     return _steps_of(omega[:own].tobytes(), damping[:own].tobytes(), times)
@@ -220,7 +220,7 @@ def _steps(omega: Any, damping: Any, tones: int) -> tuple[Any, Any]:
 
 @lru_cache(maxsize=64)
 def _steps_of(omegas: bytes, dampings: bytes, doublings: int) -> tuple[Any, Any]:
-    """Steps for the frequencies and dampings of a structure, and for tones faster by some octaves."""
+    """The same for the frequencies and dampings of a structure, and tones faster by some octaves."""
     omega, damping = np.frombuffer(omegas), np.frombuffer(dampings)
     fastest = max(float((omega + damping).max()), 1e-3)
     rates = np.concatenate((omega, damping))

@@ -32,9 +32,9 @@ from solvers.exponential.preparation import places_among_tones
 from solvers.exponential.steady_response import steady_response
 from solvers.problem import Array, Parameter, SolverError, System
 
-_ROWS = 256  # of the event record: some 25 contacts, within which no derivative overflows
+_ROWS = 256  # of the event record, for some 25 contacts, within which no derivative overflows
 _CARRIED = [Derivatives._fields.index(name) for name in ("y", "entry", "shift", "rate", "latched")]
-_LARGE = 1e100  # size at which the derivatives are scaled down
+_LARGE = 1e100  # size above which the derivatives are scaled down, or below its inverse up
 
 
 class Tangent:
@@ -61,7 +61,7 @@ class Tangent:
         self.y, self.entry, self.shift, self.end_rate, self.latched = (layout.array(self.block, 0, i) for i in _CARRIED)
         begin_state(State._make(layout.arrays(self.block, 1)), state.x[:size])
         self.places = places_among_tones(n, size // 2 - n)
-        self.tones = np.delete(np.arange(width), self.places)  # and accounts: they do not change
+        self.tones = np.delete(np.arange(width), self.places)  # and energy balance: they do not change
         self.y[: 2 * n, self.places] = system.blocks.inverse.T
         if self.exact:
             self.y[-1, self.places] = -self.change.steady(0.0)
@@ -72,7 +72,7 @@ class Tangent:
         here, ahead, behind, variation = (packed.address for packed in self.packed)
         derivatives, past = (words + start for start in layout.starts)
         self.addresses = here, ahead, behind, *engine.addresses[1:], past, derivatives, variation, system.size
-        self.log_scale = 0.0  # the derivatives are exp(log_scale) times what is kept
+        self.log_scale = 0.0  # the derivatives are exp(log_scale) times the arrays
         self.history: list[tuple[float, float]] = []  # (time, ln of their size)
 
     def follow(self) -> None:
@@ -103,7 +103,7 @@ class Tangent:
         return self.blocks.T @ y.T
 
     def latched_matrix(self) -> Array:
-        """(l, columns) derivatives of what is latched at the time reached, codes of segments among it (zero)."""
+        """(l, columns) derivatives of the latched numbers at the time reached; those of codes of segments are zero."""
         matrix: Array = math.exp(self.log_scale) * self.latched[:, self.places_latched].T
         return matrix
 
@@ -117,7 +117,7 @@ def _packed(engine: Any, parameters: Array) -> Packed:
 
 @lru_cache(maxsize=64)
 def _layout(**known: int) -> Layout:
-    """Shapes and places of the arrays of `Derivatives` and of the past `State`."""
+    """Shapes and places of the arrays of `Derivatives`, and of the `State` that the derivatives have reached."""
     latched = known["l"]
     working = latched * (5 + latched) + 2 + known["P"] + known["B"]
     sizes = {**known, "S": S, "STAGES": STAGES, "renewed": working, **NO_ROWS}
@@ -125,7 +125,7 @@ def _layout(**known: int) -> Layout:
 
 
 def _size(y: Array) -> float:
-    """Frobenius norm; in units of the largest entry, as its square may overflow."""
+    """Frobenius norm, computed in units of the largest entry, as its square may overflow."""
     largest = float(np.abs(y).max())
     return largest * math.sqrt(np.vdot(y / largest, y / largest)) if largest > 0.0 else 0.0
 
@@ -146,7 +146,7 @@ class _Change:
 
     @classmethod
     def none(cls, problem: Problem, n: int, parameters: Array) -> _Change:
-        """No parameter."""
+        """Without a parameter."""
         rows = len(problem.gap)
         variation = Variation(
             0.0, 0.0, np.zeros(0), np.zeros((0, rows, 2, 4)), np.zeros(rows), np.zeros(problem.radius.size)
@@ -163,7 +163,7 @@ class _Change:
             return None
         rubbing = any(contact.friction is not None for contact in system.contacts)
         if rubbing and np.any(radii_of(sides[0].contacts) != radii_of(sides[1].contacts)):
-            return None  # the way along a circle changes with it
+            return None  # ξ = c θ changes with it
         tones = _tones(system, *sides)
         if tones is None or not all(_same_structure(system, side) for side in sides):
             return None
@@ -186,7 +186,7 @@ class _Change:
 
 
 def _parameters(side: System, problem: Problem) -> Array:
-    """Parameters of the laws of a side with what the run has latched."""
+    """Parameters of the laws of one side, with the numbers that the run has latched."""
     parameters = law_parameters(side)
     for row, run, places in zip(parameters, problem.parameters, problem.latched, strict=True):
         row[places[places >= 0]] = run[places[places >= 0]]
@@ -203,7 +203,7 @@ class _Tones(NamedTuple):
 
 
 def _tones(here: System, behind: System, ahead: System) -> _Tones | None:
-    """The tones; None when sampled signals differ."""
+    """The tones; None if sampled signals differ."""
     found = []
     k, c = here.blocks.k, here.blocks.c
     for (vector, signal), *others in zip(here.loads, behind.loads, ahead.loads, strict=True):
@@ -223,7 +223,7 @@ def _tones(here: System, behind: System, ahead: System) -> _Tones | None:
 
 
 def _same_structure(one: System, other: System) -> bool:
-    """Whether two systems differ in signals, gaps and laws' parameters only."""
+    """Whether two systems differ only in signals, gaps and parameters of laws."""
     if one.size != other.size or len(one.contacts) != len(other.contacts):
         return False
     if any((a.map, a.outer) != (b.map, b.outer) for a, b in zip(one.contacts, other.contacts, strict=True)):

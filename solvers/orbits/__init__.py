@@ -1,8 +1,8 @@
 """Periodic motion by shooting, and Lyapunov exponents.
 
 `shots` integrates the parts of a period, `newton` corrects their states, `open_times` chooses where a shot may begin,
-`whole_state` appends to a state what laws have latched, `shooting` puts all together, `periodic_orbit` is the result
-with its Floquet multipliers. Imports: `integration` and what it imports. Begin with `shooting.orbit`.
+`whole_state` appends the latched numbers to a state, `shooting` puts all together, `periodic_orbit` is the result with
+its Floquet multipliers. Imports: `integration` and what it imports. Begin with `shooting.orbit`.
 """
 
 from solvers.orbits.newton import ArclengthCondition, extended, newton, weights

@@ -57,7 +57,7 @@ def lyapunov(
         raise ValueError(f"discard must lie in [0, duration), got {discard!r} of {duration!r} s")
     run = prepared_run(system, q0, q_dot0, duration, None, Exponential() if method is None else method, True)
     borders = np.linspace(discard, duration, _BATCHES + 1)
-    for border in borders[borders > 0.0]:  # the tangent's size is known where a stretch ends: at each border, too
+    for border in borders[borders > 0.0]:  # the size of the tangent is recorded where a stretch ends
         run.state.now[T_END] = border
         status = run.to_the_end(None)
         if status is not Status.DONE:

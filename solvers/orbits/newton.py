@@ -15,14 +15,12 @@ from solvers.orbits.periodic_orbit import OrbitError
 from solvers.orbits.shots import Chain, PeriodicProblem
 from solvers.problem import Array, SolverError, System
 
-TOLERANCE = 1e-10  # of the residual, in units of the orbit's size
-_ROUGH = (
-    1e-8  # taken with laws with memory if no step is better: a border hardly met is met in one run, not in the next
-)
-_NEARLY = 1e-5  # relative residual after which the next step is expected to be the last
-_MOST_HALVINGS = 6
-_MOST_SEGMENTS = 3  # starts of a period in other segments than it ended with
-_DEEPEST = 1e3  # energy of a stop in units of the motion's: a period spent deeper takes as long as thousands elsewhere
+TOLERANCE = 1e-10  # residual, in units of the orbit's size, at which Newton's method has converged
+_ROUGH = 1e-8  # the same with memory if no step is better: rounding decides whether a border is just reached
+_NEARLY = 1e-5  # relative residual below which the next step is expected to be the last
+_MOST_HALVINGS = 6  # of a step that does not reduce the residual
+_MOST_SEGMENTS = 3  # runs of a period to find the segments of laws with memory it begins with
+_DEEPEST = 1e3  # energy of a stop, in units of the motion's, above which a guess is refused: its run would be slow
 
 
 def weights(system: System, period: float) -> Array:
@@ -37,7 +35,7 @@ def weights(system: System, period: float) -> Array:
 
 
 def extended(matrix: Array, more: Array) -> Array:
-    """A matrix with further entries on its diagonal."""
+    """A matrix with further diagonal entries."""
     size = len(matrix)
     whole = np.diag(np.concatenate((np.zeros(size), more)))
     whole[:size, :size] = matrix
@@ -46,7 +44,7 @@ def extended(matrix: Array, more: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class ArclengthCondition:
-    """The arclength condition: scaled by ``metric``, unknowns move only at right angles to ``tangent`` from the guess.
+    """The arclength condition: in ``metric``, the unknowns move only at right angles to ``tangent`` from the guess.
 
     Both are over [states (m 2n), parameter].
     """
@@ -69,8 +67,8 @@ def newton(
 ) -> tuple[Chain, float, int]:
     """Solve the chain from a first guess; returns it with its relative residual and the iterations.
 
-    x is (m, N), with what is latched. With a condition the parameter is an unknown too. ``slope`` asks for the
-    derivatives by the parameter of what is returned; ``most`` is the number of iterations allowed. Raises OrbitError.
+    x is (m, N), with the latched numbers. With a condition the parameter is an unknown, too. ``slope`` asks for
+    derivatives by the parameter; ``most`` is the number of iterations allowed. Raises OrbitError.
     """
     unknowns = guess = np.append(x.ravel(), parameter)
     measure = _Measure(problem)
@@ -101,8 +99,8 @@ def newton(
 class _Measure:
     """Size of a residual relative to the motion's.
 
-    What counts as the motion's size lies between 1e-4 and 1e3 of the first guess's, so that neither running off to
-    infinity nor vanishing passes for convergence or its failure. What is latched counts in units of its own size.
+    The size of the motion is taken between 1e-4 and 1e3 times that of the first guess, so that running off to infinity
+    does not count as convergence, nor vanishing as its failure. Latched numbers count in units of their own size.
     """
 
     def __init__(self, problem: PeriodicProblem) -> None:
@@ -123,16 +121,16 @@ class _Measure:
         return max(relative, self._latched(chain)) if chain.coordinates < chain.x.shape[1] else relative
 
     def _latched(self, chain: Chain) -> float:
-        """Relative residual of what is latched; a code that differs counts as one."""
+        """Relative residual of the latched numbers; a code that differs counts as one."""
         sizes = np.where(self.problem.codes(chain)[chain.coordinates :], 1.0, self.problem.units(chain))
         return float((np.abs(chain.residual[:, chain.coordinates :]) / sizes).max())
 
     def too_deep(self, x: Array, parameter: float) -> bool:
-        """Whether a guess has left the motion for the inside of a stop."""
+        """Whether the stops of a guess hold far more energy than the motion."""
         return self.first > 0.0 and self._held(x, parameter) > _DEEPEST * (self.first**2 + self.stored)
 
     def _held(self, x: Array, parameter: float) -> float:
-        """Largest force times indentation of the stops."""
+        """Largest force times indentation of the stops, J."""
         system, _ = self.problem.make(parameter)
         most = 0.0
         for contact in system.contacts:
@@ -144,7 +142,7 @@ class _Measure:
 
 
 def _fire(problem: PeriodicProblem, unknowns: Array, measure: _Measure, slope: bool) -> tuple[Any, float]:
-    """The chain at given unknowns and its relative residual, inf where it cannot be integrated."""
+    """The chain at given unknowns and its relative residual; inf if it cannot be integrated."""
     x, parameter = unknowns[:-1].reshape(len(problem.fractions), -1), float(unknowns[-1])
     try:
         if measure.too_deep(x, parameter):
@@ -161,7 +159,7 @@ def _fire(problem: PeriodicProblem, unknowns: Array, measure: _Measure, slope: b
 
 
 def _with_ends(chain: Chain) -> Array:
-    """The shots' states with what is latched where the shots before them end."""
+    """The shots' states with the numbers latched at the ends of the shots before them."""
     x = chain.x.copy()
     x[:, chain.coordinates :] += np.roll(chain.residual, 1, axis=0)[:, chain.coordinates :]
     return x

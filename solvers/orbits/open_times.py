@@ -27,9 +27,9 @@ def latching_stops(system: System) -> list[int]:
 def open_intervals(
     system: System, contacts: ContactLog, period: float, passed: Array | None = None
 ) -> list[tuple[float, float]]:
-    """Intervals of a period in which all stops are open; if there are none, all whose law latches the entry rate.
+    """Intervals of a period in which all stops are open; if there are none, those whose law latches the entry rate.
 
-    They are cut where laws with memory have ``passed`` borders.
+    They are divided at the times ``passed`` at which laws with memory reach borders.
     """
     ends = np.where(np.isnan(contacts.t_out), period, contacts.t_out)
     for stops in (range(len(system.contacts)), latching_stops(system)):
@@ -47,7 +47,7 @@ def open_intervals(
 
 
 def _cut(start: float, end: float, at: Array) -> Iterator[tuple[float, float]]:
-    """The parts of an interval."""
+    """The parts of an interval, divided at times."""
     return pairwise([start, *sorted(at[(at > start) & (at < end)].tolist()), end])
 
 
@@ -56,7 +56,7 @@ def open_starts(
 ) -> list[float]:
     """Times for the starts of ``count`` shots: zero if asked for, then the middles of the longest open intervals.
 
-    Fewer when there is no open interval.
+    Fewer if there is no open interval.
     """
     open_spans = open_intervals(system, contacts, period, passed)
     starts = [0.0] if zero else []
@@ -68,7 +68,7 @@ def open_starts(
 
 
 def closed(system: System, x: Array, stops: Sequence[int]) -> bool:
-    """Whether any of these stops is closed in a state; what always acts is no stop."""
+    """Whether any of these stops is closed in a state; elements that always act are no stops."""
     contacts = [system.contacts[s] for s in stops if not system.contacts[s].always]
     return any(contact.indentation(x[: system.size]) > 0.0 for contact in contacts)
 

@@ -17,8 +17,8 @@ from solvers.orbits.whole_state import codes, counts, derivatives, memory_of, ru
 from solvers.problem import Array, ContactLog, Solution, SolverError, System, Transitions, counted
 from solvers.problem.event_list import NO_EVENTS
 
-_LOST = 1e-13  # size of a direction after one period, in units of the largest, below which it is forgotten
-_NEAR_ONE = 0.01  # | |μ| - 1 | below which a verdict on stability is doubtful
+_LOST = 1e-13  # relative size of a direction after one period below which it counts as lost
+_NEAR_ONE = 0.01  # | |μ| - 1 | of the largest multiplier below which the verdict on stability is doubtful
 
 
 class OrbitError(SolverError):
@@ -83,7 +83,7 @@ class Orbit:
 
     @property
     def whole(self) -> Array:
-        """[q, q̇] with what is latched, (2n + l,)."""
+        """[q, q̇] and the latched numbers, (2n + l,)."""
         return np.concatenate((self.state, *self.memory)) if self.memory else self.state
 
     @cached_property
@@ -96,7 +96,7 @@ class Orbit:
 
     @cached_property
     def transverse(self) -> Any:
-        """Multipliers but for those of the family."""
+        """Multipliers without those of the family."""
         if not self.memory:
             return _in_order(np.linalg.eigvals(self.monodromy))
         real = np.flatnonzero(~codes(self.system)).tolist()
@@ -106,7 +106,7 @@ class Orbit:
 
     @property
     def forgotten(self) -> int:
-        """How many multipliers are zero: what is latched from δ and δ̇ within the period forgets its past."""
+        """Number of multipliers that are zero: numbers latched from δ and δ̇ within the period lose their past."""
         return int(np.sum(self.transverse == 0.0)) if self.memory else 0
 
     @property
@@ -122,29 +122,29 @@ class Orbit:
 
 
 def _in_order(values: Any) -> Any:
-    """Eigenvalues, largest first, not to be changed."""
+    """Eigenvalues, largest first, in a read-only array."""
     values = values[np.argsort(-np.abs(values), kind="stable")]
     values.setflags(write=False)
     return values
 
 
 def _eigenvalues(matrix: Array) -> Any:
-    """Eigenvalues, those exactly zero that singular values tell of; rounding spreads them if they are multiple."""
+    """Eigenvalues; those that singular values show to be zero are set to 0, as rounding spreads multiple ones."""
     from scipy.linalg import matrix_balance
 
-    with np.errstate(invalid="ignore"):  # scales beyond the whole numbers
+    with np.errstate(invalid="ignore"):  # scales beyond the range of integers
         matrix, whole = matrix_balance(matrix, permute=False)[0], len(matrix)
     while len(matrix):
         u, s, v = np.linalg.svd(matrix)
         rank = int(np.sum(s > _LOST * s[0]))
         if rank == len(matrix):
             break
-        matrix = (s[:rank, None] * v[:rank]) @ u[:, :rank]  # as u S v has, but for the zeros
+        matrix = (s[:rank, None] * v[:rank]) @ u[:, :rank]  # it has the eigenvalues of u S v without the zeros
     return np.concatenate((np.linalg.eigvals(matrix), np.zeros(whole - len(matrix))))
 
 
 def at_zero(orbit: Orbit) -> Array:
-    """State of an orbit at t = 0, with what is latched."""
+    """State of an orbit at t = 0, with the latched numbers."""
     if orbit.phase == 0.0:
         return orbit.whole
     return state_after(delayed(orbit.system, orbit.phase), orbit.whole, orbit.period - orbit.phase, orbit.method)
@@ -172,7 +172,7 @@ def orbit_of(problem: PeriodicProblem, chain: Chain, residual: float, iterations
 
 
 def with_doubts(orbit: Orbit) -> Orbit:
-    """The orbit with the reasons why `stable` may be wrong, checked with a tighter tolerance too."""
+    """The orbit with the reasons why `stable` may be wrong, from itself and from a tighter tolerance."""
     tight = replace(orbit.method, rtol=max(0.03 * orbit.method.rtol, 1e-12))
     later = delayed(orbit.system, orbit.phase)
     _, again = derivatives(later, orbit.whole, orbit.period, tight, True)

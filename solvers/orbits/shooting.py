@@ -11,8 +11,8 @@ matrix, the product of the shots' tangents.
 A law that depends on the entry rate needs the past while in contact, so a shot may begin only while every such stop is
 open: `Orbit.phase` is the time within the period to which `Orbit.state` belongs, zero wherever that is possible.
 
-What laws with memory latch is part of the state x, so that a shot may begin anywhere. A latched number that is not
-renewed within the period makes 1 - Φ' singular: it is held where it is, and the orbit is one of a family.
+The numbers that laws with memory latch are part of the state x, so that a shot may begin at any time. A latched number
+that is not renewed within the period makes 1 - Φ' singular: it is held constant, and the orbit is one of a family.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ from solvers.problem.run_arguments import check_slopes, latched_at_start
 
 _MOST_SHOTS = 6
 _MOST_CHOICES = 4  # of the starting times of shots
-_SETTLING = 2.0  # periods that let laws with memory latch, from a start without
-_FRICTION = 20  # at least as many periods of a run from rest with them, since nothing else may damp it
-_LONGEST = 400  # periods of a run from rest
-_MOST_SETTLINGS = 4  # starts taken from a run from rest, a hundred periods apart
+_SETTLING = 2.0  # periods from a start without latched numbers, in which laws with memory latch them
+_FRICTION = 20  # least periods of a run from rest with such laws, which may be the only damping
+_LONGEST = 400  # most periods of a run from rest
+_MOST_SETTLINGS = 4  # starts tried along a run from rest, a hundred periods apart
 
 
 def orbit(
@@ -82,7 +82,7 @@ def orbit(
 
 
 def _near(system: System, period: float, x: Array, method: Any, shots: int | None) -> Orbit:
-    """The orbit near a state, with as few shots as will do."""
+    """The orbit near a state, with as few shots as possible."""
     tried: list[str] = []
     for count in [shots] if shots else range(1, _MOST_SHOTS + 1):
         try:
@@ -95,7 +95,7 @@ def _near(system: System, period: float, x: Array, method: Any, shots: int | Non
 
 
 def _round_and_unforced(system: System) -> str:
-    """Why a search in a circular clearance without any load may fail."""
+    """A hint why a search in a circular clearance without any load may fail; else empty."""
     if system.loads or all(contact.map != "annulus" for contact in system.contacts):
         return ""
     return (
@@ -118,7 +118,7 @@ def _from_zero(orbit: Orbit) -> Orbit:
 
 
 def _check_isolated(problem: PeriodicProblem, chain: Chain) -> None:
-    """Refuse an orbit whose neighbours are orbits too, to rounding, other latched numbers that stay put aside."""
+    """Refuse an orbit whose neighbours are orbits, too, apart from those with other latched numbers."""
     W, matrix = weights(*problem.make(chain.parameter)), chain.monodromy()
     if chain.coordinates < len(matrix):
         size = float(np.linalg.norm(chain.x[0, : chain.coordinates] @ W.T)) or 1.0  # at rest it has none
@@ -147,7 +147,7 @@ def checked(system: System, period: float, method: Any, shots: int | None) -> An
 
 
 def why_not_periodic(system: System, period: float) -> str:
-    """Which load does not have a period, in words; empty when all have it."""
+    """Which load does not have the period, in words; empty if all have it."""
     for load, (_, signal) in enumerate(system.loads):
         trouble = f"load {load} does not have the period {period:g} s"
         if not hasattr(signal, "tones"):
@@ -163,7 +163,7 @@ def why_not_periodic(system: System, period: float) -> str:
 
 
 def checked_start(system: System, start: ArrayLike, period: float, method: Any) -> Array:
-    """A start of the right shape, with what is latched; where that is not given it is what laws come to latch."""
+    """A start of the right shape with latched numbers, which if not given come from a run of two periods."""
     x = np.array(start, dtype=float)
     n2 = 2 * system.size
     whole = n2 + sum(counts(system))
@@ -177,10 +177,7 @@ def checked_start(system: System, start: ArrayLike, period: float, method: Any) 
 
 
 def settled(system: System, period: float, method: Any) -> Array:
-    """State to which a run from rest has settled: until the slowest block has decayed, at most 400 periods.
-
-    It comes with what is latched.
-    """
+    """State, with latched numbers, of a run from rest until the slowest block has decayed, at most 400 periods."""
     least = _FRICTION if any(counts(system)) else 1
     count = min(max(least, periods_of_decay(system, period)), _LONGEST)
     x = with_initial_memory(system, np.zeros(2 * system.size))

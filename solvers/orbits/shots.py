@@ -12,8 +12,8 @@ import numpy as np
 from solvers.orbits.whole_state import codes, derivatives, end, units
 from solvers.problem import Array, Parameter, Solution, System
 
-_UNIT = 1e-12  # rounding of the derivatives of what is not renewed
-_KEPT = 4  # values of the parameter whose systems are kept: Newton's method asks for them again
+_UNIT = 1e-12  # rounding of the derivatives of latched numbers that are not renewed
+_KEPT = 4  # values of the parameter whose systems are kept, since Newton's method needs them again
 
 
 class _Delayed:
@@ -33,7 +33,7 @@ class _Delayed:
 
 
 def delayed(system: System, delay: float) -> System:
-    """The system as it is ``delay`` seconds later: all its loads move on."""
+    """The system ``delay`` seconds later: its loads are shifted in time."""
     if delay == 0.0 or not system.loads:
         return system
     return system.like(loads=[(vector, _Delayed(signal, delay)) for vector, signal in system.loads])
@@ -43,8 +43,8 @@ def delayed(system: System, delay: float) -> System:
 class PeriodicProblem:
     """A family of periodic problems: the system and its period for each value of a parameter.
 
-    ``fractions`` (m,) are the shots' starts in units of the period, ascending; ``step`` is the parameter's difference,
-    zero where there is none.
+    ``fractions`` (m,) are the shots' starts in units of the period, ascending; ``step`` is for differences by the
+    parameter, zero if there is none.
     """
 
     make: Callable[[float], tuple[System, float]]
@@ -66,7 +66,7 @@ class PeriodicProblem:
         return self.kept[parameter]
 
     def evaluate(self, x: Array, parameter: float, slope: bool = True) -> Chain:
-        """Fire all shots from x (m, N); without ``slope`` the derivatives by the parameter are left out, as zeros."""
+        """Integrate all shots from x (m, N); without ``slope`` the derivatives by the parameter are zero."""
         here = self.shots(parameter)
         h, (m, size) = self.step if slope else 0.0, x.shape
         sides = [self.shots(parameter + s * h) for s in (-1.0, 1.0)] if h else []
@@ -85,7 +85,7 @@ class PeriodicProblem:
         return Chain(x, parameter, residual, np.array(tangents), by_parameter, solutions, slope or self.step == 0.0)
 
     def units(self, chain: Chain) -> Array:
-        """Sizes of what is latched, over the period."""
+        """Sizes of the latched numbers over the period."""
         systems = [system for system, _ in self.shots(chain.parameter)]
         rows = zip(systems, chain.x, chain.solutions, strict=True)
         found: Array = np.max([units(system, x, solution.transitions) for system, x, solution in rows], axis=0)
@@ -98,9 +98,9 @@ class PeriodicProblem:
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """What the shots from x (m, N) gave: residuals (m, N), their derivatives (m, N, N) and by the parameter.
+    """Results of the shots from x (m, N): residuals (m, N), their derivatives (m, N, N) and by the parameter.
 
-    N = 2n + l counts [q, q̇] and what is latched, see `whole_state`.
+    N = 2n + l counts [q, q̇] and latched numbers, see `whole_state`.
     """
 
     x: Array
@@ -112,7 +112,7 @@ class Chain:
     has_slope: bool = True  # whether ``by_parameter`` is known
 
     def jacobian(self) -> Array:
-        """Derivative (m N, m N) of the residuals by all states; what is never renewed is held where it is."""
+        """Derivative (m N, m N) of the residuals by all states; latched numbers never renewed are held constant."""
         m, size = self.residual.shape
         matrix = np.zeros((m, size, m, size))
         for i in range(m):
@@ -130,7 +130,7 @@ class Chain:
 
     @cached_property
     def frozen(self) -> Any:
-        """Places in a state of what is latched and never renewed within the period."""
+        """Indices in a state of the latched numbers that are never renewed within the period."""
         first, unit = self.coordinates, np.eye(self.x.shape[1])
         same = np.abs(self.tangents[:, first:] - unit[first:]) < _UNIT
         return first + np.flatnonzero(same.all(axis=(0, 2)))

@@ -1,7 +1,7 @@
-"""States with what laws have latched: x = [q, q̇, L], L the latched numbers of all contacts in a row.
+"""States with latched numbers: x = [q, q̇, L], L the latched numbers of all contacts in a row.
 
-Codes of segments are among L. They are whole numbers, rounded when a run begins, and nothing is differentiated by them.
-Without laws with memory L is empty and x is [q, q̇].
+Codes of segments are among L. They are whole numbers, rounded when a run begins, without derivatives. Without laws with
+memory L is empty and x is [q, q̇].
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from solvers.problem import Array, Parameter, Solution, System, Transitions, col
 
 _REALS = ctypes.c_void_p
 _AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS  # border, δ, δ̇, entry rate, parameters
-_OF_SLIDER = np.array([False, True])  # the code of friction and the place of its slider
+_OF_SLIDER = np.array([False, True])  # which numbers of friction are no codes: code of the segment, place of the slider
 _SLOPES = ctypes.CFUNCTYPE(None, *_AT, _REALS)
 
 
 def counts(system: System) -> list[int]:
-    """How many numbers each contact latches."""
+    """Number of latched numbers of each contact."""
 
     def found() -> list[int]:
         return [len(getattr(contact.law, "memory", ())) for contact in system.contacts]
@@ -47,13 +47,13 @@ def _remembering(system: System) -> list[Any]:
 
 
 def with_initial_memory(system: System, x: Array) -> Array:
-    """A state [q, q̇] with what the laws begin with."""
+    """A state [q, q̇] with the numbers that laws begin with."""
     latched = [np.asarray(one.law.parameters)[list(one.law.memory)] for one in _remembering(system)]
     return np.concatenate((x, *latched)) if latched else x
 
 
 def memory_of(system: System, x: Array) -> tuple[Array, ...]:
-    """What each contact has latched in a state, codes rounded; empty without laws with memory."""
+    """The latched numbers of each contact in a state, codes rounded; empty without laws with memory."""
     own = counts(system)
     if not any(own):
         return ()
@@ -79,7 +79,7 @@ def state_after(system: System, x: Array, duration: float, method: Any) -> Array
 
 
 def derivatives(system: System, x: Array, duration: float, method: Any, tangent: Any) -> tuple[Solution, Array]:
-    """A run, and the derivative of the state it ends with by the one it begins with, then by a parameter."""
+    """A run, and the derivative of its end state by its start, then by a parameter."""
     solution = run(system, x, duration, method=method, tangent=tangent)
     matrix = solution.tangent if solution.memory_tangent is None else solution.memory_tangent
     assert matrix is not None
@@ -94,7 +94,7 @@ def derivatives(system: System, x: Array, duration: float, method: Any, tangent:
 
 
 def units(system: System, x: Array, log: Transitions) -> Array:
-    """Size of each latched number over a run from x: of its values, and of what its renewals take from δ and δ̇."""
+    """Size of each latched number over a run from x: of its values, and of the terms of its renewals by δ and δ̇."""
     sizes: list[Array] = []
     for number, latched in enumerate(memory_of(system, x)):
         law: Any = system.contacts[number].law
@@ -115,12 +115,15 @@ def units(system: System, x: Array, log: Transitions) -> Array:
 
 
 def _reals(law: Any) -> Array:
-    """Which of the numbers a law latches are no codes."""
+    """Which latched numbers of a law are no codes."""
     return np.asarray(np.diag(_slopes(law, np.array(law.parameters))[:, 2:]) != 0.0)
 
 
 def _slopes(law: Any, row: Array, border: int = -1, delta: float = 0.0, rate: float = 0.0) -> Array:
-    """Derivatives (l, 2 + l) of a renewal by δ, δ̇ and what is latched; border -1: of none, zero for codes."""
+    """Derivatives (l, 2 + l) of a renewal by δ, δ̇ and the latched numbers.
+
+    Border -1 is none: the identity, with zeros for codes.
+    """
     count = len(law.memory)
     out = np.zeros((count, 2 + count))
     _SLOPES(law.renew_gradient_address)(border, delta, rate, 1.0, row.ctypes.data, out.ctypes.data)
@@ -128,7 +131,7 @@ def _slopes(law: Any, row: Array, border: int = -1, delta: float = 0.0, rate: fl
 
 
 def transitions_of(solutions: Sequence[Solution], starts: Sequence[float]) -> Transitions:
-    """One log of the runs that make up a period, each of whose times counts from its own start."""
+    """One log of the runs of a period; the times of each are counted from its own start."""
     logs = [solution.transitions for solution in solutions]
     columns = {name: [getattr(log, name) for log in logs] for name in columns_of(Transitions)}
     columns["t"] = [t + start for t, start in zip(columns["t"], starts, strict=True)]

@@ -1,9 +1,9 @@
 """Derivatives of a whole motion by its start and by a parameter: states, contact times, peak forces, impulses.
 
 `nearby` differences the data of a system, `laws` calls compiled laws and their derivatives, `elements` has the forces
-of stops on lines, of circular clearances and of friction, `panels` integrates what linear modes do under forces given
-at nodes, `stretches` divides a run at its events, `events` has what happens there, `variation` goes along a run and
-collects. Imports: `integration` and what it imports. Begin with
+of stops on lines, of circular clearances and of friction, `panels` integrates linear modes under forces given at nodes,
+`stretches` divides a run at its events, `events` has the jumps there, `flow` solves the variational equation in
+between, `variation` follows a run and collects the results. Imports: `integration` and what it imports. Begin with
 `variation.sensitivity`.
 """
 

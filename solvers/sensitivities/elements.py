@@ -1,4 +1,4 @@
-"""Forces of one element along a known motion of its rows, and what they change by.
+"""Forces of one element along a known motion of its rows, and their changes.
 
     y = -rows·q - offsets,    f = N a + F_t b,    a = ∂δ/∂y,  b = ∂ξ/∂y
 
@@ -23,58 +23,59 @@ from solvers.problem import event_list as at
 from solvers.problem.friction import CODE, CUT, FREE, MU, PRESSES, SLIDER, STICK, STIFFNESS
 from solvers.sensitivities import laws
 
-STUCK = 0.0  # code of the event with which stick begins
-_CENTRE = 1e-12  # of the clearance: nearer to the centre, where nothing acts, slopes have no direction
+STUCK = 0.0  # code of the event at which stick begins
+_CENTRE = 1e-12  # least |d| in units of the clearance: at the centre, where no force acts, slopes have no direction
 
 
 @dataclass(frozen=True, eq=False)
 class ElementMotion:
-    """δ, δ̇, ξ, ξ̇ (k,) of an element at times (k,), their slopes by its rows (m, k) and curvatures (m, m, k).
+    """δ, δ̇, ξ, ξ̇ (k,) of an element at times (k,), their slopes (m, k) and curvatures (m, m, k) by its m rows.
 
-    ``press`` is ∂δ/∂y = ∂δ̇/∂ẏ, ``turning`` ∂δ̇/∂y, ``rub`` ∂ξ/∂y; ``angle`` θ, of a circular clearance with friction.
+    ``delta_slopes`` are ∂δ/∂y = ∂δ̇/∂ẏ, ``rate_slopes`` ∂δ̇/∂y, ``xi_slopes`` ∂ξ/∂y; ``angle`` is θ, rad, of a circular
+    clearance with friction.
     """
 
     delta: Array
     rate: Array
-    press: Array
-    press_bend: Array
-    turning: Array
-    way: Array
-    speed: Array
-    rub: Array
-    rub_bend: Array
+    delta_slopes: Array
+    delta_curvature: Array
+    rate_slopes: Array
+    xi: Array
+    xi_rate: Array
+    xi_slopes: Array
+    xi_curvature: Array
     angle: Array
 
 
 def motion_of(contact: Any, t: Any, y: Array, y_dot: Array) -> ElementMotion:
-    """From the motion (m, k) of its rows."""
+    """The motion of an element from that of its rows, y and ẏ (m, k)."""
     m, k = y.shape
     none, slopes, bends = np.zeros(k), np.zeros((m, k)), np.zeros((m, m, k))
     if contact.map != "annulus":
-        press, rub = np.eye(m)[0][:, None] + slopes, slopes
+        delta_slopes, xi_slopes = np.eye(m)[0][:, None] + slopes, slopes
         if m == 1:
-            return ElementMotion(y[0], y_dot[0], press, bends, slopes, none, none, rub, bends, none)
-        rub = -np.eye(m)[1][:, None] + slopes
-        return ElementMotion(y[0], y_dot[0], press, bends, slopes, -y[1], -y_dot[1], rub, bends, none)
+            return ElementMotion(y[0], y_dot[0], delta_slopes, bends, slopes, none, none, xi_slopes, bends, none)
+        xi_slopes = -np.eye(m)[1][:, None] + slopes
+        return ElementMotion(y[0], y_dot[0], delta_slopes, bends, slopes, -y[1], -y_dot[1], xi_slopes, bends, none)
     sign, c = math.copysign(1.0, contact.circle), contact.gap
     r = np.maximum(np.hypot(y[0], y[1]), _CENTRE * c)
     e, across = y[:2] / r, np.stack((-y[1], y[0])) / r
-    press, press_bend, rub, rub_bend = slopes.copy(), bends.copy(), slopes.copy(), bends.copy()
-    press[:2], press_bend[:2, :2] = sign * e, sign / r * (across[:, None] * across)
-    turning = np.einsum("abk,bk->ak", press_bend, y_dot)
-    known = sign * r - contact.circle, (press * y_dot).sum(axis=0), press, press_bend, turning
+    delta_slopes, delta_curvature, xi_slopes, xi_curvature = slopes.copy(), bends.copy(), slopes.copy(), bends.copy()
+    delta_slopes[:2], delta_curvature[:2, :2] = sign * e, sign / r * (across[:, None] * across)
+    rate_slopes = np.einsum("abk,bk->ak", delta_curvature, y_dot)
+    known = sign * r - contact.circle, (delta_slopes * y_dot).sum(axis=0), delta_slopes, delta_curvature, rate_slopes
     if contact.friction is None:
-        return ElementMotion(*known, none, none, rub, rub_bend, none)
-    rub[:2], rub_bend[:2, :2] = c / r * across, -c / r**2 * (e[:, None] * across + across[:, None] * e)
-    rub[2:] = -math.copysign(1.0, contact.law.arm)
+        return ElementMotion(*known, none, none, xi_slopes, xi_curvature, none)
+    xi_slopes[:2], xi_curvature[:2, :2] = c / r * across, -c / r**2 * (e[:, None] * across + across[:, None] * e)
+    xi_slopes[2:] = -math.copysign(1.0, contact.law.arm)
     angle, surface = np.arctan2(y[1], y[0]), contact.law.arm * contact.spin
-    way = c * angle + (rub[2:] * y[2:]).sum(axis=0) + surface * t
-    return ElementMotion(*known, way, (rub * y_dot).sum(axis=0) + surface, rub, rub_bend, angle)
+    xi = c * angle + (xi_slopes[2:] * y[2:]).sum(axis=0) + surface * t
+    return ElementMotion(*known, xi, (xi_slopes * y_dot).sum(axis=0) + surface, xi_slopes, xi_curvature, angle)
 
 
 def acceleration_of(motion: ElementMotion, y_dot: Array, y_twice: Array) -> Array:
-    """δ̈ (k,)."""
-    return np.asarray((motion.press * y_twice + motion.turning * y_dot).sum(axis=0))
+    """δ̈ (k,) from ẏ and ÿ (m, k)."""
+    return np.asarray((motion.delta_slopes * y_twice + motion.rate_slopes * y_dot).sum(axis=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,66 +87,66 @@ class Slider:
 
     @classmethod
     def of(cls, contact: Any, row: Array) -> Slider | None:
-        """From an element's parameters with what it has latched; None without friction."""
+        """The slider in an element's parameters; None without friction."""
         return None if contact.friction is None else cls(contact, row[contact.law.place :])
 
     @property
     def sticks(self) -> bool:
-        """Whether its spring gives the force."""
+        """Whether it sticks."""
         return bool(self.numbers[CODE] == STICK)
 
     @property
     def free(self) -> bool:
-        """Whether it follows without force."""
+        """Whether it follows without force, as N <= 0."""
         return bool(self.numbers[CODE] == FREE)
 
     def uncut(self, row: Array) -> Array:
-        """Parameters of the law without a cut at N = 0, beyond which a slider is free."""
+        """Parameters of the law without a cut at N = 0."""
         place, row = int(self.numbers[CUT]), row.copy()
         if place >= 0:
             row[place] = 0.0
         return row
 
-    def share(self, normal: Array) -> Array:
-        """∂F_t/∂N (k,): ±μ in slip."""
+    def friction_by_normal(self, normal: Array) -> Array:
+        """∂F_t/∂N (k,): ±μ in slip, else 0."""
         code = 0.0 if self.free else self.numbers[CODE]
         return np.where(normal > 0.0, code * self.numbers[MU], 0.0)
 
-    def drawn(self, way: Array) -> Array:
+    def stretch(self, xi: Array) -> Array:
         """ξ - s (k,), in a circle to the nearest turn."""
-        left, turn = way - self.numbers[SLIDER], 2.0 * math.pi * abs(self.contact.circle)
+        left, turn = xi - self.numbers[SLIDER], 2.0 * math.pi * abs(self.contact.circle)
         return left - turn * np.round(left / turn) if turn else left
 
-    def force(self, way: Array, normal: Array) -> Array:
+    def force(self, xi: Array, normal: Array) -> Array:
         """F_t (k,)."""
-        return self.numbers[STIFFNESS] * self.drawn(way) if self.sticks else self.share(normal) * normal
+        return self.numbers[STIFFNESS] * self.stretch(xi) if self.sticks else self.friction_by_normal(normal) * normal
 
     def begun(self, motion: ElementMotion, row: Array, entry_rate: float) -> Array:
-        """Parameters after a run has begun in contact: it sticks, or is free where the law pulls."""
+        """Parameters after a run has begun in contact: stick, or free where the law pulls."""
         law = self.contact.law
         if law.borders > PRESSES and laws.force(law, row, (motion.delta, motion.rate), entry_rate)[0] <= 0.0:
             return self._latched(row, FREE, 0.0)
-        return self.entered(motion, row, STICK if self.numbers[MU] else math.copysign(1.0, float(motion.speed[0])))
+        return self.entered(motion, row, STICK if self.numbers[MU] else math.copysign(1.0, float(motion.xi_rate[0])))
 
     def entered(self, motion: ElementMotion, row: Array, code: float) -> Array:
-        """Parameters after an entry, by which the run began a segment of this code."""
-        return self._latched(row, code, float(motion.way[0]))
+        """Parameters after an entry that began a segment of this code."""
+        return self._latched(row, code, float(motion.xi[0]))
 
     def renewed(self, row: Array, event: Array) -> Array:
-        """Parameters after an event: stick or slip ends, or slip for want of N; or the slider is free no longer."""
-        way, speed, force = (float(number) for number in event[at.DELTA : at.FORCE + 1])
+        """Parameters after an event of the slider: stick or slip ends, N falls to zero, or N begins to grow again."""
+        xi, xi_rate, force = (float(number) for number in event[at.DELTA : at.FORCE + 1])
         if event[at.GUARD] == PRESSES:
             return self._latched(row, FREE, 0.0)
         if event[at.CODE] == STUCK:
-            return self._latched(row, STICK, way - force / self.numbers[STIFFNESS])
+            return self._latched(row, STICK, xi - force / self.numbers[STIFFNESS])
         if self.free:
-            return self._latched(row, math.copysign(1.0, speed), way)
+            return self._latched(row, math.copysign(1.0, xi_rate), xi)
         if self.numbers[MU] == 0.0 and not self.sticks:
             return self._latched(row, -self.numbers[CODE], self.numbers[SLIDER])
         return self._latched(row, math.copysign(1.0, force), self.numbers[SLIDER])
 
     def _latched(self, row: Array, code: float, place: float) -> Array:
-        """Parameters with other latched numbers."""
+        """Parameters with other latched numbers: code of the segment and place of the slider."""
         row = row.copy()
         row[list(self.contact.law.memory)] = code, place
         return row
@@ -166,20 +167,20 @@ class Linear:
 
 
 def forces_of(motion: ElementMotion, slider: Slider | None, normal: Array) -> Array:
-    """Forces (m, k) on the rows for N (k,)."""
+    """Forces (m, k) on the rows under N (k,)."""
     if slider is None:
-        return normal * motion.press
-    return normal * motion.press + slider.force(motion.way, normal) * motion.rub
+        return normal * motion.delta_slopes
+    return normal * motion.delta_slopes + slider.force(motion.xi, normal) * motion.xi_slopes
 
 
 def linear(motion: ElementMotion, slider: Slider | None, normal: Array, slopes: Array, by_law: Array) -> Linear:
-    """Changes of the forces by the motion, by N_δ and N_δ̇ (2, k), and by what changes N itself (k, columns)."""
-    a, b = motion.press, motion.rub
-    by_normal = np.stack((slopes[0] * a + slopes[1] * motion.turning, slopes[1] * a))
-    along, found = a, np.stack((normal * motion.press_bend, np.zeros_like(motion.press_bend)))
+    """Changes of the forces by the motion, with N_δ and N_δ̇ (2, k), and by other changes of N (k, columns)."""
+    a, b = motion.delta_slopes, motion.xi_slopes
+    by_normal = np.stack((slopes[0] * a + slopes[1] * motion.rate_slopes, slopes[1] * a))
+    along, found = a, np.stack((normal * motion.delta_curvature, np.zeros_like(motion.delta_curvature)))
     if slider is not None:
-        along = a + slider.share(normal) * b
-        found[0] += slider.force(motion.way, normal) * motion.rub_bend
+        along = a + slider.friction_by_normal(normal) * b
+        found[0] += slider.force(motion.xi, normal) * motion.xi_curvature
         if slider.sticks:
             found[0] += slider.numbers[STIFFNESS] * b[:, None] * b
     found += along[None, :, None] * by_normal[:, None]

@@ -2,8 +2,8 @@
 
     dt* = -db/ḃ,   Y ← Y - b ΔF dt*,   d(entry rate) = dδ̇ + δ̈ dt*,   dL ← m_L dL + m_δ (dδ + δ̇ dt*) + m_δ̇ (dδ̇ + δ̈ dt*)
 
-with b = δ - knot, or the law's border function. See Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth
-Mechanical Systems, 2004, chapter 7.
+with the event function b = δ - knot, or the margin of the law's border, and the derivatives m of what is latched. See
+Leine, Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems, 2004, chapter 7.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from solvers.sensitivities.elements import forces_of
 from solvers.sensitivities.flow import Flow
 from solvers.sensitivities.stretches import Acting, after, rises
 
-GRAZING = 1e-9  # depth δ̇²/2|δ̈| to which an entry would go without force, in units of the motion, below which it grazes
-_OFF = 1e-10  # relative distance from a knot at which a law is certainly on one side of it
-_BEHIND = 1e-6  # part of what a margin is made of, by which it is negative where another border has left it behind
+GRAZING = 1e-9  # depth δ̇²/2|δ̈| of an entry without force, in units of the motion, below which it grazes
+_OFF = 1e-10  # relative distance from a knot at which a law is evaluated on one side of it
+_LEFT_BEHIND = 1e-6  # margin, in units of its terms, below which another event has crossed its border before
 
 
 class NoDerivativeError(ArithmeticError):
@@ -30,14 +30,14 @@ class NoDerivativeError(ArithmeticError):
 
 
 def called(system: System, contact: int) -> str:
-    """What messages call a contact: by its name, if it has one."""
+    """What messages call a contact: its name, or its number."""
     return system.contacts[contact].name or f"contact {contact}"
 
 
 def cross(flow: Flow, t: float, row: Array, acting: Acting, span: float, last: Array | None) -> tuple[Acting, Array]:
-    """Take all derivatives across one event; what acts then, and the change dt* (m,) of its time.
+    """Take all derivatives across one event; returns what acts after it, and the change dt* (m,) of its time.
 
-    ``last`` is that of an event at the same time; ``span`` the size of the element's displacement.
+    ``last`` is dt* of another event at the same time, if any; ``span`` the size of the element's displacement.
     """
     s = int(row[at.ELEMENT])
     following = after(flow.system, acting, row)
@@ -49,15 +49,15 @@ def cross(flow: Flow, t: float, row: Array, acting: Acting, span: float, last: A
         return following, shift
     memory = row[at.GUARD] >= 0.0
     rate, acceleration = flow.rates(t, s, acting)
-    moved, sped = flow.change(t, s)
+    d_delta, d_rate = flow.change(t, s)
     entering = row[at.FROM] == 0.0 and row[at.TO] > 0.0
     if memory:
-        shift = _at_border(flow, t, row, acting, (moved, sped, rate, acceleration), last)
+        shift = _at_border(flow, t, row, acting, (d_delta, d_rate, rate, acceleration), last)
     else:
-        shift = _at_knot(flow, t, row, acting, (moved, rate, acceleration), span)
+        shift = _at_knot(flow, t, row, acting, (d_delta, rate, acceleration), span)
     if entering:
         floored = abs(row[at.RATE]) < flow.system.contacts[s].law.entry_rate_floor
-        flow.entry[s] = 0.0 if floored else np.sign(rate) * (sped + acceleration * shift)
+        flow.entry[s] = 0.0 if floored else np.sign(rate) * (d_rate + acceleration * shift)
         following = _enter_slider(flow, t, row, following, shift)
     normal, forces = _jump(flow, t, row, acting, following)
     flow.y -= np.outer(flow.push[s].T @ forces, shift)
@@ -66,7 +66,7 @@ def cross(flow: Flow, t: float, row: Array, acting: Acting, span: float, last: A
 
 
 def _latch_at_start(flow: Flow, t: float, s: int, acting: Acting) -> Acting:
-    """A contact under way at the start latches its rate then, and the place of its slider if it has none."""
+    """Latch the entry rate of a contact under way at the start, and the place of its slider unless it is given."""
     rate = float(flow.motion_of(t, s).rate[0])
     floor = flow.system.contacts[s].law.entry_rate_floor
     flow.entry[s] = 0.0 if abs(rate) < floor else np.sign(rate) * flow.change(t, s)[1]
@@ -78,7 +78,7 @@ def _latch_at_start(flow: Flow, t: float, s: int, acting: Acting) -> Acting:
 
 
 def _enter_slider(flow: Flow, t: float, row: Array, acting: Acting, shift: Array) -> Acting:
-    """Stick or slip as a contact begins."""
+    """Begin stick or slip as a contact begins."""
     s = int(row[at.ELEMENT])
     slider = flow.slider(s, acting)
     if slider is None:
@@ -88,33 +88,33 @@ def _enter_slider(flow: Flow, t: float, row: Array, acting: Acting, shift: Array
 
 
 def _latch_slider(flow: Flow, t: float, s: int, begun: Acting, shift: Array) -> Acting:
-    """What a slider latches that sticks as its contact begins: s = ξ then."""
+    """Derivative of the place of a slider that sticks as its contact begins, s = ξ."""
     flow.latched[s][:] = 0.0
     if flow.slider(s, begun).sticks:  # type: ignore[union-attr]
-        flow.latched[s][1] = flow.way_change(t, s) + float(flow.motion_of(t, s).speed[0]) * shift
+        flow.latched[s][1] = flow.xi_change(t, s) + float(flow.motion_of(t, s).xi_rate[0]) * shift
     return begun
 
 
 def _renew_slider(flow: Flow, t: float, s: int, acting: Acting, following: Acting, shift: Array) -> None:
-    """What a slider latches where stick begins, s = ξ - F_t/k_t.
+    """Derivative of the place of a slider where stick begins, s = ξ - F_t/k_t.
 
-    Where slip ends the rate of s is zero, so that dt* does not matter, unless Ṅ jumps there, at a knot or an event of
-    another element, whose dt* it is. Where N begins to grow from zero dt* = -dN/Ṅ.
+    Where slip ends, the rate of s is zero, so that dt* does not matter, unless Ṅ jumps there, at a knot or an event of
+    another element; then dt* is that of this event. Where N begins to grow from zero, dt* = -dN/Ṅ.
     """
     flow.latched[s][:] = 0.0
     slider, before = flow.slider(s, following), flow.slider(s, acting)
     if slider is None or before is None or not slider.sticks:
         return
     if before.free:
-        _, growing, pressed = flow.at_instant(t, s, acting.changed(s, rows=before.uncut(acting.rows[s])))
-        flow.latched[s][1] = flow.way_change(t, s) - float(flow.motion_of(t, s).speed[0]) * pressed / growing
+        _, normal_rate, normal_change = flow.at_instant(t, s, acting.changed(s, rows=before.uncut(acting.rows[s])))
+        flow.latched[s][1] = flow.xi_change(t, s) - float(flow.motion_of(t, s).xi_rate[0]) * normal_change / normal_rate
         return
     numbers = slider.numbers
-    _, growing, pressed = flow.at_instant(t, s, acting)
+    _, normal_rate, normal_change = flow.at_instant(t, s, acting)
     normal = flow.force(t, s, acting)
-    force, share = before.force(np.zeros(1), normal)[0], before.share(normal)[0]
-    rate = float(flow.motion_of(t, s).speed[0]) - share / numbers[STIFFNESS] * growing
-    flow.latched[s][1] = flow.way_change(t, s) - share / numbers[STIFFNESS] * pressed + rate * shift
+    force, friction_by_normal = before.force(np.zeros(1), normal)[0], before.friction_by_normal(normal)[0]
+    rate = float(flow.motion_of(t, s).xi_rate[0]) - friction_by_normal / numbers[STIFFNESS] * normal_rate
+    flow.latched[s][1] = flow.xi_change(t, s) - friction_by_normal / numbers[STIFFNESS] * normal_change + rate * shift
     if numbers[MU]:
         one = flow.by.elements[s]
         changed = one.mu / numbers[MU] - one.stiffness / numbers[STIFFNESS]
@@ -122,40 +122,42 @@ def _renew_slider(flow: Flow, t: float, s: int, acting: Acting, following: Actin
 
 
 def _at_knot(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[Any, ...], span: float) -> Array:
-    """dt* at the surface or a knot."""
-    s, (moved, rate, acceleration) = int(row[at.ELEMENT]), motion
+    """dt* at the surface or a knot; NoDerivativeError if it grazes."""
+    s, (d_delta, rate, acceleration) = int(row[at.ELEMENT]), motion
     up = rises(row)
     border = acting.segment[s] if up else acting.segment[s] - 1
-    late = moved.copy()
-    late[flow.own] -= flow.by.of_knot(s, border)
-    still = rate * rate <= 2.0 * abs(acceleration) * GRAZING * span
-    if t == 0.0 and still and not np.any(late[flow.own]):
+    d_border = d_delta.copy()
+    d_border[flow.own] -= flow.by.of_knot(s, border)
+    grazes = rate * rate <= 2.0 * abs(acceleration) * GRAZING * span
+    if t == 0.0 and grazes and not np.any(d_border[flow.own]):
         return np.zeros(flow.columns)  # at rest on the surface: it begins at once
-    if still:
+    if grazes:
         what = f"is entered with {abs(rate):.3g} m/s" if up and not border else "turns on a knot"
-        told = f"{called(flow.system, s)} {what} at t = {t:.9g} s"
-        raise NoDerivativeError(f"no derivative: {told}, which grazes; change the parameter a little")
-    return -late / rate
+        where = f"{called(flow.system, s)} {what} at t = {t:.9g} s"
+        raise NoDerivativeError(f"no derivative: {where}, which grazes; change the parameter a little")
+    return -d_border / rate
 
 
 def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[Any, ...], last: Array | None) -> Array:
-    """dt* at a border of a law with memory; what it latches then."""
-    s, border, (moved, sped, rate, acceleration) = int(row[at.ELEMENT]), int(row[at.GUARD]), motion
+    """dt* at a border of a law with memory, whose renewal also changes the derivatives of what is latched."""
+    s, border, (d_delta, d_rate, rate, acceleration) = int(row[at.ELEMENT]), int(row[at.GUARD]), motion
     law: Any = flow.system.contacts[s].law
     place = border, float(row[at.DELTA]), float(row[at.RATE])
     by = laws.margin_slopes(law, acting.rows[s], *place, acting.entry_rate[s])
     known = flow.latched[s]
-    late = by[0] * moved + by[1] * sped + by[2:] @ known
-    late[flow.own] += flow.over_laws(s, acting, lambda one, own: laws.margin(one, own, *place, acting.entry_rate[s]))
-    pace = by[0] * rate + by[1] * acceleration
+    d_margin = by[0] * d_delta + by[1] * d_rate + by[2:] @ known
+    d_margin[flow.own] += flow.over_laws(
+        s, acting, lambda one, own: laws.margin(one, own, *place, acting.entry_rate[s])
+    )
+    margin_rate = by[0] * rate + by[1] * acceleration
     size = np.abs(by * np.concatenate((place[1:], acting.rows[s][list(law.memory)]))).sum()
-    behind = laws.margin(law, acting.rows[s], *place, acting.entry_rate[s]) < -_BEHIND * size
-    if behind and last is not None:
+    left_behind = laws.margin(law, acting.rows[s], *place, acting.entry_rate[s]) < -_LEFT_BEHIND * size
+    if left_behind and last is not None:
         shift = last
     else:
-        shift = -late / pace if pace < 0.0 and t > 0.0 else np.zeros(flow.columns)
+        shift = -d_margin / margin_rate if margin_rate < 0.0 and t > 0.0 else np.zeros(flow.columns)
     maps = laws.renewal_slopes(law, acting.rows[s], *place, acting.entry_rate[s])
-    latched = np.outer(maps[:, 0], moved + rate * shift) + np.outer(maps[:, 1], sped + acceleration * shift)
+    latched = np.outer(maps[:, 0], d_delta + rate * shift) + np.outer(maps[:, 1], d_rate + acceleration * shift)
     latched += maps[:, 2:] @ known
     places = list(law.memory)
     latched[:, flow.own] += flow.over_laws(s, acting, lambda one, own: laws.renewed(one, own, *place)[places])
@@ -164,7 +166,7 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
 
 
 def _jump(flow: Flow, t: float, row: Array, before: Acting, then: Acting) -> tuple[float, Array]:
-    """By how much N jumps, and by how much the forces (m,) on the rows."""
+    """Jumps of N and of the forces (m,) on the rows at an event."""
     s, found = int(row[at.ELEMENT]), []
     for acting in (before, then):
         normal = np.array([0.0 if acting.segment[s] == 0 else _force_beside(flow, row, before, then, acting)])
@@ -175,7 +177,7 @@ def _jump(flow: Flow, t: float, row: Array, before: Acting, then: Acting) -> tup
 
 
 def _force_beside(flow: Flow, row: Array, before: Acting, then: Acting, acting: Acting) -> float:
-    """N on one side of an event."""
+    """N just before or after an event."""
     s, rate = int(row[at.ELEMENT]), float(row[at.RATE])
     law: Any = flow.system.contacts[s].law
     if row[at.GUARD] >= 0.0:

@@ -5,9 +5,9 @@
     M G = -dM q̈ - dC q̇ - dK q + Σ (dv s + v ds) + Σ d rows f
 
 with the changes df of the forces on the rows from `elements`. Columns of Y: by the start [q, q̇], by what laws have
-latched then, and last by the parameters, to which alone the explicit terms belong. Flights are exact; while forces act,
-the forces at a panel's nodes are the unknowns. What a panel does is linear in the state at its start: all panels of a
-stretch are solved at once, then passed one after the other.
+latched then, and last by the parameters, which alone have the explicit terms. Flights are exact; while forces act,
+their values at a panel's nodes are the unknowns. The end of a panel is linear in the state at its start: all panels of
+a stretch are solved at once, then applied one after the other.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from solvers.sensitivities.nearby import Change
 from solvers.sensitivities.panels import Panels, S, moved, propagator, running
 from solvers.sensitivities.stretches import Acting, Motion
 
-_INSIDE = 1e-10  # relative distance kept from a knot, where the slope of a law could be that of the next segment
+_INSIDE = 1e-10  # relative distance kept from a knot, where the slope of a law may be that of the next segment
 
 
 class Flow:
-    """The derivatives at one time, moved along."""
+    """The derivatives at one time; methods move them on to later times."""
 
     def __init__(self, system: System, motion: Motion, by: Change, start: Array, latched: list[Array]) -> None:
         self.system, self.motion, self.by = system, motion, by
@@ -63,7 +63,7 @@ class Flow:
 
     @property
     def by_parameters(self) -> Array:
-        """(d, 2n) of them those by the parameters."""
+        """(d, 2n) derivatives of [q, q̇] by the parameters."""
         return np.asarray((self.T @ self.y[:, self.own]).T)
 
     def _of_rows(self, t: Any, s: int) -> tuple[Array, Array]:
@@ -72,11 +72,11 @@ class Flow:
         return -self.rows[s] @ q - self.system.contacts[s].row_gaps[:, None], -self.rows[s] @ q_dot
 
     def motion_of(self, t: Any, s: int) -> ElementMotion:
-        """ElementMotion of an element at times."""
+        """`ElementMotion` of an element at times."""
         return motion_of(self.system.contacts[s], np.atleast_1d(t), *self._of_rows(t, s))
 
     def slider(self, s: int, acting: Acting) -> Slider | None:
-        """Friction of an element."""
+        """The slider of an element, None without friction."""
         return Slider.of(self.system.contacts[s], acting.rows[s])
 
     def force(self, t: Any, s: int, acting: Acting, motion: ElementMotion | None = None) -> Array:
@@ -91,13 +91,13 @@ class Flow:
         return forces_of(motion, self.slider(s, acting), self.force(t, s, acting, motion))
 
     def bend(self, t: Array, s: int, acting: Acting) -> Array | None:
-        """What changes its sign at kinks of a law within its segment, at times; None without any."""
+        """Event function of kinks of a law within its segment, at times; None without any."""
         return laws.bend(
             self.system.contacts[s].law, self._inside(s, acting, self.motion_of(t, s)), acting.entry_rate[s]
         )
 
     def _inside(self, s: int, acting: Acting, motion: ElementMotion) -> tuple[Array, Array]:
-        """δ kept within the segment of the law, and δ̇."""
+        """δ, kept within the segment of the law, and δ̇."""
         contact = self.system.contacts[s]
         knots = (-np.inf if contact.always else 0.0, *contact.law.knots, np.inf)
         low, high = knots[acting.segment[s] - 1], knots[acting.segment[s]]
@@ -124,15 +124,15 @@ class Flow:
     def change(self, t: float, s: int) -> tuple[Array, Array]:
         """dδ and dδ̇ (m,) of an element at fixed time."""
         motion, (moved_rows, sped) = self.motion_of(t, s), self._rows_change(t, s)
-        press, turning = motion.press[:, 0], motion.turning[:, 0]
-        found = press @ moved_rows, press @ sped + turning @ moved_rows
+        delta_slopes, rate_slopes = motion.delta_slopes[:, 0], motion.rate_slopes[:, 0]
+        found = delta_slopes @ moved_rows, delta_slopes @ sped + rate_slopes @ moved_rows
         found[0][self.own] -= np.sign(self.system.contacts[s].circle) * self.by.elements[s].clearance
         return found
 
-    def way_change(self, t: float, s: int) -> Array:
+    def xi_change(self, t: float, s: int) -> Array:
         """dξ (m,) of an element with friction at fixed time."""
         motion = self.motion_of(t, s)
-        found, one = motion.rub[:, 0] @ self._rows_change(t, s)[0], self.by.elements[s]
+        found, one = motion.xi_slopes[:, 0] @ self._rows_change(t, s)[0], self.by.elements[s]
         found[self.own] += one.clearance * motion.angle[0] + one.surface * t
         return np.asarray(found)
 
@@ -150,7 +150,7 @@ class Flow:
         return y - one.offsets.T[:, None], y_dot
 
     def over_laws(self, s: int, acting: Acting, read: Callable[[Any, Array], Any]) -> Any:
-        """Derivatives (..., d) by the parameters of what is read off a law, with what it has latched held fixed."""
+        """Derivatives (..., d) by the parameters of what is read off a law, at fixed latched numbers."""
         places = list(getattr(self.system.contacts[s].law, "memory", ()))
         width = len(acting.rows[s])
 
@@ -163,7 +163,7 @@ class Flow:
         return self.by.over_laws(s, of)
 
     def force_change(self, t: Array, s: int, acting: Acting) -> Linear:
-        """Changes of an element's forces by its motion, and by all but that, at times (k,)."""
+        """Changes of an element's forces at times (k,), by its motion and by everything else."""
         law: Any = self.system.contacts[s].law
         motion, slider = self.motion_of(t, s), self.slider(s, acting)
         inside, rate = self._inside(s, acting, motion), acting.entry_rate[s]
@@ -185,24 +185,25 @@ class Flow:
     def _add_friction(
         self, t: Array, s: int, acting: Acting, motion: ElementMotion, slider: Slider, found: Linear
     ) -> None:
-        """Add what its slider's place, and the parameter, change a force by at fixed motion and N."""
-        normal, drawn = self.force(t, s, acting, motion), slider.drawn(motion.way)
+        """Add the changes of F_t at fixed motion and N, by the slider's place and by the parameters."""
+        normal, stretch = self.force(t, s, acting, motion), slider.stretch(motion.xi)
         stiffness = slider.numbers[STIFFNESS] if slider.sticks else 0.0
-        found.other[...] -= stiffness * motion.rub[..., None] * self.latched[s][1]
+        found.other[...] -= stiffness * motion.xi_slopes[..., None] * self.latched[s][1]
         one, contact = self.by.elements[s], self.system.contacts[s]
         changed = np.outer(
-            slider.share(normal) * normal, one.mu / slider.numbers[MU] if slider.numbers[MU] else 0.0 * one.mu
+            slider.friction_by_normal(normal) * normal,
+            one.mu / slider.numbers[MU] if slider.numbers[MU] else 0.0 * one.mu,
         )
         if slider.sticks:
-            changed = np.outer(drawn, one.stiffness) + stiffness * np.outer(
-                np.broadcast_to(t, drawn.shape), one.surface
+            changed = np.outer(stretch, one.stiffness) + stiffness * np.outer(
+                np.broadcast_to(t, stretch.shape), one.surface
             )
         if contact.circle:
-            turns = (drawn - (motion.way - slider.numbers[SLIDER])) / contact.gap
+            turns = (stretch - (motion.xi - slider.numbers[SLIDER])) / contact.gap
             changed = changed + stiffness * np.outer(motion.angle + turns, one.clearance)
-            lengthened = np.outer(slider.force(motion.way, normal), one.clearance / contact.gap)
-            found.other[:2, :, self.own] += lengthened * motion.rub[:2, :, None]
-        found.other[..., self.own] += changed * motion.rub[..., None]
+            lengthened = np.outer(slider.force(motion.xi, normal), one.clearance / contact.gap)
+            found.other[:2, :, self.own] += lengthened * motion.xi_slopes[:2, :, None]
+        found.other[..., self.own] += changed * motion.xi_slopes[..., None]
 
     def at_instant(self, t: float, s: int, acting: Acting) -> tuple[float, float, Array]:
         """N, dN/dt and dN (m,) at fixed time of an element that acts."""
@@ -215,14 +216,14 @@ class Flow:
         return float(self.force(times, s, acting)[0]), float(slopes @ self.rates(t, s, acting)), changed
 
     def fly(self, start: float, end: float, samples: Array) -> Array:
-        """Over a time in which nothing acts; derivatives by the parameters at samples, (q, 2n, d)."""
+        """Move over a flight that parameters do not drive; derivatives by the parameters at samples, (q, 2n, d)."""
         over = propagator(self.k, self.c, np.append(samples, end) - start)
         found = moved(self.k, self.c, over, self.y[:, None])
         self.y = found[:, -1]
         return np.moveaxis(found[:, :-1, self.own], 0, 1)
 
     def pass_flight(self, panels: Panels, acting: Acting, samples: Array) -> Array:
-        """The same where the parameters drive the motion."""
+        """The same where the parameters drive the motion, too."""
         rates, begun = self._drive(panels.times, acting), self.y[:, None, self.own]
         found = self.fly(panels.ends[0], panels.ends[-1], samples)
         if rates is None:
@@ -237,8 +238,9 @@ class Flow:
     def pass_panels(
         self, panels: Panels, acting: Acting, samples: Array
     ) -> tuple[Array, dict[int, tuple[Array, Array]]]:
-        """Where elements act; derivatives at samples (q, 2n, d), and changes at nodes of N (P, S, columns) and of the
-        forces on the rows (P, m, S, columns).
+        """Move over panels in which elements act; derivatives at samples (q, 2n, d), and changes of forces.
+
+        These are at the nodes, of N (P, S, columns) and of the forces on the rows (P, m, S, columns).
 
         f = A y + B with y at the start of a panel; y ← (E + K A) y + K B + drive at its end.
         """
@@ -269,9 +271,9 @@ class Flow:
         return panels.within(states, samples), changes
 
     def _forces(self, panels: Panels, acting: Acting, drive: Array | None, pushes: list[Array]) -> Any:
-        """Changes of all R forces on rows at the nodes, by the state at the start of a panel (P, R S, 2n), and else.
+        """Changes of all R forces on rows at the nodes by the state at a panel's start (P, R S, 2n), and by the rest.
 
-        Likewise those of N of each element; None where it is the force on its only row.
+        Likewise those of N of each element; None if it is the force on its only row.
         """
         count, size, total = len(panels), 2 * len(self.k), len(pushes)
         driven = None if drive is None else panels.at_nodes(drive)
@@ -301,7 +303,7 @@ class Flow:
     def _normal(
         self, count: int, change: Linear, seen: Array, answer: Array, moved_rows: Array | None, forces: Any
     ) -> tuple[Array, Array]:
-        """Changes of N at the nodes (P, S, ...), by the state at the start of a panel and else."""
+        """Changes of N at the nodes (P, S, ...), by the state at the start of a panel and by the rest."""
         normal = change.normal.reshape(2, -1, count, S)
         pull = np.einsum("dbps,dbrpsj->psrj", normal, answer).reshape(count, S, -1)
         other = change.normal_other.reshape(count, S, -1) + pull @ forces[1]
@@ -310,7 +312,7 @@ class Flow:
         return np.einsum("dbps,dbpsn->psn", normal, seen) + pull @ forces[0], other
 
     def _drive(self, t: Array, acting: Acting) -> Array | None:
-        """Rates (2n, P, S, d) of the blocks by the parameters at times (P, S), state and forces held fixed."""
+        """Rates (2n, P, S, d) of the blocks by the parameters at times (P, S), at fixed state and forces, or None."""
         by, system = self.by, self.system
         if not (by.forced or by.turned):
             return None
@@ -332,12 +334,15 @@ class Flow:
 
 
 def _begun(places: list[int], law: Any) -> Array:
-    """What a law begins with."""
+    """The latched numbers a law begins with."""
     return np.asarray(law.parameters)[places]
 
 
 def latched_columns(system: System, by: Change, columns: int, given: Sequence[Any] | None) -> list[Array]:
-    """(l, m) of every element at the start: by what it has latched itself, and by parameters where laws begin so."""
+    """(l, m) derivatives of the latched numbers of every element at the start.
+
+    Given numbers are unknowns of the start; numbers that laws begin with depend on the parameters.
+    """
     found, place = [], 2 * system.size
     for s, contact in enumerate(system.contacts):
         places = list(getattr(contact.law, "memory", ()))

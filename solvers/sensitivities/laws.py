@@ -1,4 +1,4 @@
-"""Compiled laws called from Python: force, its derivatives, and what a memory does on a border."""
+"""Compiled laws called from Python: force, its derivatives, margins and renewals of a memory."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ _KNOWN = ctypes.c_int64, _REALS, _REALS, ctypes.c_double, _REALS
 _AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS
 _ONE, _THREE = ctypes.CFUNCTYPE(None, *_KNOWN, _REALS), ctypes.CFUNCTYPE(None, *_KNOWN, *[_REALS] * 3)
 _MAPS = ctypes.CFUNCTYPE(None, *_AT, _REALS)
-_SHARE, _LEAST = 1e-7, 1e-10  # of differences of margins, which are nearly linear
+_SHARE, _LEAST = 1e-7, 1e-10  # relative and least step in differences of margins, which are nearly linear
 
 
 def _pointers(*arrays: Array) -> list[int]:
-    """Addresses of numbers."""
+    """Addresses of arrays."""
     return [array.ctypes.data for array in arrays]
 
 
@@ -52,7 +52,7 @@ def by_latched(law: Any, row: Array, motion: tuple[Any, Any], entry_rate: float)
 
 
 def bend(law: Any, motion: tuple[Any, Any], entry_rate: float) -> Array | None:
-    """What changes its sign where a law has a kink that is no knot, (k,): the force without its cut, or δ̇."""
+    """Event function (k,) of a law's kink that is no knot: the force without its cut, or δ̇; None without one."""
     kind = getattr(law, "bend", None)
     if kind == "rate":
         return np.asarray(motion[1])
@@ -67,7 +67,7 @@ def margin(law: Any, row: Array, border: int, delta: float, rate: float, entry_r
 
 
 def margin_slopes(law: Any, row: Array, border: int, delta: float, rate: float, entry_rate: float) -> Array:
-    """Its derivatives (2 + l,) by δ, δ̇ and what is latched, by differences."""
+    """Derivatives (2 + l,) of a margin by δ, δ̇ and the latched numbers, by differences."""
     places = list(law.memory)
     at = np.array([delta, rate, *row[places]])
 
@@ -85,7 +85,7 @@ def margin_slopes(law: Any, row: Array, border: int, delta: float, rate: float, 
 
 
 def renewal_slopes(law: Any, row: Array, border: int, delta: float, rate: float, entry_rate: float) -> Array:
-    """Derivatives (l, 2 + l) of what is latched on a border by δ, δ̇ and what was latched."""
+    """Derivatives (l, 2 + l) of the numbers latched on a border by δ, δ̇ and the numbers latched before."""
     count = len(law.memory)
     out = np.zeros((count, 2 + count))
     _MAPS(law.renew_gradient_address)(border, delta, rate, entry_rate, *_pointers(row, out))
@@ -93,7 +93,7 @@ def renewal_slopes(law: Any, row: Array, border: int, delta: float, rate: float,
 
 
 def renewed(law: Any, row: Array, border: int, delta: float, rate: float) -> Array:
-    """A row of parameters after a renewal."""
+    """Parameters after a renewal."""
     from solvers.problem import renew
 
     after = row.copy()

@@ -17,16 +17,16 @@ _STENCILS = {  # offsets in steps, weights per step with errors of fourth order,
     1: ((0, 1, 2, 3, 4), (-25 / 12, 4.0, -3.0, 4 / 3, -1 / 4), (-3 / 2, 2.0, -1 / 2, 0.0, 0.0)),
     -1: ((0, -1, -2, -3, -4), (25 / 12, -4.0, 3.0, -4 / 3, 1 / 4), (3 / 2, -2.0, 1 / 2, 0.0, 0.0)),
 }
-_ROUNDING = 1e-9  # of data, well above that of modes of a fine mesh
-_PROBES = np.linspace(0.0, 1.0, 37)  # of a run, where a signal is looked at for a change
+_ROUNDING = 1e-9  # of data, relative; well above that of the modes of a fine mesh
+_PROBES = np.linspace(0.0, 1.0, 37)  # times, in units of the run, at which a signal is compared
 
 
 @dataclass(frozen=True, eq=False)
 class Nearby:
     """Systems at values of a parameter near the present one, and weights: Σ weight f(system) = df/d(parameter).
 
-    Of the data of the system alone, such as gaps, numbers of laws, frequencies: the motion is not differenced.
-    ``coarse`` are the weights of a formula of lower order, which tells where data are not smooth.
+    Only data of the system are differenced, such as gaps, numbers of laws, frequencies; the motion is not. ``coarse``
+    are the weights of a formula of lower order, which shows where data are not smooth.
     """
 
     systems: tuple[Any, ...]
@@ -53,15 +53,15 @@ class Nearby:
         raise refused
 
     def map(self, change: Callable[[Any], Any]) -> Nearby:
-        """The same weights for other things made of the systems."""
+        """The same weights for something else made of each system."""
         return Nearby(tuple(change(one) for one in self.systems), self.weights, self.coarse)
 
     def derivative(self, read: Callable[[Any], Any]) -> Array:
-        """The derivative of what is read off a system."""
+        """The derivative of what ``read`` returns of a system."""
         return combined(self.weights, [np.asarray(read(one), dtype=float) for one in self.systems])
 
     def disagreement(self, read: Callable[[Any], Any]) -> float:
-        """Largest difference of what both formulas give, in units of the largest derivative."""
+        """Largest difference of the results of both formulas, in units of the largest derivative."""
         values = [np.asarray(read(one), dtype=float) for one in self.systems]
         fine, coarse = (combined(weights, values) for weights in (self.weights, self.coarse))
         rounding = _ROUNDING * np.abs(values[0]).max(initial=0.0) * max(map(abs, self.weights))
@@ -70,20 +70,21 @@ class Nearby:
 
 
 def unchanged(system: System) -> Nearby:
-    """What a start changes: nothing of the data."""
+    """For derivatives by the start alone: data do not change."""
     return Nearby((system,), (0.0,), (0.0,))
 
 
 def combined(weights: tuple[float, ...], values: list[Any]) -> Any:
-    """Σ weight value, exactly zero where all values are the same."""
+    """Σ weight × value, exactly zero if all values are equal."""
     first = values[0]
     return sum(weight * (value - first) for weight, value in zip(weights, values, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
 class ElementChange:
-    """Derivatives of an element's data by d parameters: its rows (d, m, n) and their offsets (d, m), see `elements`;
-    |c|; μ, k_t and R Ω, (d,) each.
+    """Derivatives of an element's data by d parameters.
+
+    Its rows (d, m, n) and their offsets (d, m), see `elements`; |c|, μ, k_t and R Ω, (d,) each.
     """
 
     rows: Array
@@ -108,7 +109,7 @@ class ElementChange:
 def indentation_change(
     contact: Any, s: int, nearby: Nearby | None, motion: tuple[Array, Array], change: tuple[Array, Array]
 ) -> tuple[Array, Array]:
-    """Changes (k,) of δ and δ̇ of element s for those of q and q̇ (k, n) at fixed times."""
+    """Changes (k,) of δ and δ̇ of element s due to those of q and q̇ (k, n) at fixed times, and to a parameter."""
     (q, q_dot), (d_q, d_q_dot) = motion, change
     y, y_dot = -contact.rows @ q.T - contact.row_gaps[:, None], -contact.rows @ q_dot.T
     moved, sped, clearance = -contact.rows @ d_q.T, -contact.rows @ d_q_dot.T, 0.0
@@ -116,9 +117,9 @@ def indentation_change(
         one = ElementChange.of([nearby], s, contact.rows.shape)
         moved, sped = moved - one.rows[0] @ q.T - one.offsets[0][:, None], sped - one.rows[0] @ q_dot.T
         clearance = float(one.clearance[0] * np.sign(contact.circle))
-    along = motion_of(contact, 0.0, y, y_dot)
-    rate = (along.press * sped + along.turning * moved).sum(axis=0)
-    return (along.press * moved).sum(axis=0) - clearance, rate
+    element = motion_of(contact, 0.0, y, y_dot)
+    rate = (element.delta_slopes * sped + element.rate_slopes * moved).sum(axis=0)
+    return (element.delta_slopes * moved).sum(axis=0) - clearance, rate
 
 
 def _clearance(contact: Any) -> float:
@@ -138,8 +139,9 @@ def _surface(contact: Any) -> float:
 
 
 class Change:
-    """Derivatives of the data by d parameters: matrices (d, n, n), elements, loads' vectors (d, L, n); signals and laws
-    that change, of each parameter.
+    """Derivatives of the data by d parameters.
+
+    Matrices (d, n, n), elements, loads' vectors (d, L, n); signals and laws that change, of each parameter.
     """
 
     def __init__(self, system: System, nearby: Sequence[Nearby], duration: float) -> None:
@@ -158,26 +160,26 @@ class Change:
 
     @property
     def structural(self) -> bool:
-        """Whether matrices change."""
+        """Whether M, C or K changes."""
         return any(np.any(one) for one in (self.M, self.B, self.K))
 
     @cached_property
     def turned(self) -> bool:
-        """Whether rows of elements change."""
+        """Whether directions of elements change."""
         return any(np.any(one.rows) for one in self.elements)
 
     @cached_property
     def forced(self) -> bool:
-        """Whether the motion changes while nothing touches, besides by its state."""
+        """Whether a parameter changes the motion in flight, other than by the state."""
         moving = any(signal is not None for signals in self.signals for signal in signals)
         return self.structural or moving or bool(np.any(self.vectors))
 
     def of_knot(self, s: int, border: int) -> Array:
-        """(d,) of a knot of an element; border 0 is its surface."""
+        """(d,) derivatives of a knot of an element; border 0 is its surface."""
         return self.over_laws(s, lambda law: 0.0 if border == 0 else law.knots[border - 1])
 
     def over_laws(self, s: int, read: Callable[[Any], Any]) -> Any:
-        """(..., d) of what is read off the law of an element; zeros (d,) where it does not change."""
+        """(..., d) derivatives of what ``read`` returns of an element's law; zeros (d,) if the law does not change."""
         found = [
             0.0
             if (known := laws[s]) is None
@@ -189,7 +191,7 @@ class Change:
 
 
 def _laws(nearby: Nearby, s: int) -> list[Any] | None:
-    """The laws of an element at the values; None where all are one."""
+    """The laws of an element in the nearby systems; None if all are equal."""
     laws: list[Any] = [one.contacts[s].law for one in nearby.systems]
     same = all(
         law is laws[0] or (law == laws[0] and np.array_equal(law.parameters, laws[0].parameters)) for law in laws
@@ -198,7 +200,7 @@ def _laws(nearby: Nearby, s: int) -> list[Any] | None:
 
 
 def _signal(nearby: Nearby, system: System, i: int, duration: float) -> Callable[[Array], Array] | None:
-    """Derivative of a load's signal at fixed time; None where it is zero."""
+    """Derivative of a load's signal at fixed time, a function of time; None if it is zero."""
     signals: list[Any] = [one.loads[i][1] for one in nearby.systems]
     own: Any = system.loads[i][1]
     if all(signal is signals[0] for signal in signals):
@@ -211,7 +213,7 @@ def _signal(nearby: Nearby, system: System, i: int, duration: float) -> Callable
 
 
 def _of_values(nearby: Nearby, signals: list[Any], t: Array) -> Array:
-    """By the values of the signals themselves."""
+    """By differences of the signals' values."""
     return np.asarray(combined(nearby.weights, [np.asarray(signal(t), dtype=float) for signal in signals]))
 
 

@@ -1,6 +1,6 @@
-"""What linear modes do over a panel of time, driven by forces given at its nodes.
+"""Motion of linear modes over panels of time, driven by forces given at nodes.
 
-Blocks p' = v, v' = -k p - c v are propagated exactly; forces are polynomials through S Gauss-Legendre nodes in σ, where
+Blocks p' = v, v' = -k p - c v are propagated exactly; forces are polynomials through S Gauss–Legendre nodes in σ, where
 t = clock(σ) makes forces δ^p with a broken p smooth at both ends of a contact,
 
     z(t_i) = E(t_i - a) z(a) + Σ_j K_ij r_j,    K_ij = ∫_a^{t_i} E(t_i - s) ℓ_j(s) ds.
@@ -20,27 +20,25 @@ from scipy.special import betainc, betaincinv
 from solvers.problem import Array
 
 S = 14  # nodes
-_BEYOND = (
-    1.02  # half widths of a panel from its middle: the outermost nodes are within, a zero may lie between two panels
-)
-_SAME = 1e-12  # relative difference of widths that are one
+_BEYOND = 1.02  # half widths from a panel's middle: a zero may lie between the outermost nodes of two panels
+_SAME = 1e-12  # relative difference of widths up to which they are equal
 _X, _W = np.polynomial.legendre.leggauss(S)
 X, W = 0.5 * (_X + 1.0), 0.5 * _W  # on [0, 1]
 _LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_X, S - 1))  # values at nodes -> coefficients
 
 
 def _lagrange(at: Array) -> Array:
-    """Values (..., S) of the polynomials that are 1 at one node and 0 at the others."""
+    """Values (..., S) at points of [0, 1] of the polynomials that are 1 at one node and 0 at the others."""
     return np.asarray(np.polynomial.legendre.legvander(2.0 * at - 1.0, S - 1) @ _LEGENDRE)
 
 
-_WITHIN = _lagrange(X[:, None] * X)  # (i, q, j): ℓ_j at node q of the part before node i
+_WITHIN = _lagrange(X[:, None] * X)  # (i, q, j): ℓ_j at node q of the interval before node i
 _FINE, _NEWTON = _lagrange(np.linspace(0.0, 1.0, 4 * S + 1)), 4  # where a maximum is looked for, and steps from there
 
 
 @dataclass(frozen=True)
 class Clock:
-    """Time over σ in [0, 1] from start to end: dt/dσ ~ (σ (1 - σ))^(m - 1)."""
+    """Time as a function of σ in [0, 1] from start to end: dt/dσ ~ (σ (1 - σ))^(m - 1)."""
 
     start: float
     end: float
@@ -59,7 +57,7 @@ class Clock:
         return np.asarray(length * (sigma * (1.0 - sigma)) ** (m - 1) / beta_function(m, m))
 
     def place(self, t: Array) -> Array:
-        """σ of times."""
+        """σ of times t."""
         share = np.clip((np.asarray(t) - self.start) / (self.end - self.start), 0.0, 1.0)
         return share if self.power == 1 else np.asarray(betaincinv(self.power, self.power, share))
 
@@ -92,7 +90,7 @@ def moved(k: Array, c: Array, over: tuple[Array, Array], y: Array) -> Array:
 
 
 def running(k: Array, c: Array, t: Array, kicks: Array) -> Array:
-    """Σ_{i<=j} E(t_j - t_i) g_i (2n, P, m) for all j, of kicks g (2n, P, m) at times t (P,): by doubling."""
+    """Σ_{i<=j} E(t_j - t_i) g_i (2n, P, m) for all j, of impulses g (2n, P, m) at times t (P,), by doubling."""
     total, apart = kicks, 1
     while apart < len(t):
         over = propagator(k, c, t[apart:] - t[:-apart])
@@ -103,7 +101,7 @@ def running(k: Array, c: Array, t: Array, kicks: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Panels:
-    """Panels of a clock between σ (P + 1,), ascending; of blocks with stiffness k and damping c."""
+    """Panels between the edges σ (P + 1,), ascending, of a clock, for blocks with stiffness k and damping c."""
 
     k: Array
     c: Array
@@ -114,7 +112,7 @@ class Panels:
         return len(self.edges) - 1
 
     def parts(self, most: int) -> list[Panels]:
-        """Themselves in parts of at most so many."""
+        """The panels in parts of at most ``most``."""
         return [replace(self, edges=self.edges[i : i + most + 1]) for i in range(0, len(self), most)]
 
     @cached_property
@@ -220,7 +218,7 @@ def coefficients(values: Array) -> Array:
 def largest(values: Array, ends: tuple[bool, bool]) -> tuple[int, float, float]:
     """Panel, place in [0, 1] and size of the largest value of the polynomials through values (P, S) at the nodes.
 
-    The first and the last end of all panels count where ``ends`` says so; -inf where the largest value is one that does
+    ``ends`` tells whether the first and the last end count; -inf is returned if the largest value is at one that does
     not.
     """
     panel, best = (int(i) for i in np.unravel_index(np.argmax(values @ _FINE.T), (len(values), len(_FINE))))
@@ -234,11 +232,11 @@ def largest(values: Array, ends: tuple[bool, bool]) -> tuple[int, float, float]:
         if not 0 <= panel + beyond < len(values):
             return panel, 0.5 * (beyond + 1.0), float(whole(beyond)) if ends[beyond > 0] else -np.inf
         panel, x = panel + beyond, -float(beyond)
-    return panel, 0.5 * (x + 1.0), float(Legendre(coefficients(values[panel]))(x))  # a kink between them
+    return panel, 0.5 * (x + 1.0), float(Legendre(coefficients(values[panel]))(x))  # a kink between two panels
 
 
 def _top(whole: Legendre, x: float) -> float:
-    """Where the slope of a polynomial is zero near x; beyond [-1, 1] where it rises to an end."""
+    """Zero of the slope of a polynomial near x; beyond [-1, 1] if it rises to an end."""
     slope, curvature = whole.deriv(), whole.deriv(2)
     for _ in range(_NEWTON):
         bend = float(curvature(x))

@@ -1,6 +1,4 @@
-"""A run divided at its events: which elements act from one to the next, with which latched numbers, and where its
-motion has to be known.
-"""
+"""A run divided at its events: which elements act in between, with which latched numbers, on which panels."""
 
 from __future__ import annotations
 
@@ -21,8 +19,8 @@ from solvers.sensitivities.elements import ElementMotion, Slider, motion_of
 from solvers.sensitivities.panels import Clock, Panels
 
 _RADIANS = 1.5  # of the fastest motion in one panel
-_FEWEST = 2  # panels between two events, where elements act
-_MOST_NODES = 4_000_000
+_FEWEST = 2  # panels between two events while elements act
+_MOST_NODES = 4_000_000  # panels × blocks above which a stretch is refused
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,11 +33,11 @@ class Acting:
 
     @property
     def elements(self) -> list[int]:
-        """Those that act."""
+        """The elements that act."""
         return [s for s, segment in enumerate(self.segment) if segment > 0]
 
     def changed(self, s: int, **new: Any) -> Acting:
-        """With other values of one element."""
+        """A copy with other values of one element."""
         return replace(self, **{
             name: tuple(value if i == s else old for i, old in enumerate(getattr(self, name)))
             for name, value in new.items()
@@ -48,7 +46,7 @@ class Acting:
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """From one event to the next: what acts, and its panels; None in a flight that only the state changes."""
+    """The time from one event to the next: what acts, and its panels; None in a flight that only the state changes."""
 
     start: float
     end: float
@@ -57,7 +55,7 @@ class Stretch:
 
     @property
     def times(self) -> list[Array]:
-        """Where the motion has to be known."""
+        """Times at which the motion is needed."""
         ends = np.array([self.start, self.end])
         return [ends] if self.panels is None else [ends, self.panels.times.ravel()]
 
@@ -82,7 +80,7 @@ _LOGGED = 4  # place of the number of events in `State.count`
 
 
 def acting_at_start(system: System, x: Array, rows: Array, memory: Sequence[Any] | None) -> Acting:
-    """What acts at t = 0, before events then."""
+    """What acts at t = 0, before the events at that time."""
     begun = {int(row[at.ELEMENT]): row for row in rows if row[at.GUARD] == at.BEGIN}
     segment, entry_rate, parameters = [], [], list(law_parameters(system))
     for s, contact in enumerate(system.contacts):
@@ -99,7 +97,7 @@ def acting_at_start(system: System, x: Array, rows: Array, memory: Sequence[Any]
 
 
 def rises(row: Array) -> bool:
-    """Whether a knot or the surface is met inwards: what rests on its surface has no rate to tell by."""
+    """Whether a knot or the surface is crossed inwards, by the segments, or if they are equal by δ̇."""
     before, behind = row[at.FROM], row[at.TO]
     return bool(behind > before if behind != before else row[at.RATE] > 0.0)
 
@@ -126,7 +124,7 @@ def grouped(rows: Array) -> list[tuple[float, list[Array]]]:
 
 
 class Division:
-    """Stretches of a run, with panels fine enough for its modes and its laws."""
+    """Divides a run into stretches, with panels fine enough for its modes and its laws."""
 
     def __init__(self, system: System, forced: bool, depth: Array, bends: Array) -> None:
         self.system, self.forced, self.bends = system, forced, bends
@@ -149,7 +147,7 @@ class Division:
         return math.sqrt(stiffness * mobility) + damping * mobility
 
     def stretches(self, acting: Acting, rows: Array, duration: float, refinement: int) -> Iterator[Stretch]:
-        """All of them, one after the other; events at one time are passed together."""
+        """All stretches in the order of time; events at one time are applied together."""
         events = grouped(rows)
         marks = [0.0, *(t for t, _ in events if t > 0.0), duration]
         passed = dict(events)
@@ -160,7 +158,7 @@ class Division:
                 yield self._stretch(start, end, acting, refinement)
 
     def _stretch(self, start: float, end: float, acting: Acting, refinement: int) -> Stretch:
-        """One, with its panels."""
+        """One stretch with its panels."""
         if not (acting.elements or self.forced):
             return Stretch(start, end, acting)
         clock = Clock(start, end, max([1, *(_power(self.system.contacts[s]) for s in acting.elements)]))
@@ -178,7 +176,7 @@ class Division:
 
 
 def _power(contact: Any) -> int:
-    """Power of the clock that makes the force at the ends of a contact smooth: 1 where all its exponents are whole."""
+    """Power of the clock that makes the force smooth at the ends of a contact: 1 if all its exponents are whole."""
     if contact.always:
         return 1
     powers = np.asarray(getattr(contact.law, "powers", (contact.law.exponent,)), dtype=float)
@@ -199,5 +197,5 @@ class Motion:
         self.t, self.both = solution.t, np.array([solution.q.T, solution.q_dot.T])
 
     def at(self, times: Any) -> Array:
-        """(2, n) or (2, n, k), at times that were asked for."""
+        """(2, n) or (2, n, k) q and q̇ at times that were sampled."""
         return self.both[..., np.minimum(np.searchsorted(self.t, times), len(self.t) - 1)]

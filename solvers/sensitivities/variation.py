@@ -26,15 +26,15 @@ from solvers.sensitivities.stretches import (
     replayed,
 )
 
-SMOOTH = 1e-3  # share of the last Legendre coefficients of forces' derivatives, above which panels are halved
-_FINEST, _TWICE = 4, 2  # times
-_MOST_ENTRIES = 4_000_000  # of tables of panels held at once
-_SAME_BEND = 1e-9  # of the duration: a kink found twice, on both of its sides
-_NEAR_TOP = 0.9  # of the largest force so far: a panel whose nodes stay below has no larger one
-_SAME = 1e-6  # of the duration: events of one run, made twice, may be so far apart
-_NEAR = 1e-3  # of the motion: stops that come so near are looked at closely
-_CLOSELY = np.linspace(-0.02, 0.02, 9)  # in units of the distance of samples
-_PER_PERIOD, _MOST_LOOKS = 24, 200_000  # samples in which contacts that nearly come are looked for
+SMOOTH = 1e-3  # relative size of the last Legendre coefficients of forces' derivatives, above which panels are halved
+_FINEST, _REPEATS = 4, 2  # largest refinement of panels, and passes after the first to locate kinks
+_MOST_ENTRIES = 4_000_000  # of the tables of panels held at once
+_SAME_BEND = 1e-9  # of the duration: a kink may be found twice, once from each side
+_NEAR_PEAK = 0.9  # of the largest force so far: panels whose nodes are all below have no larger one
+_SAME = 1e-6  # of the duration: difference of the times of events in two runs up to which they are the same
+_NEAR = 1e-3  # of the motion: distance of a stop up to which it is sampled again, finely
+_FINE_OFFSETS = np.linspace(-0.02, 0.02, 9)  # times of these samples, in units of the distance of the first ones
+_PER_PERIOD, _MOST_SAMPLES = 24, 200_000  # samples per period of the fastest mode, and at most, to see stops come near
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +44,12 @@ class Sensitivity:
     Attributes
     ----------
     t : (k,) s. states : (k, 2n) of [q, q̇] at fixed times t.
-    contacts : log of the run. entries, exits : (c,) of ``t_in`` and ``t_out``, in its order; zero of one under way at
-        the start, NaN of one not ended. peak_force, impulse : (c,) likewise.
-    end : (2n + l,) of [q, q̇] at the end and of what is latched then. rate : (2n,) the motion's own [q̇, q̈] there.
+    contacts : log of the run. entries, exits : (c,) of ``t_in`` and ``t_out``, in its order; zero for one under way at
+        the start, NaN for one not ended. peak_force, impulse : (c,) likewise.
+    end : (2n + l,) of [q, q̇] at the end and of the numbers latched then. rate : (2n,) the motion's own [q̇, q̈] there.
     matrix : (2n + l, 2n + l) the derivative of the end by the start.
     growth : largest factor by which a small change of the start has grown at the end, in the norm of energy.
-    roughness : share of the last Legendre coefficients in the forces' derivatives: an estimate of the error.
+    roughness : relative size of the last Legendre coefficients of the forces' derivatives, an estimate of the error.
     """
 
     t: Array
@@ -138,7 +138,7 @@ def sensitivities(
 
     check_slopes(system)
     method = Exponential() if method is None else method
-    asked = _Asked(
+    asked = _Request(
         system,
         _state(q0, q_dot0),
         duration,
@@ -148,7 +148,7 @@ def sensitivities(
         Change(system, [unchanged(system) if one is None else one for one, _ in parameters], duration),
         [np.zeros(2 * system.size) if one is None else np.asarray(one, dtype=float) for _, one in parameters],
     )
-    log, rows = replayed(system, asked.x, duration, asked.looks(), asked.method, memory)
+    log, rows = replayed(system, asked.x, duration, asked.dense_times(), asked.method, memory)
     asked.measure(log, rows)
     refinement, best, bends = 1, None, np.zeros(0)
     while best is None or (best.roughness > SMOOTH and refinement < _FINEST):
@@ -156,8 +156,8 @@ def sensitivities(
             refinement *= 2
         walk = _Walk(asked, rows, refinement, bends)
         walk.pass_all()
-        for _ in range(_TWICE if walk.bends else 0):  # the second time they are known to rounding
-            bends = _apart(walk.bends, _SAME_BEND * duration)
+        for _ in range(_REPEATS if walk.bends else 0):  # the second time they are known to rounding
+            bends = _without_repeats(walk.bends, _SAME_BEND * duration)
             walk = _Walk(asked, rows, refinement, bends)
             walk.pass_all()
         if best is not None and walk.roughness >= best.roughness:
@@ -166,14 +166,14 @@ def sensitivities(
     return best.results()
 
 
-def _apart(times: list[float], distance: float) -> Array:
-    """Times in order, of those nearer to each other than a distance the first."""
+def _without_repeats(times: list[float], distance: float) -> Array:
+    """Times in order, without those nearer to the one before than a distance."""
     ordered = np.sort(np.array(times))
     return ordered[np.diff(ordered, prepend=-np.inf) > distance]
 
 
 def _parts(values: Array, counts: list[int]) -> list[Array]:
-    """Values in parts of given lengths; zeros where there are none."""
+    """Values in parts of given lengths; zeros if there are none."""
     values = values if values.size else np.zeros(sum(counts))
     return np.split(values, np.cumsum(counts)[:-1]) if counts else []
 
@@ -184,8 +184,8 @@ def _state(q0: ArrayLike, q_dot0: ArrayLike) -> Array:
 
 
 @dataclass(eq=False)
-class _Asked:
-    """What is wanted, and of what."""
+class _Request:
+    """System, run and parameters of a sensitivity, and the sizes of its motion."""
 
     system: System
     x: Array
@@ -198,14 +198,14 @@ class _Asked:
     span: Array = field(default_factory=lambda: np.zeros(0))  # (E,) size of each element's displacement
     depth: Array = field(default_factory=lambda: np.zeros(0))  # (E,) largest indentation, m
 
-    def looks(self) -> Array:
+    def dense_times(self) -> Array:
         """Times dense enough to see how near each stop comes."""
         fastest = float(np.sqrt(np.abs(self.system.blocks.k)).max(initial=0.0))
-        count = 100 + int(min(_PER_PERIOD * fastest * self.duration / (2.0 * np.pi), _MOST_LOOKS))
+        count = 100 + int(min(_PER_PERIOD * fastest * self.duration / (2.0 * np.pi), _MOST_SAMPLES))
         return np.linspace(0.0, self.duration, count)
 
     def measure(self, solution: Solution, rows: Array) -> None:
-        """Sizes of the displacements; NoDerivativeError for a stop that is touched but not entered."""
+        """Set the sizes of the displacements; NoDerivativeError for a stop that is touched but not entered."""
         self.span, self.depth = (np.zeros(len(self.system.contacts)) for _ in range(2))
         for s, contact in enumerate(self.system.contacts):
             delta = motion_at(contact, solution.q.T, solution.q_dot.T).delta
@@ -214,20 +214,23 @@ class _Asked:
             deepest = np.nanmax(np.append(mine[:, at.DEEPEST], 0.0))
             deepest = max(deepest, float((np.abs(delta) if contact.always else delta).max()))
             self.depth[s] = max(deepest, 1e-9 * self.span[s])
-        self._check_apart(solution)
+        self._check_touching(solution)
 
-    def _check_apart(self, solution: Solution) -> None:
-        """NoDerivativeError where a stop is touched, as the run shows when it is looked at closely there."""
+    def _check_touching(self, solution: Solution) -> None:
+        """NoDerivativeError if a stop is touched, by fine samples where it comes near."""
         near = [
-            (s, t, h) for s in self._stops() for t, h, top in self._tops(solution, s) if abs(top) < _NEAR * self.span[s]
+            (s, t, h)
+            for s in self._stops()
+            for t, h, top in self._maxima(solution, s)
+            if abs(top) < _NEAR * self.span[s]
         ]
         if not near:
             return
-        times = np.unique(np.concatenate([t + h * _CLOSELY for _, t, h in near]))
+        times = np.unique(np.concatenate([t + h * _FINE_OFFSETS for _, t, h in near]))
         times = times[(times >= 0.0) & (times <= self.duration)]
         closer = replayed(self.system, self.x, self.duration, times, self.method, self.memory)[0]
         for s in {s for s, _, _ in near}:
-            for t, _, top in self._tops(closer, s):
+            for t, _, top in self._maxima(closer, s):
                 if abs(top) <= GRAZING * self.span[s]:
                     raise NoDerivativeError(
                         f"no derivative: {called(self.system, s)} is touched but not entered at t = {t:.6g} s, "
@@ -238,8 +241,8 @@ class _Asked:
         """Elements whose contacts begin and end."""
         return [s for s, contact in enumerate(self.system.contacts) if not contact.always]
 
-    def _tops(self, solution: Solution, s: int) -> list[tuple[float, float, float]]:
-        """Times of the maxima of δ below zero between samples, the distance of samples there, and δ of cubics."""
+    def _maxima(self, solution: Solution, s: int) -> list[tuple[float, float, float]]:
+        """(time, distance of samples, δ) of the maxima of δ below zero between samples, from cubics."""
         contact, t = self.system.contacts[s], solution.t
         motion, found = motion_at(contact, solution.q.T, solution.q_dot.T), []
         delta, rate = motion.delta, motion.rate
@@ -253,7 +256,7 @@ class _Asked:
 
 
 def _check_same(rows: Array, again: Array, duration: float) -> None:
-    """NoDerivativeError where a run that is sampled more finely meets other events: rounding alone decides on them."""
+    """NoDerivativeError if the run, sampled at other times, has other events: then rounding decides on them."""
     own = [at.ELEMENT, at.GUARD, at.FROM, at.TO]
     if rows.shape == again.shape and np.array_equal(rows[:, own], again[:, own]):
         apart = np.abs(rows[:, at.TIME] - again[:, at.TIME]).max(initial=0.0)
@@ -277,7 +280,7 @@ class _Contact:
     top: float = -np.inf
 
     def offer(self, force: float, change: Array) -> None:
-        """A candidate for the largest force."""
+        """Take a force and its derivatives as peak if it is the largest so far."""
         if force > self.top:
             self.top, self.peak = force, change
 
@@ -285,7 +288,7 @@ class _Contact:
 class _Walk:
     """One pass over a run."""
 
-    def __init__(self, asked: _Asked, rows: Array, refinement: int, bends: Array) -> None:
+    def __init__(self, asked: _Request, rows: Array, refinement: int, bends: Array) -> None:
         system, by = asked.system, asked.by
         self.asked, self.rows, self.events = asked, rows, dict(grouped(rows))
         self.acting = acting_at_start(system, asked.x, rows, asked.memory)
@@ -313,17 +316,17 @@ class _Walk:
 
     @property
     def roughness(self) -> float:
-        """Of the forces' derivatives."""
+        """Of the forces' derivatives, see `Sensitivity`."""
         return self.flow.roughness
 
     def pass_all(self) -> None:
-        """Go along the run, and collect."""
-        self._keep(0.0)
+        """Follow the run and collect the derivatives."""
+        self._store_at(0.0)
         for stretch in self.stretches:
             self._pass_events(stretch.start)
             if stretch.start == 0.0:
                 self._check_start()
-            self._pass(stretch)
+            self._pass_stretch(stretch)
         self._pass_events(self.asked.duration)
         for one in self.open.values():
             force, _, change = self.flow.at_instant(self.asked.duration, one.stop, self.acting)
@@ -331,7 +334,7 @@ class _Walk:
             one.impulse = (self.flow.impulse[one.stop] - one.before)[self.flow.own]
 
     def results(self) -> list[Sensitivity]:
-        """What was collected, one of each parameter."""
+        """The collected derivatives, one `Sensitivity` for each parameter."""
         flow, log, times = self.flow, self.solution.contacts, self.asked.times
         end = np.concatenate((flow.state, *flow.latched))
         rate = flow.rate(np.array([self.asked.duration]), self.acting)[:, 0]
@@ -345,9 +348,7 @@ class _Walk:
         ]
 
     def _check_start(self) -> None:
-        """NoDerivativeError for a stop that begins on its surface, if a parameter moves it: without contact, or where
-        the force jumps.
-        """
+        """NoDerivativeError if a stop begins on its surface and a parameter moves it, so that both sides differ."""
         for s, (span, contact) in enumerate(zip(self.asked.span, self.asked.system.contacts, strict=True)):
             near = abs(self.flow.motion_of(0.0, s).delta[0]) <= GRAZING * span
             bends = not self.acting.segment[s] or (contact.law.jump and not contact.always)
@@ -357,21 +358,18 @@ class _Walk:
                     "so that it differs on both sides; begin off the surface"
                 )
 
-    def _keep(self, t: float) -> None:
-        """Keep the derivatives of the state where a sample is at the time reached."""
+    def _store_at(self, t: float) -> None:
+        """Store the derivatives of the state if t is a sample."""
         place = np.searchsorted(self.asked.times, t)
         if place < len(self.states) and self.asked.times[place] == t:
             self.states[place] = self.flow.by_parameters
 
     def _pass_events(self, t: float) -> None:
-        """All events at a time."""
+        """Apply all events at a time."""
         last, own = None, self.flow.own
         for row in self.events.get(t, ()):
             s = int(row[at.ELEMENT])
-            ends, begins = (
-                row[at.FROM] > 0.0 and row[at.TO] == 0.0,
-                row[at.FROM] == 0.0 and row[at.TO] > 0.0,
-            )
+            ends, begins = row[at.FROM] > 0.0 and row[at.TO] == 0.0, row[at.FROM] == 0.0 and row[at.TO] > 0.0
             if s in self.open and t > 0.0:
                 force, pace, change = self.flow.at_instant(t, s, self.acting)
             else:
@@ -391,8 +389,8 @@ class _Walk:
                 force, pace, change = self.flow.at_instant(t, s, self.acting)
                 self.open[s].offer(force, (change + pace * last)[own])
 
-    def _pass(self, stretch: Stretch) -> None:
-        """One stretch, by panels or in one flight."""
+    def _pass_stretch(self, stretch: Stretch) -> None:
+        """Move over one stretch, by panels or in one flight."""
         flow, times = self.flow, self.asked.times
         begin, (low, high) = stretch.start, np.searchsorted(times, [stretch.start, stretch.end], side="right")
         high -= int(high > low and times[high - 1] == stretch.end)
@@ -402,21 +400,21 @@ class _Walk:
             middle = high if panels.ends[-1] >= stretch.end else low + np.searchsorted(times[low:high], panels.ends[-1])
             if stretch.acting.elements:
                 found, changes = flow.pass_panels(panels, self.acting, times[low:middle])
-                self._look(panels, changes, self.acting)
+                self._inspect(panels, changes, self.acting)
             else:
                 found = flow.pass_flight(panels, stretch.acting, times[low:middle])
             self._sampled(low, found)
             low = middle
-        self._keep(stretch.end)
+        self._store_at(stretch.end)
 
     def _sampled(self, first: int, found: Array) -> None:
-        """Keep derivatives (q, 2n, d) of the blocks at samples."""
+        """Store derivatives (q, 2n, d) of the blocks at samples."""
         self.states[first : first + len(found)] = np.moveaxis(self.flow.T @ found, 1, 2)
 
-    def _look(self, panels: Panels, changes: dict[int, tuple[Array, Array]], acting: Acting) -> None:
-        """Peaks and kinks within panels, and how rough the derivatives are there."""
+    def _inspect(self, panels: Panels, changes: dict[int, tuple[Array, Array]], acting: Acting) -> None:
+        """Find peaks and kinks within panels, and the roughness of the derivatives there."""
         for s, (change, forces) in changes.items():
-            self._look_for_kinks(panels, s, acting)
+            self._find_kinks(panels, s, acting)
             size = np.abs(forces).max(axis=(1, 2))
             tail = np.abs(coefficients(np.moveaxis(forces, 2, 0))[-2:]).max(axis=(0, 2))
             size[0] = np.maximum(size[0], self.flow.largest[s])
@@ -425,17 +423,17 @@ class _Walk:
             rough = (tail / np.where(scale > 0.0, scale, 1.0)).max(initial=0.0)
             self.flow.roughness = max(self.flow.roughness, float(rough))
             if s in self.open:
-                self._look_for_peak(panels, s, acting, change[..., self.flow.own])
+                self._find_peak(panels, s, acting, change[..., self.flow.own])
 
-    def _look_for_peak(self, panels: Panels, s: int, acting: Acting, change: Array) -> None:
-        """Largest force within panels; ends of a stretch are looked at with their events."""
+    def _find_peak(self, panels: Panels, s: int, acting: Acting, change: Array) -> None:
+        """Offer the largest force within panels; ends of a stretch are offered with their events."""
         values = self.flow.force(panels.times.ravel(), s, acting).reshape(-1, S)
-        if values.max() > _NEAR_TOP * self.open[s].top:
+        if values.max() > _NEAR_PEAK * self.open[s].top:
             i, place, top = largest(values, (panels.edges[0] > 0.0, panels.edges[-1] < 1.0))
             self.open[s].offer(top, interpolated(place, change[i]))
 
-    def _look_for_kinks(self, panels: Panels, s: int, acting: Acting) -> None:
-        """Times within panels, and a little beyond, at which a law has a kink that is no knot."""
+    def _find_kinks(self, panels: Panels, s: int, acting: Acting) -> None:
+        """Collect times within panels, and a little beyond, at which a law has a kink that is no knot."""
         bent = self.flow.bend(panels.times.ravel(), s, acting)
         if bent is None:
             return
@@ -456,7 +454,7 @@ class _Walk:
         return found
 
     def _growth(self) -> float:
-        """Largest factor from start to end in the norm of energy, of a spring that makes rigid motion count."""
+        """Largest factor from start to end in the norm of energy, with an added spring so that rigid motions count."""
         system, duration = self.asked.system, self.asked.duration
         M, K = dense(system.M), dense(system.K)
         n, stiff = system.size, K + M / duration**2
@@ -466,7 +464,7 @@ class _Walk:
 
 
 def _root(matrix: Array) -> Array:
-    """Square root of a symmetric matrix, negative eigenvalues by their size."""
+    """Square root of a symmetric matrix, with the absolute values of its eigenvalues."""
     values, vectors = np.linalg.eigh(matrix)
     values = np.abs(values)
     return np.asarray((vectors * np.sqrt(np.maximum(values, 1e-12 * values.max()))) @ vectors.T)

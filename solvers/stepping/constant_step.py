@@ -1,8 +1,8 @@
 """What all methods of constant step share: checked before they start, watched while they run.
 
-Borders of laws with memory are passed: a step keeps the segment it began with, in implicit steps through all
-iterations, and at its end every border with a negative margin is renewed, until none is left (a return map). A force
-that is late by part of a step leaves an error of order h² per border where the force is continuous, h where it jumps.
+Borders of laws with memory are not located: a step keeps the segment it began with, in implicit steps through all
+iterations. At its end every border with a negative margin is renewed, until none is left (a return map). A force that
+is late by part of a step leaves an error of order h² per border where the force is continuous, h where it jumps.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class ConstantStep(ABC):
 
     @property
     def events(self) -> int:
-        """What is done about events."""
+        """How events are treated: located, or ignored until the end of a step."""
         return LOCATED if self.locate else IGNORED
 
     @property
@@ -75,13 +75,13 @@ class ConstantStep(ABC):
         return eigen_oscillators(M, C, K, G)
 
     def oscillators(self, system: System) -> tuple[Array, Array]:
-        """The same of a system in flight: its decoupled modes, or what decides on its matrices."""
+        """The same of a system in flight: its decoupled modes, or the oscillators that limit a step on its matrices."""
         if system.sparse or self.takes_matrices(system):
             return self.critical(system.M, system.C, system.K, system.gyroscopic)
         return system.blocks.k, system.blocks.c
 
     def prepared(self, system: System, forcing: Forcing, duration: float) -> tuple[Forcing, None]:
-        """The forcing alone: nothing is made in advance."""
+        """The forcing alone: nothing is tabulated in advance."""
         return forcing, None
 
     def engine(self, system: System, z: Array, prepared: tuple[Forcing, None], duration: float) -> Any:

@@ -27,14 +27,14 @@ import numpy as np
 
 from solvers.problem import Array, decouple
 
-_DENSE = 60  # coordinates up to which eigenvalues are asked of dense matrices: all of them, and sooner
-_EXTREMES = (("LM", 6), ("SR", 3), ("LI", 3))  # eigenvalues of sparse matrices asked for: how many of the largest size,
-# most damped and fastest: an explicit method's limit is met first by one of them
-_NOTHING = 1e-6  # share of the largest eigenvalue below which one is that of a body that floats, or rounding
+_DENSE = 60  # coordinates up to which all eigenvalues are computed, of dense matrices, which is quicker
+_EXTREMES = (("LM", 6), ("SR", 3), ("LI", 3))  # eigenvalues computed of sparse matrices: so many of the largest size,
+# most damped and fastest; one of these limits an explicit method
+_NOTHING = 1e-6  # share of the largest eigenvalue below which one is a rigid-body motion, or rounding
 
 
 def eigen_oscillators(M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Array]:
-    """(k, c) of the eigenvalues of λ² M + λ (C + G) + K; of large sparse matrices those of the extreme ones alone."""
+    """(k, c) of the eigenvalues of λ² M + λ (C + G) + K; of large sparse matrices only those of the extreme ones."""
     if hasattr(M, "toarray") and M.shape[0] > _DENSE:
         values = _extreme_eigenvalues(M, C if G is None else C + G, K)
     else:
@@ -42,7 +42,7 @@ def eigen_oscillators(M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Arr
         try:
             blocks = decouple(M, C, K, G)
             return blocks.k, blocks.c
-        except ValueError:  # two damped modes coincide: their eigenvalues need not be told apart
+        except ValueError:  # two damped modes coincide; their eigenvalues alone are enough here
             n, by_rate = M.shape[0], C if G is None else C + G
             A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, by_rate)]])
             values = np.linalg.eigvals(A)

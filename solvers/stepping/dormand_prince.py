@@ -130,7 +130,7 @@ class DormandPrince:
         return step
 
     def prepared(self, system: System, forcing: Forcing, duration: float) -> tuple[Forcing, None]:
-        """The forcing alone: nothing is made in advance."""
+        """The forcing alone: nothing is tabulated in advance."""
         return forcing, None
 
     def engine(self, system: System, z: Array, prepared: tuple[Forcing, None], duration: float) -> Any:

@@ -15,16 +15,16 @@ from solvers.stepping.stability import is_dissipative, work_of
 NOW, BEGAN, LEAST, IN_A_ROW, MOST_INPUT, HELD = range(6)  # places in `Space.watch`, see `watched`
 
 
-STEPS_OF_GAIN = 8  # steps in a row: one alone may be the energy balance's, as in the first step of a load
+STEPS_OF_GAIN = 8  # consecutive steps with a gain; one alone may be an error of the balance, as in a load's first step
 
 
-_FAR, STEPS_FAR = 1e3, 3  # times the energy given, and then steps in a row
-_WAYS = np.geomspace(1e-9, 1e3, 241)  # m or rad, to either side, where a law is tried for a well of energy beside 0
+_FAR, STEPS_FAR = 1e3, 3  # factor on the energy given, and consecutive steps above it, that end a run sooner
+_TRIED = np.geomspace(1e-9, 1e3, 241)  # m or rad, to either side, where a law that always acts must lead back to 0
 
 
 @kernel
 def gains(problem, state, space):
-    """Whether for some steps the energy exceeds twice the initial energy plus all input, or by far for fewer steps."""
+    """Whether the energy exceeds twice the initial one plus all input for `STEPS_OF_GAIN` steps, or by far sooner."""
     ledger = 2 * problem.k.size
     watch = space.watch
     watch[MOST_INPUT] = max(watch[MOST_INPUT], state.x[ledger])
@@ -43,7 +43,7 @@ def gains(problem, state, space):
 
 @inner
 def modal_gains(problem, state, space):
-    """The same on decoupled modes; coupling damping has another form of the energy, checked by the engine."""
+    """The same on decoupled modes; False with damping that couples them, which the engine checks."""
     if problem.loss.shape[0] > 0:
         return False
     n, energy = problem.k.size, 0.0
@@ -54,7 +54,7 @@ def modal_gains(problem, state, space):
 
 
 def watched(system: System, motion: Array, least: float) -> Array:
-    """What `gains` compares, J: stored now, at the start, negligible; steps that gained; most input, held by stops."""
+    """Initial entries of `Space.watch`: energy now, at the start, negligible, J; steps; input; held by stops, J."""
     q, q_dot = np.split(motion, 2)
     stored = abs(float(system.energy(q, q_dot)))
     known = system.about_laws.get("dissipative", lambda: [_only_takes(contact) for contact in system.contacts])
@@ -66,20 +66,20 @@ def watched(system: System, motion: Array, least: float) -> Array:
 
 
 def _only_takes(contact: Contact) -> bool:
-    """Whether a contact gives back no more than it holds: of one that acts both ways, if its force leads to 0."""
+    """Whether a contact returns at most the energy it holds; if it acts on both sides, whether F δ >= 0 at rest."""
     law: Any = contact.law
     if not is_dissipative(law):
         return False
     if not contact.always:
         return True
     parts = [part for part in getattr(law, "parts", (law,)) if not (part.memory or (law.memory and part.one_sided))]
-    delta = np.outer(_WAYS, (-1.0, 1.0)).ravel()
+    delta = np.outer(_TRIED, (-1.0, 1.0)).ravel()
     with np.errstate(all="ignore"):  # what overflows is not known to lead there
         return all(bool(np.all(delta * part.batch(1.0)(delta, 0.0 * delta) >= 0.0)) for part in parts)
 
 
 def _held(contact: Contact, delta: float) -> float:
-    """Energy that a contact may give back, J; unknown (inf) of one that opens and begins in contact."""
+    """Energy, J, that a contact may return; unknown, inf, of one that opens and begins in contact."""
     law: Any = contact.law
     if getattr(law, "opens", False) and delta > 0.0:
         return math.inf
@@ -89,7 +89,7 @@ def _held(contact: Contact, delta: float) -> float:
 
 
 def largest_loads(problem: Any) -> Array:
-    """Bound of every load's signal (L,)."""
+    """(L,) bounds of the loads' signals."""
     largest = np.zeros(len(problem.load))
     np.add.at(largest, problem.tone_load, np.abs(problem.tone_amplitude))
     for j, load in enumerate(problem.table_load):
@@ -98,5 +98,5 @@ def largest_loads(problem: Any) -> Array:
 
 
 def negligible_energy(problem: Any, inverse_mass: Array, dt: float) -> float:
-    """What rounding in the loads may bring: 1e-10 of the energy ½ vᵀM⁻¹v (s dt)² of the largest in one step, J."""
+    """Energy, J, by rounding of the loads: 1e-10 of that of the largest in one step, ½ vᵀM⁻¹v (s dt)²."""
     return 0.5e-10 * dt**2 * float(np.sum(inverse_mass * largest_loads(problem) ** 2))

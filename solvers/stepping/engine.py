@@ -1,4 +1,4 @@
-"""One run of a stepping method: its problem, its state, its share of the loop, and explanations of failures."""
+"""One run of a stepping method: its problem, its state, its part of the loop, and explanations of failures."""
 
 from __future__ import annotations
 
@@ -33,22 +33,22 @@ from solvers.stepping.stability import kinks_of, shortest_contact
 
 
 def absolute_tolerance(method: Any, problem: Any, z: Array, fastest: float) -> float:
-    """The method's own, or less where start and loads are so small or slow that it would exceed rtol times them."""
+    """The method's own, or less if start and loads are so small or slow that it would exceed rtol times the motion."""
     p, v = np.abs(z).reshape(2, -1).max(axis=1)
     push = np.abs(problem.load).max(axis=1, initial=0.0) @ largest_loads(problem) / fastest
-    size = max(p, v / fastest, push / fastest) * min(fastest, 1.0)  # it is that of rates too
+    size = max(p, v / fastest, push / fastest) * min(fastest, 1.0)  # it holds for rates, too
     return float(min(method.atol, method.rtol * size) if size > 0.0 else method.atol)
 
 
 class Engine:
-    """One run of a stepping method: problem, state, and its share of the loop."""
+    """One run of a stepping method: problem, state, and its part of the loop."""
 
     def __init__(self, method: Any, system: System, z: Array, forcing: Forcing, duration: float) -> None:
         self.method, self.duration, self.system = method, duration, system
         self.problem = problem_of(system, forcing)
         self.back = system.blocks.T
         if method.events == HENON:
-            self.problem.knots[:, 1:] = math.inf  # kinks are not looked for
+            self.problem.knots[:, 1:] = math.inf  # kinks are not located
         self.state: State = new_state(z, len(system.contacts), sum(c.friction is not None for c in system.contacts))
         self.state.now[T_END] = duration
         dt = 0.0 if method.adaptive else max(method.steps)
@@ -64,7 +64,7 @@ class Engine:
         self.loop: Any = partial(loop, method.step)
 
     def record(self, **arrays: Array) -> None:
-        """Let other arrays be those of the state that outputs go to: ``log``, ``out``, ``due``."""
+        """Replace arrays of the state that outputs go to: ``log``, ``out``, ``due``."""
         self.state = self.state._replace(**arrays)
 
     def start(self) -> None:
@@ -77,14 +77,14 @@ class Engine:
         )
 
     def keeps_ledger(self, sampled: bool) -> bool:
-        """The energy balance is integrated along, always."""
+        """Always: the energy balance is integrated along."""
         return True
 
     def march(self, budget: int) -> int:
         """Advance by at most ``budget`` steps."""
         method = self.method
         if self.state.now[T] == 0.0 and not np.isfinite(self.state.rate).all():
-            return LAW_NOT_FINITE  # loads and starts were looked at before
+            return LAW_NOT_FINITE  # loads and starts have been checked before
         steps = (math.inf, math.inf) if method.adaptive else method.steps
         code = self.loop(
             *(self.problem, self.state, self.space, budget, steps, (method.rtol, self.atol)),
@@ -102,7 +102,7 @@ class Engine:
         return bool(gains(self.problem, self.state, self.space))
 
     def explain(self, code: Status) -> str:
-        """What grew, and the step to try."""
+        """Which coordinate grew, and which step to try."""
         if code not in (Status.GAINED, Status.DIVERGED) or self.method.adaptive:
             return ""
         q, q_dot = np.split(self.back @ self.state.x[: 2 * self.problem.k.size], 2)

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from solvers.compiled.friction import slide, slide_acceleration
+from solvers.compiled.friction import xi_acceleration_of, xi_and_rate_of
 from solvers.compiled.kernels import (
     dot,
     indentation,
@@ -21,23 +21,23 @@ from solvers.compiled.kernels import (
     radius_of,
     slider_of,
 )
-from solvers.compiled.sliding import ACCELERATION, DELTA, RATE, SPEED, WAY, WAY_ACCELERATION
+from solvers.compiled.sliding import ACCELERATION, DELTA, RATE, XI, XI_ACCELERATION, XI_RATE
 from solvers.compiled.state import surface_tolerance
 
 # finer near 0, where a contact just left may come back
 _NODES = np.array([0.0, 1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1.0])
 _GOLDEN = 0.6180339887498949
-UNRESOLVED = -1.0
-NONE = 2.0
+UNRESOLVED = -1.0  # in place of θ: a stop that has just left its border crosses it at once, so the step must be shorter
+NONE = 2.0  # in place of θ: no event in the step
 MOST_LANDINGS = 60
-"""Steps tried to land: where the level is only just reached Newton halves its distance, so does bisection."""
+"""Trials of a landing: where the level is only just reached, each of Newton or bisection halves the distance."""
 IGNORED, HENON, LOCATED = range(3)
-"""What a method does about events: pieces follow at the end of a step; Hénon's step onto an entry; all located."""
+"""How a method treats events: segments follow at the end of a step; Hénon's step onto an entry; all located."""
 
 
 @kernel
 def in_contact(segment):
-    """How many stops are in contact."""
+    """Number of stops in contact."""
     count = 0
     for s in range(segment.size):
         count += 1 if segment[s] > 0 else 0
@@ -46,7 +46,7 @@ def in_contact(segment):
 
 @inner
 def polynomial(coefficients, theta):
-    """Value at θ of the nested form; coefficients (δ₀, r₀ ... r₆)."""
+    """Value at θ of the dense output of a row, from its coefficients (u₀, r₀ ... r₆)."""
     u = 1.0 - theta
     r = coefficients
     return r[0] + theta * (r[1] + u * (r[2] + theta * (r[3] + u * (r[4] + theta * (r[5] + u * (r[6] + theta * r[7]))))))
@@ -54,9 +54,7 @@ def polynomial(coefficients, theta):
 
 @inner
 def motion_of(problem, s, x, dense, coefficients):
-    """Nested coefficients of the displacement on a stop's row and, in the second row, of its rate; of its other rows
-    behind them.
-    """
+    """Write the coefficients of displacement and rate of a stop's first row, then of its other rows."""
     for r in range(problem.first[s], problem.first[s + 1]):
         place = 2 * (r - problem.first[s])
         _coefficients_of(problem.read[r], problem.gap[r], x, dense, coefficients[place])
@@ -65,7 +63,7 @@ def motion_of(problem, s, x, dense, coefficients):
 
 @inner
 def _slope(coefficients, theta):
-    """Derivative by θ of the nested form."""
+    """Derivative by θ of the dense output of a row."""
     value, slope, u = coefficients[7], 0.0, 1.0 - theta
     for i in range(7, 0, -1):
         factor, change = (theta, 1.0) if i % 2 == 1 else (u, -1.0)
@@ -76,8 +74,8 @@ def _slope(coefficients, theta):
 
 @inner
 def point_at(problem, s, t, h, theta, coefficients, point):
-    """Motion of an element with friction at θ of a step of duration h from t, see `compiled.sliding`."""
-    radius, own, turned, turning, turning_rate = radius_of(problem, s), slider_of(problem, s), 0.0, 0.0, 0.0
+    """Write the motion of an element with friction at θ of a step of duration h from t, see `compiled.sliding`."""
+    radius, slider, turned, turning, turning_rate = radius_of(problem, s), slider_of(problem, s), 0.0, 0.0, 0.0
     u, u_dot = polynomial(coefficients[0], theta), polynomial(coefficients[1], theta)
     w, w_dot = polynomial(coefficients[2], theta), polynomial(coefficients[3], theta)
     u_twice, w_twice = _slope(coefficients[1], theta) / h, _slope(coefficients[3], theta) / h
@@ -91,8 +89,8 @@ def point_at(problem, s, t, h, theta, coefficients, point):
         along = speed + u * u_twice + w * w_twice
         twice = (along - product * product / square) / math.sqrt(square)
         point[ACCELERATION] = twice if radius > 0.0 else -twice
-    point[WAY], point[SPEED] = slide(radius, own, t + theta * h, u, u_dot, w, w_dot, turned, turning)
-    point[WAY_ACCELERATION] = slide_acceleration(radius, own, u, u_dot, u_twice, w, w_dot, w_twice, turning_rate)
+    point[XI], point[XI_RATE] = xi_and_rate_of(radius, slider, t + theta * h, u, u_dot, w, w_dot, turned, turning)
+    point[XI_ACCELERATION] = xi_acceleration_of(radius, slider, u, u_dot, u_twice, w, w_dot, w_twice, turning_rate)
 
 
 @inner
@@ -111,13 +109,13 @@ def delta_at(coefficients, radius, theta):
 
 @inlined
 def rate_at(coefficients, radius, theta):
-    """Its rate at θ."""
+    """Indentation rate at θ."""
     return polynomial(coefficients[1], theta) if radius == 0.0 else _radial_at(coefficients, radius, theta)[1]
 
 
 @inner
 def _coefficients_of(row, offset, x, dense, out):
-    """Nested coefficients of ``row·z - offset``."""
+    """Write the coefficients of ``row·z - offset``."""
     size = row.size
     out[0] = dot(row, x, size) - offset
     for i in range(7):
@@ -126,7 +124,7 @@ def _coefficients_of(row, offset, x, dense, out):
 
 @merged  # as a call would hand over the address of ``value``, with which numba keeps no caller's machine code
 def golden_section(value, known, a, b):
-    """Place of the largest ``value(known, θ)`` on [a, b], and the largest value met."""
+    """(θ, value) of the largest ``value(known, θ)`` on [a, b], for one maximum."""
     best = -np.inf
     for _ in range(40):
         c, d = b - _GOLDEN * (b - a), a + _GOLDEN * (b - a)
@@ -148,7 +146,7 @@ def _falling(known, theta):
 
 @merged
 def bisection(value, known, a, b):
-    """Where ``value(known, θ)`` becomes positive in [a, b]."""
+    """θ at which ``value(known, θ)`` becomes positive in [a, b]."""
     for _ in range(50):
         middle = 0.5 * (a + b)
         if value(known, middle) > 0.0:
@@ -169,8 +167,8 @@ def _beyond(known, theta):
 def crossing(coefficients, radius, level, sign, tolerance):
     """First θ at which sign·(δ - level) becomes positive; NONE, or UNRESOLVED when it does so at once.
 
-    Between two nodes δ may rise and fall again; that it does is seen by its rate, whose zero is where it is highest: a
-    place that runs through the middle of a hole is told from its values only within 4e-9 of the nodes' distance.
+    Between two nodes δ may rise and fall again. That shows in the sign of its rate, whose zero is at the maximum; the
+    values at the nodes would show a passage through the middle of a hole only within 4e-9 of their distance.
     """
     if abs(level) == np.inf:
         return NONE
@@ -194,10 +192,10 @@ def crossing(coefficients, radius, level, sign, tolerance):
 
 @kernel
 def nearer(h, distance, rate, before, beyond, longest):
-    """Duration to try after h has ended ``distance`` beyond a level, at ``rate``; -1 where none is known to land.
+    """Duration to try next after h ended ``distance`` beyond a level, at ``rate``; -1 if there may be no landing.
 
-    By Newton, or by halving where that leaves (before, beyond). ``beyond`` is a duration that ends beyond the level,
-    or ``longest`` where none is known: then there may be no landing.
+    It is that of Newton's method, or by bisection where that leaves (before, beyond). ``beyond`` is a duration that
+    ends beyond the level, or ``longest`` if none is known.
     """
     guess = h - distance / rate
     if before < guess < beyond:

@@ -1,13 +1,13 @@
 """The paper's scheme: Heun's method with two constant steps, and Hénon's step onto the stop.
 
-Heun, x' = f(x, t):  k₁ = f(x, t),  k₂ = f(x + h k₁, t + h),  x₊ = x + h (k₁ + k₂)/2.
+Heun, x' = f(x, t): k₁ = f(x, t), k₂ = f(x + h k₁, t + h), x₊ = x + h (k₁ + k₂)/2.
 
 Hénon's step: where a flight step would end inside a stop, δ becomes the independent variable,
 
     dx/dδ = f/δ̇,   dt/dδ = 1/δ̇,
 
-and one Heun step from the present δ to 0 lands on the surface exactly. Contact goes on with the small step;
-the exit is not located, the large step resumes once δ <= 0.
+and one Heun step from the present δ to 0 ends on the surface exactly. In contact the small step is used; the exit is
+not located, the large step resumes once δ <= 0.
 
 References
 ----------
@@ -29,7 +29,7 @@ from solvers.stepping.stability import Radius, taylor_radius
 
 @kernel
 def hermite(h, x, rate, x_new, rate_new, dense):
-    """Dense output of a step that has only its ends: the cubic Hermite interpolant."""
+    """Write the dense output of a step known at its ends only: the cubic Hermite interpolant."""
     for i in range(x.size):
         change = x_new[i] - x[i]
         dense[0, i] = change
@@ -56,7 +56,7 @@ def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, wo
 
 @inner
 def land(problem, t, h, x, rate, segment, entry_rate, stop, level, x_new, work):
-    """Hénon's step of stop ``stop`` onto ``level``; returns its duration, or -1 where it fails (δ̇ near 0)."""
+    """Hénon's step of a stop onto ``level``; returns its duration, s, or -1 where it fails (δ̇ near 0)."""
     trial, second, batch = work[0], work[1], work[2]
     delta_dot = indentation_rate(problem, stop, x)
     distance = level - indentation(problem, stop, x)

@@ -19,7 +19,7 @@ from solvers.compiled.kernels import (
     slider_of,
 )
 from solvers.compiled.renewals import most_rows
-from solvers.compiled.sliding import DELTA, RATE, WAY, normal_force
+from solvers.compiled.sliding import DELTA, RATE, XI, normal_force
 from solvers.compiled.state import (
     AT_ONCE,
     CALLS,
@@ -45,7 +45,7 @@ from solvers.compiled.state import (
     switch_on_surface,
 )
 from solvers.problem.friction import PEAK
-from solvers.stepping.borders import border_apart, renew_passed
+from solvers.stepping.borders import border_distance, renew_crossed
 from solvers.stepping.events import (
     IGNORED,
     LOCATED,
@@ -61,11 +61,11 @@ from solvers.stepping.events import (
 )
 from solvers.stepping.shared import shared
 
-SWITCHED = -1  # beside the status codes: an event has changed the right-hand side
+SWITCHED = -1  # besides the status codes: an event has changed the right-hand side
 
 _PEAK_NODES = np.linspace(0.0, 1.0, 9)
 _KINK_NODES = np.array([0.0, 1 / 16, 1 / 4, 1 / 2, 3 / 4, 7 / 8, 31 / 32, 127 / 128, 511 / 512, 1.0])
-NEAR_END = 1e-6  # share of a step: a kink as near to an end as that counts as reached
+NEAR_END = 1e-6  # share of a step: a kink this near to an end counts as reached
 
 
 @inner
@@ -92,31 +92,31 @@ def _peaks(problem, state, space, h):
 
 @inner
 def _peak_of_friction(problem, state, space, h, s):
-    """Largest |F_t| of the step just accepted; the motion is that of `motion_of`."""
+    """Raise the largest |F_t| by the step just accepted; the coefficients are those of `motion_of`."""
     known, best, place = (problem, state, space, h, s), -1.0, 0
     for i in range(_PEAK_NODES.size):
         value = _friction_at(known, _PEAK_NODES[i])
         if value > best:
             best, place = value, i
     a, b = _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
-    own = slider_of(problem, s)
-    own[PEAK] = max(own[PEAK], best, golden_section(_friction_at, known, a, b)[1])
+    slider = slider_of(problem, s)
+    slider[PEAK] = max(slider[PEAK], best, golden_section(_friction_at, known, a, b)[1])
 
 
 @inner
 def _friction_at(known, theta):
-    """|F_t| at θ of the step."""
+    """|F_t|, N, at θ of the step."""
     problem, state, space, h, s = known
     point_at(problem, s, state.now[T], h, theta, space.coefficients, space.point[0])
     normal = normal_force(
         problem, s, state.segment[s], state.entry_rate[s], space.point[0, DELTA], space.point[0, RATE]
     )
-    return abs(friction_force(radius_of(problem, s), slider_of(problem, s), space.point[0, WAY], normal))
+    return abs(friction_force(radius_of(problem, s), slider_of(problem, s), space.point[0, XI], normal))
 
 
 @inner
 def _peak_value(known, theta):
-    """Indentation or force at θ of the step."""
+    """Indentation or force of a stop at θ of the step."""
     problem, state, s, column, coefficients, batch = known
     delta = delta_at(coefficients, radius_of(problem, s), theta)
     if column == PEAK_DELTA:
@@ -128,7 +128,7 @@ def _peak_value(known, theta):
 
 @inner
 def first_kink(problem, state, space):
-    """θ of the first place inside the step where a clamped force begins or ends, or a damper of approach; else NONE."""
+    """θ of the first kink inside the step: a law is cut at zero, or a damper of approach begins or ends; else NONE."""
     first, batch = NONE, space.work[0]
     for s in range(problem.law.size):
         if state.segment[s] == 0 or space.kinks[s] == 0:
@@ -152,7 +152,7 @@ def first_kink(problem, state, space):
 
 @inner
 def _side(problem, state, space, s, theta, lowest, batch):
-    """On which side of its kinks a law is at θ of the step; beyond the surface on that of the surface."""
+    """Which side of its kinks a law is on at θ of the step: plus 1 cut, plus 2 approaching; no cut near the surface."""
     radius = radius_of(problem, s)
     delta, rate = delta_at(space.coefficients, radius, theta), rate_at(space.coefficients, radius, theta)
     side = 2 if space.kinks[s] & 2 and rate > 0.0 else 0
@@ -179,21 +179,21 @@ def _sample(state, space, h):
 
 @kernel
 def landing_tolerance(problem, state, stop):
-    """Distance from a level that counts as reached."""
+    """Distance from a level, m, that counts as reached."""
     return 4.0 * surface_tolerance(problem, stop, state.x)
 
 
 @kernel
-def _past(problem, stop, direction, level, x):
-    """How far a state is beyond a level, and how fast that grows."""
+def _beyond_level(problem, stop, direction, level, x):
+    """(distance beyond a level in a direction, m, its rate, m/s) of a state."""
     return direction * (indentation(problem, stop, x) - level), direction * indentation_rate(problem, stop, x)
 
 
 @shared
 def land(step, problem, state, space, h, longest, stop, direction, level, border, rtol, atol):
-    """Repeat the step with the duration that ends on ``level``, or on a ``border`` that is not -1.
+    """Repeat the step with the duration that ends on ``level``, or on a ``border`` if that is not -1.
 
-    Returns the duration, else minus the step to try instead.
+    Returns the duration, s, or if it fails minus the step to try instead.
     """
     tolerance = landing_tolerance(problem, state, stop)
     before, beyond = 0.0, longest
@@ -203,14 +203,14 @@ def land(step, problem, state, space, h, longest, stop, direction, level, border
             *(space.x_new, space.rate_new, space.dense, space.work, rtol, atol),
         )
         state.count[CALLS] += calls
-        distance, slope = _past(problem, stop, direction, level, space.x_new)
+        distance, slope = _beyond_level(problem, stop, direction, level, space.x_new)
         if border >= 0:
-            distance, slope, tolerance = border_apart(problem, state, space, h, stop, border)
+            distance, slope, tolerance = border_distance(problem, state, space, h, stop, border)
         if abs(distance) <= tolerance:
             return _if_accurate(h, error)
         before, beyond = (h, beyond) if distance < 0.0 else (before, h)
         corrected = nearer(h, distance, slope, before, beyond, longest)
-        if not corrected > 0.0:  # a graze, off the surface by rounding or in need of a closer look
+        if not corrected > 0.0:  # a graze: off the surface by rounding, or in need of shorter steps
             return _if_accurate(h, error) if abs(distance) <= 100.0 * tolerance else -0.5 * longest
         h = corrected
     return -0.5 * longest
@@ -218,13 +218,13 @@ def land(step, problem, state, space, h, longest, stop, direction, level, border
 
 @shared
 def _if_accurate(h, error):
-    """A landing of duration h, or minus the step to try: where a law bends a shorter step may be the worse one."""
+    """Duration h of a landing, or minus the step to try: across a bend the shorter step may have the larger error."""
     return h if error <= 1.0 else -max(0.2, 0.9 * error**-0.125) * h if np.isfinite(error) else -0.2 * h
 
 
 @inner
 def _switch_by_sign(problem, state):
-    """Put every stop on the piece its indentation lies in, one border at a time; returns whether any moved."""
+    """Move every stop to the segment of its indentation, one border at a time; returns whether any moved."""
     switched = False
     for s in range(problem.law.size):
         delta = indentation(problem, s, state.x)
@@ -238,8 +238,8 @@ def _switch_by_sign(problem, state):
 
 
 @kernel
-def look(problem, state, space, events):
-    """Before a step: a status code if the run is over, SWITCHED if a stop switched or passed a border, else RUNNING."""
+def before_step(problem, state, space, events):
+    """A status code if the run is over, SWITCHED if a stop switched or a border was renewed, else RUNNING."""
     if state.now[T] >= state.now[T_END]:
         return DONE
     if state.count[LOGGED] + most_rows(problem) > state.log.shape[0]:
@@ -250,12 +250,12 @@ def look(problem, state, space, events):
         switched = _switch_by_sign(problem, state)
     else:
         switched = switch_on_surface(problem, state, events == LOCATED)
-    return SWITCHED if renew_passed(problem, state, space) or switched else RUNNING
+    return SWITCHED if renew_crossed(problem, state, space) or switched else RUNNING
 
 
 @kernel
-def find(problem, state, space):
-    """(θ, stop, direction, level) of the first event of a step; θ as of `first_event`."""
+def first_crossing(problem, state, space):
+    """(θ, stop, direction, level) of the first border of a segment that the step crosses; θ as of `first_event`."""
     theta, stop, direction = first_event(problem, state.x, space.dense, state.segment, space.coefficients)
     level = 0.0
     if 0.0 <= theta < NONE:
@@ -265,9 +265,9 @@ def find(problem, state, space):
 
 @kernel
 def accept(problem, state, space, h, stop, direction, at_end):
-    """Record a step that ends on an event of ``stop`` (-1: of none) and go on from its end; returns a status code."""
+    """Accept and record a step, which ends on an event of ``stop`` unless that is -1; returns a status code."""
     if not np.isfinite(dot(space.x_new, space.x_new, space.x_new.size)):
-        return LAW_NOT_FINITE if _law_fails(problem, state, space, h) else DIVERGED
+        return LAW_NOT_FINITE if _law_not_finite(problem, state, space, h) else DIVERGED
     _sample(state, space, h)
     _peaks(problem, state, space, h)
     copy(space.x_new, state.x, state.x.size)
@@ -281,7 +281,7 @@ def accept(problem, state, space, h, stop, direction, at_end):
 
 
 @inner
-def _law_fails(problem, state, space, h):
+def _law_not_finite(problem, state, space, h):
     """Whether a law is not finite where an Euler step would take its stop."""
     for s in range(problem.law.size):
         read = problem.read[problem.first[s]]

@@ -45,11 +45,11 @@ from solvers.stepping.energy_gain import modal_gains
 from solvers.stepping.events import HENON, LOCATED, NONE, UNRESOLVED, entry_by_sign, in_contact
 from solvers.stepping.henon import hermite
 from solvers.stepping.henon import land as henon_landing
-from solvers.stepping.located import NEAR_END, SWITCHED, accept, find, first_kink, land, look
+from solvers.stepping.located import NEAR_END, SWITCHED, accept, before_step, first_crossing, first_kink, land
 from solvers.stepping.shared import shared
 
-_LEAST_STEP = 1e-290  # s, at t = 0, where every step would still move the clock
-_MOST_NODES = 16.0  # of a signal on a step: a period of its fastest part has ten and more
+_LEAST_STEP = 1e-290  # s: at t = 0 any step changes the time
+_MOST_NODES = 16.0  # of a signal on a step; a period of its fastest part has ten or more
 
 
 class Space(NamedTuple):
@@ -61,15 +61,15 @@ class Space(NamedTuple):
     work: Any  # (rows, x.size) of the method
     coefficients: Any  # (6, 8), see `events.motion_of`
     watch: Any  # see `watched`
-    kinks: Any  # (m,) where laws have kinks inside a segment, see `stability.kinks_of`; used under error control
+    kinks: Any  # (m,) kinks of the laws inside a segment, see `stability.kinks_of`; used under error control
     margin: Any  # (nodes × B,) margins of an element's borders, row by row, B the most of any; see `borders`
     points: Any  # (2, nodes) its δ and δ̇
     trial: Any  # (2,) δ and δ̇ at one point
-    one: Any  # (B,) margins there
-    scale: Any  # (m, 4) what rounding may make of δ and δ̇, ξ and ξ̇, m and m/s
+    one: Any  # (B,) margins of one element at one point
+    scale: Any  # (m, 4) rounding of δ and δ̇, ξ and ξ̇, m and m/s
     at_start: Any  # (m, B) margins at the start of the step
-    present: Any  # (m, B) margins in the state looked at last
-    rounding: Any  # (m, B) what rounding may make of these
+    present: Any  # (m, B) margins in the state evaluated last
+    rounding: Any  # (m, B) their rounding
     point: Any  # (2, 6) motion of an element with friction, see `compiled.sliding`
 
 
@@ -79,8 +79,8 @@ SPACE = types.NamedTuple(
 
 
 @shared
-def _renew(rate_of, problem, state, space):
-    """Evaluate the state's rate anew, after an event."""
+def _update_rate(rate_of, problem, state, space):
+    """Evaluate the state's rate again, after an event."""
     state.count[CALLS] += rate_of(
         *(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, space.work[0])
     )
@@ -88,8 +88,8 @@ def _renew(rate_of, problem, state, space):
 
 @shared
 def _first_event(problem, state, space, h, adaptive):
-    """(θ, stop, direction, level, border) of what comes first in a step of duration h; no border: -1."""
-    theta, stop, direction, level = find(problem, state, space)
+    """(θ, stop, direction, level, border) of the first event in a step of duration h; border -1 if it is none."""
+    theta, stop, direction, level = first_crossing(problem, state, space)
     if adaptive and theta != UNRESOLVED:
         place, element, border = border_ahead(problem, state, space, h)
         if place == 0.0 or place < theta:
@@ -98,10 +98,10 @@ def _first_event(problem, state, space, h, adaptive):
 
 
 @inner
-def _span_seen(problem, t, longest):
-    """The longest step up to ``longest`` that passes over no part of a sampled signal.
+def _longest_resolved(problem, t, longest):
+    """The longest step up to ``longest`` that leaves out no part of a sampled signal.
 
-    It ends where a signal ceases to be constant, or has a few of its nodes.
+    It ends where a signal ceases to be constant, or after a few of its nodes.
     """
     for j in range(problem.table_dt.size):
         dt, start, last = problem.table_dt[j], problem.table_start[j], problem.table_start[j + 1] - 1
@@ -116,10 +116,10 @@ def _span_seen(problem, t, longest):
 @inlined
 def _constant(table, node):
     """Whether a signal is constant from a node to the next one."""
-    still = table[node, 0] == table[node + 1, 0]
+    constant = table[node, 0] == table[node + 1, 0]
     for order in range(1, 3):
-        still &= table[node, order] == 0.0 and table[node + 1, order] == 0.0
-    return still
+        constant &= table[node, order] == 0.0 and table[node + 1, order] == 0.0
+    return constant
 
 
 @merged
@@ -146,28 +146,28 @@ def _entry_by_henon(problem, state, space, h):
 def march(step, rate_of, gained, problem, state, space, budget, steps, tolerances, adaptive, events):
     """Advance the state to the end of the run or for ``budget`` steps; returns a status code.
 
-    ``rate_of`` writes the rate of a state as `rhs` does, ``gained`` says whether the run gains energy; ``steps`` are
-    the longest in flight and in contact, s, ``tolerances`` (rtol, atol).
+    ``rate_of`` writes the rate of a state as `rhs` does, ``gained`` tells whether the run gains energy. ``steps`` are
+    the longest in flight and in contact, s, ``tolerances`` are (rtol, atol).
     """
     now, count, (dt_flight, dt_contact), (rtol, atol) = state.now, state.count, steps, tolerances
     t_end = now[T_END]
-    not_finite, by_hand = False, False
-    nearest = 0.0  # a kink nearer than this has been reached: there rounding switches the law to and fro
+    not_finite, walking_in = False, False
+    reached_kink = 0.0  # s: a kink this near to the start has been reached; rounding switches the law there
     for _ in range(budget):
         # --- end of the run, and what can stop it early
-        code = look(problem, state, space, events)
+        code = before_step(problem, state, space, events)
         if code == SWITCHED:
-            _renew(rate_of, problem, state, space)
+            _update_rate(rate_of, problem, state, space)
             continue
         if code != RUNNING:
             return code
 
         # --- try a step
         phase = H_CONTACT if in_contact(state.segment) > 0 else H_FLIGHT
-        nearest = nearest if phase == H_CONTACT else 0.0
+        reached_kink = reached_kink if phase == H_CONTACT else 0.0
         h = min(now[phase], dt_contact if phase == H_CONTACT else dt_flight, t_end - now[T])
         if adaptive:
-            h = _span_seen(problem, now[T], h)
+            h = _longest_resolved(problem, now[T], h)
         if h < max(4e-15 * now[T], _LEAST_STEP) and h < t_end - now[T]:
             return LAW_NOT_FINITE if not_finite else STEP_TOO_SMALL
         error, calls = step(
@@ -185,9 +185,9 @@ def march(step, rate_of, gained, problem, state, space, budget, steps, tolerance
         stop, direction, border, tried = -1, 0, -1, h
         if events == LOCATED:
             theta, stop, direction, level, border = _first_event(problem, state, space, h, adaptive)
-            if border >= 0 and theta == 0.0:  # the step begins on the border and goes across
+            if border >= 0 and theta == 0.0:  # the step begins on the border and crosses it
                 renew_border(problem, state, space, stop, border)
-                _renew(rate_of, problem, state, space)
+                _update_rate(rate_of, problem, state, space)
                 continue
             if theta == UNRESOLVED:
                 now[phase] = h / 32.0
@@ -195,23 +195,23 @@ def march(step, rate_of, gained, problem, state, space, budget, steps, tolerance
                 continue
             if theta < NONE:
                 h = land(step, problem, state, space, theta * h, tried, stop, direction, level, border, rtol, atol)
-                if h < 0.0:  # the interpolant crosses, the step does not, or not to the tolerance: look closer
+                if h < 0.0:  # only the interpolant crosses, or the landing is not accurate: shorter step
                     now[phase] = -h
                     count[REJECTED] += 1
                     continue
-        elif events == HENON and phase == H_FLIGHT and not by_hand:  # the paper's scheme
+        elif events == HENON and phase == H_FLIGHT and not walking_in:  # the paper's scheme
             h, stop = _entry_by_henon(problem, state, space, h)
             direction = 1
-            if h < 0.0:  # it grazes: walk in with the small step
-                now[H_FLIGHT], by_hand = dt_contact, True
+            if h < 0.0:  # it grazes: approach with the small step
+                now[H_FLIGHT], walking_in = dt_contact, True
                 count[REJECTED] += 1
                 continue
 
         # --- a law with a kink inside its segment: end the step there, the error estimate fails across it
         if adaptive and phase == H_CONTACT:
             theta = first_kink(problem, state, space)
-            if theta < NONE and theta * h > nearest:
-                now[phase], nearest = theta * h, max(nearest, NEAR_END * theta * h)
+            if theta < NONE and theta * h > reached_kink:
+                now[phase], reached_kink = theta * h, max(reached_kink, NEAR_END * theta * h)
                 count[REJECTED] += 1
                 continue
 
@@ -223,7 +223,7 @@ def march(step, rate_of, gained, problem, state, space, budget, steps, tolerance
         if border >= 0 and now[T] < t_end:
             renew_together(problem, state, space, h, stop, border)
         if stop >= 0:
-            _renew(rate_of, problem, state, space)
+            _update_rate(rate_of, problem, state, space)
         if gained(problem, state, space):
             return GAINED
 
@@ -231,7 +231,7 @@ def march(step, rate_of, gained, problem, state, space, budget, steps, tolerance
         if adaptive and stop < 0 and not at_end:
             now[phase] = h * (5.0 if error == 0.0 else min(5.0, 0.9 * error**-0.125))
         elif not adaptive:
-            now[H_FLIGHT], now[H_CONTACT], by_hand = dt_flight, dt_contact, False
+            now[H_FLIGHT], now[H_CONTACT], walking_in = dt_flight, dt_contact, False
     return RUNNING
 
 
@@ -254,7 +254,7 @@ def march_of(planar: bool) -> Any:
 def new_space(
     problem: Any, state: State, work_rows: int, watch: Array, constants: tuple[float, ...] = (), kinks: Any = ()
 ) -> Space:
-    """Working arrays; a method's constants stand in the last row of ``work``."""
+    """Working arrays; a method's constants are in the last row of ``work``."""
     size = state.x.size
     work = np.empty((work_rows, size))
     work[-1, : len(constants)] = constants

@@ -42,14 +42,14 @@ from solvers.stepping.henon import hermite
 from solvers.stepping.shared import shared
 from solvers.stepping.stability import Radius, alpha_radius
 
-MOST_SWEEPS = 60
+MOST_SWEEPS = 60  # iterations for one contact force, and sweeps over all of them
 
 
 @kernel
 def contact_force(problem, s, entry_rate, delta, delta_dot, by_force, rate_by_force, force, batch):
-    """Solve F = law(δ - by_force (F - force), δ̇ - rate_by_force (F - force)) from ``force``; (F, law calls).
+    """Solve F = law(δ - by_force (F - force), δ̇ - rate_by_force (F - force)) by Newton's method; (F, law calls).
 
-    NaN where Newton finds nothing. ``batch`` is working space of six numbers.
+    δ and δ̇ are those under ``force``, the first guess. NaN if Newton's method fails. ``batch`` holds six numbers.
     """
     F, calls = force, 0
     for _ in range(MOST_SWEEPS):
@@ -69,7 +69,7 @@ def contact_force(problem, s, entry_rate, delta, delta_dot, by_force, rate_by_fo
 
 @kernel
 def _predict(n, h, constants, x, rate, x_new):
-    """The end of the step with (1-α_m) a₊ + α_m a = 0."""
+    """Write the end of the step for (1-α_m) a₊ + α_m a = 0."""
     beta, gamma, share = constants[2], constants[3], constants[0] / (1.0 - constants[0])
     for i in range(n):
         a = rate[n + i]
@@ -79,15 +79,15 @@ def _predict(n, h, constants, x, rate, x_new):
 
 @kernel
 def _blend(n, constants, before, force):
-    """(1-α_f) r₊ + α_f r in place of r₊."""
-    kept, alpha_f = 1.0 - constants[1], constants[1]
+    """Replace r₊ in ``force`` by (1-α_f) r₊ + α_f r; r is ``before``."""
+    share, alpha_f = 1.0 - constants[1], constants[1]
     for i in range(n, 2 * n if alpha_f != 0.0 else n):
-        force[i] = kept * force[i] + alpha_f * before[i]
+        force[i] = share * force[i] + alpha_f * before[i]
 
 
 @kernel
 def _accelerate(n, h, constants, change, x_new):
-    """Add a change of a₊ to the end of the step."""
+    """Add a change of a₊ to displacements and rates at the end of the step."""
     beta, gamma = constants[2], constants[3]
     for i in range(n):
         x_new[i] += beta * h * h * change[n + i]
@@ -95,8 +95,8 @@ def _accelerate(n, h, constants, change, x_new):
 
 
 @kernel
-def _push(problem, s, h, entry_rate, x_new, rate_new, work):
-    """Let a stop push the end of the step until its force is that of its law there; law calls."""
+def _solve_contact(problem, s, h, entry_rate, x_new, rate_new, work):
+    """Find the force of one stop that equals its law at the end of the step, and apply it; returns the law calls."""
     n, row, force, reply, compliance = problem.k.size, problem.first[s], work[0], work[3], 0.0
     beta, gamma = work[4, 2], work[4, 3]
     for i in range(n):
@@ -115,8 +115,8 @@ def _push(problem, s, h, entry_rate, x_new, rate_new, work):
 
 
 @shared
-def _touch(reply, problem, h, segment, entry_rate, x_new, rate_new, work):
-    """Add what the stops in contact do to the end of a step, by turns until their forces agree; law calls."""
+def _add_contacts(reply, problem, h, segment, entry_rate, x_new, rate_new, work):
+    """Find the forces of all stops in contact at the end of a step by Gauss–Seidel sweeps; returns the law calls."""
     active, force, calls = in_contact(segment), work[0], 0
     if active == 0:
         return 0
@@ -128,7 +128,7 @@ def _touch(reply, problem, h, segment, entry_rate, x_new, rate_new, work):
             if segment[s] > 0:
                 before = force[s]
                 reply(problem, h, s, work)
-                calls += _push(problem, s, h, entry_rate[s], x_new, rate_new, work)
+                calls += _solve_contact(problem, s, h, entry_rate[s], x_new, rate_new, work)
                 largest, change = max(largest, abs(force[s])), max(change, abs(force[s] - before))
         if active == 1 or change <= 1e-12 * largest:
             break
@@ -136,15 +136,15 @@ def _touch(reply, problem, h, segment, entry_rate, x_new, rate_new, work):
 
 
 @kernel
-def _keep(n, rate, change):
-    """The change of a₊, beside what writes its rates anew."""
+def _store_accelerations(n, rate, change):
+    """Copy the accelerations a₊ to ``change`` before they are overwritten."""
     for i in range(n, 2 * n):
         change[i] = rate[i]
 
 
 @kernel
 def _finish(n, h, constants, x, rate, x_new, rate_new, change, dense):
-    """The new acceleration, the energy balance by the trapezoidal rule, the interpolant."""
+    """Set the new acceleration, the energy balance by the trapezoidal rule, and the interpolant."""
     share = constants[0] / (1.0 - constants[0])
     for i in range(n, 2 * n):
         rate_new[i] = change[i] - share * rate[i]
@@ -171,8 +171,8 @@ def newmark(
     _blend(n, constants, dense[0], rate_new)
     solve(problem, h, work, rate_new)
     _accelerate(n, h, constants, rate_new, x_new)
-    calls += _touch(reply, problem, h, segment, entry_rate, x_new, rate_new, work)
-    _keep(n, rate_new, work[1])
+    calls += _add_contacts(reply, problem, h, segment, entry_rate, x_new, rate_new, work)
+    _store_accelerations(n, rate_new, work[1])
     calls += balance(problem, t + h, x_new, segment, entry_rate, rate_new, work[2])
     _finish(n, h, constants, x, rate, x_new, rate_new, work[1], dense)
     return 0.0, calls
@@ -183,7 +183,7 @@ def newmark(
 
 @inlined
 def _flight(problem, t, x, force):
-    """Loads, damping and stiffness."""
+    """Write the forces of loads, damping and stiffness."""
     n = problem.k.size
     for i in range(2 * n):
         force[i] = 0.0
@@ -194,7 +194,7 @@ def _flight(problem, t, x, force):
 
 @inlined
 def _solve(problem, h, work, force):
-    """Divide by S, which is kept in ``work[1]``."""
+    """Divide forces by S, which is kept in ``work[1]``."""
     n, alpha_m, kept, beta, gamma = problem.k.size, work[4, 0], 1.0 - work[4, 1], work[4, 2], work[4, 3]
     for i in range(n):
         work[1, i] = (1.0 - alpha_m) + kept * (gamma * h * problem.c[i] + beta * h * h * problem.k[i])
@@ -203,7 +203,7 @@ def _solve(problem, h, work, force):
 
 @inlined
 def _reply(problem, h, s, work):
-    """Divide the push of a stop by S."""
+    """Write the push of a stop over S to ``work[3]``."""
     n, row = problem.k.size, problem.first[s]
     for i in range(n):
         work[3, n + i] = (1.0 - work[4, 1]) * problem.push[row, n + i] / work[1, i]
@@ -240,7 +240,7 @@ class _Family(ConstantStep):
 
     @property
     def radius(self) -> Radius:
-        """From the matrix of one step."""
+        """Of the matrix of one step."""
         return alpha_radius(*self.constants)
 
     @property
@@ -253,7 +253,7 @@ class _Family(ConstantStep):
         return system.sparse or system.blocks.loss.size > 0
 
     def critical(self, M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Array]:
-        """A contact couples the modes even where they are stepped one by one."""
+        """The oscillator that limits a step on matrices, since contacts couple the modes."""
         _, _, beta, gamma = self.constants
         return newmark_oscillator(beta, gamma, M, C, K, G)
 

@@ -24,7 +24,7 @@ from solvers.stepping.stability import Radius, taylor_radius
 
 @kernel
 def _add_stage(start, stage, weight, reach, x, x_new, trial):
-    """Add a stage to the end of the step, from ``start``; ``trial`` is where the next one is evaluated."""
+    """x_new = start + weight × stage, trial = x + reach × stage: the point of the next stage."""
     for i in range(x.size):
         x_new[i] = start[i] + weight * stage[i]
         trial[i] = x[i] + reach * stage[i]

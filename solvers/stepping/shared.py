@@ -9,15 +9,15 @@ from solvers.compiled.kernels import merged
 
 
 class shared:  # noqa: N801  a decorator
-    """Decorator of functions that are `merged` into a compiled caller and, called from Python, are Python.
+    """Decorator of functions that are `merged` into a compiled caller, and run as Python when called from Python.
 
-    Functions handed to them are called directly in both. What they call must be shared or a `kernel`, but for what is
-    reached on decoupled modes only.
+    Functions passed to them are called directly in both. What they call must be shared or a `kernel`, except what only
+    runs on decoupled modes reach.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.py_func, self.merged = function, merged(function)
-        self.targetoptions, self._numba_type_ = self.merged.targetoptions, self.merged._numba_type_  # numba looks here
+        self.targetoptions, self._numba_type_ = self.merged.targetoptions, self.merged._numba_type_  # which numba reads
         self.__doc__ = function.__doc__
 
     def __call__(self, *arguments: Any) -> Any:

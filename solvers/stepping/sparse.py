@@ -19,18 +19,18 @@ from solvers.stepping.energy_gain import LEAST, NOW, gains, negligible_energy, w
 from solvers.stepping.engine import Engine
 from solvers.stepping.loop import march, new_space
 
-MASS = 0.0  # instead of a step
+MASS = 0.0  # key of the mass matrix among the factors, whose keys are steps
 
 
 class Factor(NamedTuple):
-    """A matrix made ready to solve with, and its answers to the pushes of stops."""
+    """A factorised matrix: how to solve with it, and its solutions for the pushes of stops."""
 
     solve: Callable[[Array], Array]
     replies: dict[int, Array]
 
 
 class MatrixEngine(Engine):
-    """One run of a method on matrices: what `runge_kutta` and `newmark` ask of them, in the words of these."""
+    """One run of a method on matrices: the functions that `runge_kutta` and `newmark` call, on sparse matrices."""
 
     def __init__(self, method: Any, system: System, z: Array, forcing: Forcing, duration: float) -> None:
         from scipy.sparse import csc_array, eye_array
@@ -44,12 +44,12 @@ class MatrixEngine(Engine):
         self.state.now[[H_FLIGHT, H_CONTACT, T_END]] = *method.steps, duration
         self.space = new_space(self.problem, self.state, method.work_rows, watched(system, z, 0.0), method.constants)
         self.open = np.zeros_like(self.state.segment)
-        self.moving = slice(system.size, 2 * system.size)  # the rates in x, the accelerations and forces in its rate
+        self.moving = slice(system.size, 2 * system.size)  # rates in x, accelerations or forces in its rate
         self.factors: dict[float, Factor] = {}
         self.loop = partial(march, method.matrix_step(self), self.rate, self.gained)
 
     def start(self) -> None:
-        """Find what energy counts as rounding, the segment of every stop, and the first rate."""
+        """Set the negligible energy, the segment of every stop, and the first rate."""
         vectors, solve = self.problem.power[:, self.moving], self.factor(MASS).solve
         least = negligible_energy(self.problem, np.array([v @ solve(v) for v in vectors]), self.method.dt)
         self.space.watch[LEAST] = least
@@ -57,11 +57,11 @@ class MatrixEngine(Engine):
 
     def march(self, budget: int) -> int:
         """Advance by at most ``budget`` steps."""
-        with np.errstate(all="ignore"):  # the loop reports what is not finite
+        with np.errstate(all="ignore"):  # the loop reports numbers that are not finite
             return super().march(budget)
 
     def gained(self, problem: Any, state: Any, space: Any) -> bool:
-        """Whether energy comes from nowhere."""
+        """Whether the run gains energy, see `gains`."""
         q, q_dot = state.x[: self.system.size], state.x[self.moving]
         space.watch[NOW] = 0.5 * (q_dot @ (self.M @ q_dot) + q @ (self.K @ q))
         return bool(gains(problem, state, space))
@@ -73,7 +73,7 @@ class MatrixEngine(Engine):
         return calls
 
     def balance(self, problem: Any, t: float, x: Array, segment: Any, entry_rate: Any, out: Array, batch: Any) -> int:
-        """The same with forces for accelerations."""
+        """The same with forces in place of accelerations."""
         n, q_dot = self.system.size, x[self.moving]
         calls: int = rhs(problem, t, x, segment, entry_rate, out, batch)
         damping = self.C @ q_dot
@@ -82,22 +82,22 @@ class MatrixEngine(Engine):
         return calls
 
     def flight(self, problem: Any, t: float, x: Array, out: Array) -> None:
-        """Forces without contact."""
+        """Forces without contact, into ``out``."""
         self.balance(problem, t, x, self.open, self.state.entry_rate, out, self.space.work[2])
 
     def solve(self, problem: Any, h: float, work: Array, force: Array) -> None:
-        """Accelerations in place of forces."""
+        """Replace forces by S⁻¹ times them, accelerations."""
         force[self.moving] = self.factor(h).solve(force[self.moving])
 
     def reply(self, problem: Any, h: float, s: int, work: Array) -> None:
-        """Accelerations per newton of a stop."""
+        """Write the accelerations per newton of a stop to ``work[3]``."""
         solve, replies = self.factor(h)
         if s not in replies:
             replies[s] = (1.0 - self.method.constants[1]) * solve(problem.push[problem.first[s], self.moving])
         work[3, self.moving] = replies[s]
 
     def factor(self, h: float) -> Factor:
-        """That of the mass, or of a step; kept for the constant one and the latest landing."""
+        """Factorised M (h = `MASS`) or S of a step h; kept for the constant step and the latest landing."""
         if h not in self.factors:
             self.factors = {kept: self.factors[kept] for kept in (MASS, self.method.dt) if kept in self.factors}
             symmetric = h == MASS or self.by_rate is self.C
@@ -111,7 +111,7 @@ class MatrixEngine(Engine):
 
 
 def _factorised(matrix: Any, symmetric: bool) -> Callable[[Array], Array]:
-    """Solver of a sparse matrix, positive definite where it is ``symmetric``; a diagonal one only divides."""
+    """Solver of a sparse matrix, positive definite if ``symmetric``; of a diagonal matrix it divides."""
     from scipy.sparse import csc_array
     from scipy.sparse.linalg import splu
 

@@ -1,14 +1,14 @@
 r"""How long a constant step may be: predicted, before a run begins.
 
-One step of a linear method multiplies the state of a mode p'' + c p' + k p = 0 by a matrix; the motion stays bounded
-where its spectral radius ρ(h) is not above 1. A run of duration T is refused where it would amplify a mode by more than
-a tenth, ln ρ · T/h > 0.1: the limit proper for T → ∞, and for a short run of an undamped mode a little more.
+One step of a linear method multiplies the state of a mode p'' + c p' + k p = 0 by a matrix; the motion stays bounded if
+its spectral radius ρ(h) is at most 1. A run of duration T is refused if it would amplify a mode by more than a tenth,
+ln ρ · T/h > 0.1: the limit proper for T → ∞, and for a short run of an undamped mode a little more.
 
 In contact the law is replaced by its tangent at the expected indentation, k_t = ∂F/∂δ and c_t = ∂F/∂δ̇:
 
 .. math:: K_c = K + k_t\, w w^T,\qquad C_c = C + c_t\, w w^T
 
-and the same question asked of the modes of (M, C_c, K_c).
+and the modes of (M, C_c, K_c) are judged in the same way.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 Radius = Callable[[Any, Any, Any], Any]
 """ρ(h, k, c): factor by which one step of size h multiplies a mode p'' + c p' + k p = 0; arrays as numbers."""
 
-EXPECTED_SPEED = 1.0  # m/s; a Hertz stop's frequency goes with its fifth root, so a guess serves
+EXPECTED_SPEED = 1.0  # m/s; the frequency on a Hertz stop goes with its fifth root, so a guess is good enough
 _SLACK = 1e-10  # rounding of ρ
-_GROWTH = 0.1  # allowed logarithm of a mode's amplification in a run
+_GROWTH = 0.1  # allowed logarithm of the amplification of a mode in a run
 _SMALLEST, _LARGEST, _PER_DECADE = 1e-2, 1e2, 60  # range of hω searched; below it a method counts as never stable
-_AT_ONCE = 100  # modes whose steps are searched in one array
+_AT_ONCE = 100  # modes that are searched in one array
 
 
 class Limit(NamedTuple):
@@ -101,7 +101,7 @@ def largest_steps(radius: Radius, k: Array, c: Array, duration: float = math.inf
 
 
 def _first_border(stable: Callable[[Array, Any], Any], modes: Any, fastest: Array, duration: float) -> Array:
-    """Where the first stretch of stable steps ends, by a search on a grid and bisection, for modes (j,)."""
+    """Longest step of the first interval of stable steps, by search on a grid and bisection, for modes (j,)."""
     grid = np.geomspace(_SMALLEST, _LARGEST, round(_PER_DECADE * math.log10(_LARGEST / _SMALLEST)) + 1)
     steps = grid / fastest[:, None]
     good = stable(steps, modes[:, None])
@@ -135,13 +135,13 @@ def limit(method: ConstantStep, system: System, indentation: float | None, durat
 
 
 def _shortest(method: ConstantStep, system: System, k: Array, c: Array, duration: float) -> tuple[float, int]:
-    """Smallest of the oscillators' limits, and whose it is; -1 where they are not the modes."""
+    """Smallest limit of the oscillators, and which mode it is; -1 if they are not the modes."""
     steps = largest_steps(method.radius, k, c, duration)
     return float(steps.min()), int(np.argmin(steps)) if len(steps) == system.size else -1
 
 
 def with_tangents(system: System, indentation: float | None) -> tuple[Any, Any, float]:
-    """C and K with every stop's tangent, and how long a contact lasts."""
+    """C and K with every stop's tangent, and the half period of the slowest contact, s."""
     C, K, longest = system.C, system.K, 0.0
     for contact, (stiffness, damping, mass) in zip(system.contacts, tangents(system, indentation), strict=True):
         if system.sparse:
@@ -166,7 +166,7 @@ def shortest_contact(system: System) -> float:
 
 
 def tangents(system: System, indentation: float | None) -> list[tuple[float, float, float]]:
-    """The `tangent` of every stop; found once per system."""
+    """The `tangent` of every stop; computed once per system."""
     key = "tangents", indentation
     found: Any = system.kept.get(key, lambda: [tangent(system, contact, indentation) for contact in system.contacts])
     return found  # type: ignore[no-any-return]
@@ -182,7 +182,7 @@ def tangent(system: System, contact: Contact, indentation: float | None) -> tupl
     speed = max(speed, contact.law.entry_rate_floor)
     around = delta * np.array([1.0 - 1e-6, 1.0 + 1e-6])
     forces = contact.law.force(around, 0.0, speed)
-    if getattr(contact.law, "opens", False):  # its steepest line is that on which it unloads
+    if getattr(contact.law, "opens", False):  # its unloading is steepest
         forces = contact.law.along([0.0, *around[::-1]])[:0:-1]  # type: ignore[attr-defined]
     by_delta = np.diff(forces)[0] / (around[1] - around[0])
     by_rate = np.diff(contact.law.force(np.full(2, delta), speed * np.array([-1e-6, 1e-6]), speed))[0] / (2e-6 * speed)
@@ -204,16 +204,16 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 
 def work_of(law: Any, delta: float) -> float:
-    """∫F dδ up to an indentation, slowly; 0 in flight."""
+    """∫F dδ, J, up to an indentation at rest; 0 in flight."""
     return 0.0 if delta <= 0.0 else 0.5 * delta * float(_WEIGHTS @ law.force(0.5 * delta * (1.0 + _NODES), 0.0, 1.0))
 
 
 def is_dissipative(law: Any) -> bool:
-    """Whether a law is dissipative: it pushes at rest, and its damping acts against the motion."""
+    """Whether a law pushes at rest, and its damping acts against the motion."""
     deepest = 2.0 * _depth(law, 1.0, EXPECTED_SPEED)
     delta, rate = np.meshgrid(deepest * np.geomspace(1e-6, 1.0, 13), np.linspace(-2.0, 2.0, 9))
     slow = law.force(delta, 0.0, EXPECTED_SPEED)
-    with np.errstate(all="ignore"):  # what overflows is not known to take
+    with np.errstate(all="ignore"):  # a force that overflows does not pass the comparison
         damping = law.force(delta, rate, EXPECTED_SPEED) - slow
         return bool(np.all(slow >= 0.0) and np.all(damping * rate >= -1e-12 * slow))
 
@@ -237,7 +237,7 @@ def _kinks(law: Any) -> int:
 
 
 def _depth(law: Any, mass: float, speed: float) -> float:
-    """Indentation at which a stop has taken the energy of a mass."""
+    """Indentation, m, at which a stop has taken the kinetic energy of a mass at this speed."""
     low, high = -15.0, 3.0  # powers of ten, m
     while high - low > 1e-6:
         powers = np.linspace(low, high, 65)

@@ -1,7 +1,7 @@
-"""Steps in contact with a circular clearance: its unknowns are the components of the force at the nodes, of both rows.
+"""Steps in contact with a circular clearance: the unknowns are both components of its force at the nodes.
 
-δ, δ̇ and N stand behind the rows, at the place ``problem.own`` of `Scratch.motion` and `Scratch.law_force`, where
-whatever looks at the indentation of an element finds them.
+δ, δ̇ and N are stored behind the rows, at the index ``problem.own`` of `Scratch.motion` and `Scratch.law_force`, where
+`node_response.motion_of` and `force_of` read them.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ from solvers.exponential.contact.many_stops import pair_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 
-_TINY = 1e-300  # m²: at the centre, where there is no direction, δ̇ becomes 0 instead of NaN
+_TINY = 1e-300  # m²: makes δ̇ at the centre, where there is no direction, 0 instead of NaN
 
 
 @inlined
 def _radial_nodes(problem, scratch, s):
-    """δ and δ̇ at the nodes from the motion of both rows; returns σ e of both."""
+    """Write δ and δ̇ at the nodes from the motion of both rows; returns both components of σ e."""
     u, w, own = scratch.motion[problem.first[s]], scratch.motion[problem.first[s] + 1], scratch.motion[problem.own[s]]
     along, across, sign = load8(u[0], 0), load8(w[0], 0), 1.0 if problem.radius[s] > 0.0 else -1.0
     r = sqrt8(along * along + across * across + splat8(_TINY))
@@ -63,13 +63,13 @@ def _signed(problem, s, value):
 
 @part(CIRCLE_MOTION, types.void, types.int64)
 def radial_nodes(problem, scratch, s):
-    """The same at an address."""
+    """`_radial_nodes`, called at an address."""
     _radial_nodes(problem, scratch, s)
 
 
 @inlined
 def _radial_forces(problem, tables, state, scratch, s):
-    """Force at the nodes for the motion of both rows, and its components, into ``scratch.law_force``."""
+    """Write N at the nodes for the motion of both rows, and its components, into ``scratch.law_force``."""
     along, across = _radial_nodes(problem, scratch, s)
     row, own = problem.first[s], problem.own[s]
     motion, force = scratch.motion[own], scratch.law_force[own]
@@ -89,13 +89,13 @@ def _radial_forces(problem, tables, state, scratch, s):
 
 @part(CIRCLE_FORCES, types.void, types.int64)
 def radial_forces(problem, tables, state, scratch, s):
-    """The same at an address."""
+    """`_radial_forces`, called at an address."""
     _radial_forces(problem, tables, state, scratch, s)
 
 
 @part(CIRCLE_GUESS, types.void, types.int64)
 def guess_radial_forces(problem, tables, state, scratch, s):
-    """First guess of the components: the law for the free response."""
+    """First guess of the components at the nodes: the law for the free response."""
     for r in range(problem.first[s], problem.first[s] + 2):
         copy(scratch.free[r, 0], scratch.motion[r, 0], S)
         copy(scratch.free[r, 1], scratch.motion[r, 1], S)
@@ -106,16 +106,16 @@ def guess_radial_forces(problem, tables, state, scratch, s):
 
 @part(CIRCLE_AWAY, types.boolean, types.int64, REAL)
 def stays_in_circle(problem, state, scratch, s, h):
-    """Whether a circle cannot be met on the step; the motion at the nodes is set to that at the start.
+    """Whether a circle cannot be reached on the step; the motion at the nodes is set to that at the start.
 
-    ``scratch.per_row`` bounds the rows' accelerations. In a disc the way there is no further out than its ends.
+    ``scratch.per_row`` bounds the accelerations of the rows. A disc is convex: u + tu̇ is inside if both its ends are.
     """
     row, size = problem.first[s], 2 * problem.k.size
-    bound, ahead = 0.5 * h * h * math.hypot(scratch.per_row[row], scratch.per_row[row + 1]), 0.0
+    bound, extrapolated = 0.5 * h * h * math.hypot(scratch.per_row[row], scratch.per_row[row + 1]), 0.0
     for r in range(row, row + 2):
         u = dot(problem.read[r], state.x, size) - problem.gap[r]
         v = dot(problem.read_rate[r], state.x, size)
-        ahead += (u + h * v) ** 2
+        extrapolated += (u + h * v) ** 2
         for i in range(S):
             scratch.motion[r, 0, i], scratch.motion[r, 1, i] = u, v
     delta, rate = scratch.start_motion[s, 0], scratch.start_motion[s, 1]
@@ -123,16 +123,16 @@ def stays_in_circle(problem, state, scratch, s, h):
         scratch.motion[problem.own[s], 0, i], scratch.motion[problem.own[s], 1, i] = delta, rate
     if problem.radius[s] < 0.0:
         return delta + h * max(rate, 0.0) + bound < 0.0
-    return max(delta, math.sqrt(ahead) - problem.radius[s]) + bound < 0.0
+    return max(delta, math.sqrt(extrapolated) - problem.radius[s]) + bound < 0.0
 
 
 @inlined
 def turn_slopes(u, w, u_dot, w_dot, force, by_delta, by_rate, radius, i, out):
-    """Slopes of a force's components at point i, rows 2a + b of ``out``: of a by u_b, then by u̇_b; u is (u, w).
+    """Slopes of a force's components at point i: of a by u_b, then by u̇_b, into row 2a + b of ``out``; u is (u, w).
 
     Row 4 gets the direction of the force, σ e.
 
-    ∂F_a/∂u_b = N_δ e_a e_b + N_δ̇ e_a (u̇_b - ṙ e_b)/r + σ (N/r) (1 if a = b - e_a e_b),   ∂F_a/∂u̇_b = N_δ̇ e_a e_b
+        ∂F_a/∂u_b = N_δ e_a e_b + N_δ̇ e_a (u̇_b - ṙ e_b)/r + σ (N/r) (1 if a = b - e_a e_b),   ∂F_a/∂u̇_b = N_δ̇ e_a e_b
     """
     r = math.sqrt(u * u + w * w)
     e_u, e_w = u / r, w / r
@@ -148,13 +148,13 @@ def turn_slopes(u, w, u_dot, w_dot, force, by_delta, by_rate, radius, i, out):
 
 @merged
 def turned_of(problem, scratch, s):
-    """(5, 2, S) slopes and directions of the components at the nodes."""
+    """(5, 2, S) slopes and directions of `turn_slopes` at the nodes."""
     return scratch.turned[5 * (problem.own[s] - problem.gap.size) : 5 * (problem.own[s] - problem.gap.size) + 5]
 
 
 @inner
 def slopes_at_nodes(problem, scratch, s):
-    """Slopes of the components at the nodes, into ``scratch.turned``, from those of the law."""
+    """Slopes of the components at the nodes into ``scratch.turned``, from those of the law in ``scratch.slope``."""
     u, w, own = scratch.motion[problem.first[s]], scratch.motion[problem.first[s] + 1], problem.own[s]
     slope, force, out = scratch.slope[s], scratch.law_force[own], turned_of(problem, scratch, s)
     radius = problem.radius[s]
@@ -164,7 +164,7 @@ def slopes_at_nodes(problem, scratch, s):
 
 @part(CIRCLE_NEWTON, types.void, *[types.int64] * 4)
 def linearise_circle(problem, tables, state, scratch, node_set, level, s, begin):
-    """Write what both rows of a circle add to the matrix of Newton's method, from its row ``begin`` on."""
+    """Write the 2S rows of Newton's matrix that belong to a circle, from its row ``begin`` on."""
     slopes_at_nodes(problem, scratch, s)
     row, turned, column = problem.first[s], turned_of(problem, scratch, s), 0
     for u in range(problem.gap.size):
@@ -189,7 +189,7 @@ def linearise_circle(problem, tables, state, scratch, node_set, level, s, begin)
 
 @part(CIRCLE_WORK, REAL, *[types.int64] * 3)
 def work_in_circle(problem, tables, state, scratch, node_set, level, s):
-    """Work, J, of the forces on all rows over the step just found, each as a plain force's; see `contact.outputs`."""
+    """Work, J, of the forces on all rows of an element over the step just solved; each as in `contact.outputs`."""
     size, h, work = 2 * problem.k.size, tables.contact_step[level], 0.0
     weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
     weights = tables.weights[node_set] if weighted else tables.plain[node_set]
@@ -209,7 +209,10 @@ def work_in_circle(problem, tables, state, scratch, node_set, level, s):
 
 @part(CIRCLE_WITHIN, types.UniTuple(REAL, 2), types.int64, types.int64)
 def work_within_circle(problem, tables, scratch, s, first):
-    """(work, impulse) on a panel within a step; the rows' forces are in ``scratch.between`` from row ``first`` on."""
+    """(work, J, impulse, N s) of an element over a panel of the step, from motion and forces at its points.
+
+    The motion of the blocks is in ``scratch.along``, the rows' forces in ``scratch.between`` from row ``first`` on.
+    """
     size, work, row = 2 * problem.k.size, 0.0, problem.first[s]
     weights = tables.gauss[1]
     product, square = scratch.trial, scratch.clipped
@@ -233,9 +236,9 @@ def work_within_circle(problem, tables, scratch, s, first):
 
 @part(CIRCLE_LANDED, types.void, types.int64, REAL)
 def land_on_circle(problem, state, scratch, s, level):
-    """Move a state that has landed near |u| = c onto it, along its motion: dt = (level - δ)/δ̇.
+    """Move a state that has landed near δ = ``level`` onto it, along its motion: dt = (level - δ)/δ̇.
 
-    A landing ends there to its own tolerance, as the indentation is not linear in the state; this leaves rounding.
+    The indentation is not linear in the state, so a landing ends there only to its own tolerance; this leaves rounding.
     """
     size = 2 * problem.k.size
     for _ in range(2):

@@ -4,7 +4,8 @@ With δ = σ|u| - c' (c' = c, or -c of an outer circle) and e = u/|u|, at fixed 
 
     dδ = σ e·du - dc',   dδ̇ = σ (e·du̇ + (u̇ - ṙe)·du/r),
 
-and the components change by their slopes, which `contact.turn_slopes` has, and by what changes N at fixed u and u̇.
+and the components of the force change by their slopes, see `contact.turn_slopes`, and by the change of N at fixed u,
+u̇.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from solvers.exponential.contact.nodes import S
 
 @inlined
 def explicit_change(variation, r, d, t):
-    """Explicit change of the displacement (d = 0) or rate of a row by the parameter: the state is held fixed."""
+    """Derivative of a row's displacement (d = 0) or rate (d = 1) by the parameter, the state held fixed."""
     total = -variation.gap[r] if d == 0 else 0.0
     for j in range(variation.omega.size):
         a = variation.steady[j, r, d]
@@ -29,20 +30,20 @@ def explicit_change(variation, r, d, t):
 
 @inlined
 def is_parameter(variation, derivatives, column):
-    """Whether a column is the parameter's."""
+    """Whether a column is the derivative by the parameter; the others are by the start."""
     return variation.step > 0.0 and column == derivatives.y.shape[0] - 1
 
 
 @inner
 def row_change(problem, variation, derivatives, y, c, r, d, t):
-    """Change of a row's displacement (d = 0) or rate at fixed time, in column c, whose state is y."""
+    """Change of a row's displacement (d = 0) or rate (d = 1) at fixed time, in column c, whose state is y."""
     value = dot(problem.read[r] if d == 0 else problem.read_rate[r], y, 2 * problem.k.size)
     return value + explicit_change(variation, r, d, t) if is_parameter(variation, derivatives, c) else value
 
 
 @inner
 def radial_change(problem, variation, derivatives, x, c, s, d, t):
-    """Change of δ (d = 0) or δ̇ of a circle in the state x at fixed time, in column c."""
+    """Change of δ (d = 0) or δ̇ (d = 1) of a circle in the state x at fixed time, in column c."""
     row, size, y = problem.first[s], 2 * problem.k.size, derivatives.y[c]
     u, w = (
         dot(problem.read[row], x, size) - problem.gap[row],
@@ -58,18 +59,18 @@ def radial_change(problem, variation, derivatives, x, c, s, d, t):
         change += (u_dot - along * u) / r * row_change(problem, variation, derivatives, y, c, row, 0, t)
         change += (w_dot - along * w) / r * row_change(problem, variation, derivatives, y, c, row + 1, 0, t)
     change = change if problem.radius[s] > 0.0 else -change
-    return change - _moved_radius(variation, derivatives, c, s) if d == 0 else change
+    return change - _radius_change(variation, derivatives, c, s) if d == 0 else change
 
 
 @inlined
-def _moved_radius(variation, derivatives, c, s):
-    """Change of c'."""
+def _radius_change(variation, derivatives, c, s):
+    """Change of c' in column c."""
     return variation.radius[s] if is_parameter(variation, derivatives, c) else 0.0
 
 
 @inlined
 def change_of(problem, variation, derivatives, x, column, s, d, t):
-    """Change of δ (d = 0) or δ̇ of a stop in the state x at fixed time, in one column."""
+    """Change of δ (d = 0) or δ̇ (d = 1) of any stop in the state x at fixed time, in one column."""
     if is_circle(problem, s):
         return radial_change(problem, variation, derivatives, x, column, s, d, t)
     r = problem.first[s]
@@ -80,9 +81,9 @@ def change_of(problem, variation, derivatives, x, column, s, d, t):
 
 @inner
 def radial_residual(problem, tables, scratch, derivatives, variation, node_set, level, begin, c, s, shift, place):
-    """Right-hand sides for the components' changes at the nodes, in column c, into ``scratch.residual``.
+    """Right-hand sides for the changes of the force's components at the nodes, in column c, into ``scratch.residual``.
 
-    The motion of both rows without the changes of forces is in ``scratch.motion``.
+    ``scratch.motion`` holds the change of motion of both rows without that of the forces.
     """
     row, turned, parameter = problem.first[s], turned_of(problem, scratch, s), is_parameter(variation, derivatives, c)
     for i in range(S):
@@ -106,9 +107,9 @@ def radial_residual(problem, tables, scratch, derivatives, variation, node_set, 
 
 @inner
 def add_radial_change(problem, derivatives, variation, s, w, t, factor, force, by_law, out):
-    """Add to the rates of all columns what the changes of a circle's force do in the state w of a landing.
+    """Add the changes of a circle's force, in the state w of a landing, to the rates of all columns.
 
-    The slopes of the law are in ``derivatives.batch[2:5]``, its derivative by the parameter is ``by_law``.
+    The slopes of the law are in ``derivatives.batch[2:5]``; ``by_law`` is its derivative by the parameter.
     """
     row, size, batch, turned = problem.first[s], 2 * problem.k.size, derivatives.batch, derivatives.turned
     read, rate = problem.read, problem.read_rate

@@ -1,11 +1,12 @@
-"""Flight in a circular clearance: certified spans, and the first contact on the Taylor polynomials.
+"""Flight in a circular clearance: time steps proven free of contact, and the first contact on the Taylor polynomials.
 
 With M a bound of |ü|, |u(τ)| <= |u + u̇τ| + Mτ²/2, and (c - Mτ²/2)² >= c² - cMτ². So an inner circle is not met before
 
     τ = (-b + √(b² + a (c² - r²)))/a,   a = |u̇|² + cM,   b = u·u̇.
 
-An outer one is a line: r(τ) >= r + ṙτ - Mτ²/2. On a cell of sampled signals u differs from the straight line between
-its ends by at most e, and a disc is convex: an inner circle is not met if |u| + e < c at both ends.
+For an outer one the bound along the radius suffices: r(τ) >= r + ṙτ - Mτ²/2. On a cell of sampled signals u differs
+from the straight line between its ends by at most e, and a disc is convex: an inner circle is not met if |u| + e < c at
+both ends.
 """
 
 from __future__ import annotations
@@ -21,23 +22,23 @@ from solvers.exponential.flight import ORDER, motion_of_row, safe_time
 
 @inlined
 def _safe_in_circle(radius, uu, uv, vv, bound):
-    """Time before which a circle cannot be met, from u·u, u·u̇ and u̇·u̇."""
+    """Time τ before which a circle cannot be met, from u·u, u·u̇, u̇·u̇ and the bound of |ü|."""
     r = math.sqrt(uu)
     if radius < 0.0:
         return safe_time(r + radius, uv / r if r > 0.0 else 0.0, bound)
-    left, a = (radius - r) * (radius + r), vv + radius * bound
-    if left <= 0.0 and uv >= 0.0:
+    distance, a = (radius - r) * (radius + r), vv + radius * bound
+    if distance <= 0.0 and uv >= 0.0:
         return 0.0
     if a <= 0.0:
         return math.inf
-    left = max(left, 0.0)
-    root = math.sqrt(uv * uv + a * left)
-    return left / (uv + root) if uv > 0.0 else (root - uv) / a
+    distance = max(distance, 0.0)
+    root = math.sqrt(uv * uv + a * distance)
+    return distance / (uv + root) if uv > 0.0 else (root - uv) / a
 
 
 @part(CIRCLE_SPAN, REAL, types.int64, MATRIX)
 def span_of_circle(problem, tables, scratch, s, x):
-    """The time from the blocks' p and v; ``scratch.per_row`` bounds the rows' accelerations."""
+    """The same from the blocks' p and v; ``scratch.per_row`` bounds the accelerations of the rows."""
     row = problem.first[s]
     u, u_dot = motion_of_row(problem, tables, row, x)
     w, w_dot = motion_of_row(problem, tables, row + 1, x)
@@ -48,7 +49,7 @@ def span_of_circle(problem, tables, scratch, s, x):
 
 @part(CIRCLE_SPAN_AT, REAL, types.int64)
 def span_of_circle_at(problem, state, scratch, s):
-    """The time from the state."""
+    """The same from the state."""
     row, size = problem.first[s], 2 * problem.k.size
     uu, uv, vv, bound = 0.0, 0.0, 0.0, math.hypot(scratch.per_row[row], scratch.per_row[row + 1])
     for r in range(row, row + 2):
@@ -60,9 +61,9 @@ def span_of_circle_at(problem, state, scratch, s):
 
 @part(CIRCLE_NEAR, types.boolean, types.int64, MATRIX)
 def circle_is_near(problem, tables, scratch, s, x):
-    """Whether a circle may be met on a cell that ends here; ``scratch.per_row`` bounds what the rows deviate by.
+    """Whether a circle may be met on a cell with this end; ``scratch.per_row`` bounds the rows' error of interpolation.
 
-    Outside an outer circle the line between two places may cross it: there cells are not crossed whole.
+    Always True of an outer circle, which the straight line between two places outside may cross.
     """
     row = problem.first[s]
     u, w = motion_of_row(problem, tables, row, x)[0], motion_of_row(problem, tables, row + 1, x)[0]
@@ -72,7 +73,7 @@ def circle_is_near(problem, tables, scratch, s, x):
 
 @part(CIRCLE_ROOT, types.void, types.int64, MATRIX, VECTOR)
 def radial_polynomial(problem, s, terms, values):
-    """Coefficients of σ (|u|² - c²)/2c in time from the state's derivatives; near c it is δ to first order."""
+    """Coefficients in time of σ (|u|² - c²)/2c, which is δ to first order near c, from the derivatives of the state."""
     row, radius, size = problem.first[s], problem.radius[s], 2 * problem.k.size
     for i in range(ORDER + 1):
         values[i] = 0.0
@@ -91,7 +92,7 @@ def radial_polynomial(problem, s, terms, values):
 
 @inner
 def _coefficient(problem, r, terms, i, size):
-    """Coefficient i of a row's displacement."""
+    """Coefficient of t^i of a row's displacement."""
     value = dot(problem.read[r], terms[i], size)
     for k in range(i):
         value /= k + 1.0

@@ -8,9 +8,9 @@ s is latched at entry, ds = dξ + ξ̇ dt*, and where slip ends, at s = ξ - F_t
 
     ds = dξ - dF_t/k_t + (ξ̇ - Ḟ_t/k_t) dt*.
 
-There ṡ = ξ̇ - Ḟ_t/k_t falls to zero, so that it does not matter when, unless it jumps with Ṅ, at a knot or an event of
-another element, whose dt* it is. F_t is continuous at all borders. A parameter adds what the forces change by at fixed
-motion, a difference of the two laws ahead and behind.
+There ṡ = ξ̇ - Ḟ_t/k_t falls to zero, so that dt* does not matter, unless ṡ jumps with Ṅ, at a knot or an event of
+another element; then dt* is that of this event. F_t is continuous at all borders. A parameter adds the change of the
+forces at fixed motion, a difference of the two laws ahead and behind.
 """
 
 from __future__ import annotations
@@ -30,100 +30,102 @@ from solvers.compiled.kernels import (
     radius_of,
     rhs,
     row_of,
-    slide_of,
     slider_of,
+    xi_and_rate_at,
 )
 from solvers.compiled.sliding import begin_slider, end_slider, normal_force, renew_slider, slopes_of
 from solvers.compiled.state import LAST_EVENT, T
 from solvers.exponential.circles.derivative import change_of, explicit_change, is_parameter, row_change
 from solvers.exponential.circles.friction import (
-    WAYS,
+    NODE_XI,
     count_of,
+    friction_by_normal,
+    friction_by_xi,
+    row_directions,
     row_slopes,
     rubbing_forces,
-    share_of,
-    slide_at_nodes,
-    spring_of,
-    ways_of,
+    xi_and_rate_at_nodes,
 )
 from solvers.exponential.contact.nodes import S
 from solvers.problem.friction import CODE, FREE, SLIDER, STIFFNESS
 
-_OF_SLIDER = 1  # place of s among what is latched
+_OF_SLIDER = 1  # index of s among the latched numbers of an element
 
 
 @inlined
-def _place(problem, s):
-    """Where ds of element s stands among the derivatives of what is latched."""
+def _latched_place(problem, s):
+    """Index of ds of element s in ``derivatives.latched``."""
     return s * problem.latched.shape[1] + _OF_SLIDER
 
 
 @inner
-def way_change(problem, variation, derivatives, x, c, s, t):
+def xi_change(problem, variation, derivatives, x, c, s, t):
     """Change of ξ in the state x at fixed time, in column c."""
     first, size, change, y = row_of(problem, s), 2 * problem.k.size, 0.0, derivatives.y[c]
     u = dot(problem.read[first], x, size) - problem.gap[first]
     w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
     for a in range(count_of(problem, s)):
-        change += ways_of(problem, s, u, w, a)[1] * row_change(problem, variation, derivatives, y, c, first + a, 0, t)
+        change += row_directions(problem, s, u, w, a)[1] * row_change(
+            problem, variation, derivatives, y, c, first + a, 0, t
+        )
     return change
 
 
 @inner
-def _keep_together(problem, ahead, behind, variation, s):
-    """The laws ahead and behind have latched the same."""
+def _copy_slider(problem, ahead, behind, variation, s):
+    """Copy the slider's code and place to the laws ahead and behind."""
     if variation.law_step > 0.0:
-        own, one, other = slider_of(problem, s), slider_of(ahead, s), slider_of(behind, s)
-        one[CODE], one[SLIDER] = own[CODE], own[SLIDER]
-        other[CODE], other[SLIDER] = own[CODE], own[SLIDER]
+        slider, one, other = slider_of(problem, s), slider_of(ahead, s), slider_of(behind, s)
+        one[CODE], one[SLIDER] = slider[CODE], slider[SLIDER]
+        other[CODE], other[SLIDER] = slider[CODE], slider[SLIDER]
 
 
 @inner
 def latch_begin(problem, ahead, behind, past, derivatives, variation, s):
-    """What the slider of a contact has latched as it began; its time has changed by ``derivatives.shift``."""
-    t, place, own, explicit = past.now[T], _place(problem, s), slider_of(problem, s), 0.0
-    speed = slide_of(problem, s, t, past.x)[1]
+    """Changes of s as latched at the begin of a contact, whose time changes by ``derivatives.shift``."""
+    t, place, slider, explicit = past.now[T], _latched_place(problem, s), slider_of(problem, s), 0.0
+    xi_rate = xi_and_rate_at(problem, s, t, past.x)[1]
     if variation.law_step > 0.0:
-        explicit = slide_of(ahead, s, t, past.x)[0] - slide_of(behind, s, t, past.x)[0]
+        explicit = xi_and_rate_at(ahead, s, t, past.x)[0] - xi_and_rate_at(behind, s, t, past.x)[0]
         explicit /= 2.0 * variation.law_step
     for c in range(derivatives.y.shape[0]):
-        found = way_change(problem, variation, derivatives, past.x, c, s, t) + speed * derivatives.shift[c, s]
-        found += explicit if is_parameter(variation, derivatives, c) else 0.0
-        derivatives.latched[c, place] = found if own[CODE] == 0.0 else 0.0
-    _keep_together(problem, ahead, behind, variation, s)
+        change = xi_change(problem, variation, derivatives, past.x, c, s, t) + xi_rate * derivatives.shift[c, s]
+        change += explicit if is_parameter(variation, derivatives, c) else 0.0
+        derivatives.latched[c, place] = change if slider[CODE] == 0.0 else 0.0
+    _copy_slider(problem, ahead, behind, variation, s)
 
 
 @inner
 def begin_rubbing(problem, ahead, behind, past, derivatives, variation, s):
-    """A contact begins."""
+    """Begin the slider of a contact and the derivative of its place."""
     begin_slider(problem, s, past.now[T], past.x, past.entry_rate[s], False)
     latch_begin(problem, ahead, behind, past, derivatives, variation, s)
 
 
 @inner
 def end_rubbing(problem, ahead, behind, derivatives, variation, s):
-    """A contact ends, and with it its slider."""
+    """End the slider of a contact; the derivative of its place is zero."""
     end_slider(problem, s)
     for c in range(derivatives.y.shape[0]):
-        derivatives.latched[c, _place(problem, s)] = 0.0
-    _keep_together(problem, ahead, behind, variation, s)
+        derivatives.latched[c, _latched_place(problem, s)] = 0.0
+    _copy_slider(problem, ahead, behind, variation, s)
 
 
 @inner
-def _place_of_slider(problem, s, entry_rate, segment, t, x):
-    """ξ - F_t/k_t."""
-    own, way = slider_of(problem, s), slide_of(problem, s, t, x)[0]
+def _slider_place(problem, s, entry_rate, segment, t, x):
+    """ξ - F_t/k_t, m: the place of a slider that would stick now."""
+    slider, xi = slider_of(problem, s), xi_and_rate_at(problem, s, t, x)[0]
     normal = normal_force(problem, s, segment, entry_rate, *indentation_and_rate(problem, s, x))
-    return way - friction_force(radius_of(problem, s), own, way, normal) / own[STIFFNESS]
+    return xi - friction_force(radius_of(problem, s), slider, xi, normal) / slider[STIFFNESS]
 
 
 @inner
-def _by_law(problem, ahead, behind, past, variation, s):
+def _changes_by_parameter(problem, ahead, behind, past, variation, s):
     """Changes of N and of ξ - F_t/k_t at fixed motion per unit of a parameter of the laws."""
     if variation.law_step == 0.0:
         return 0.0, 0.0
     entry, segment, t, x, width = past.entry_rate[s], past.segment[s], past.now[T], past.x, 2.0 * variation.law_step
-    place = _place_of_slider(ahead, s, entry, segment, t, x) - _place_of_slider(behind, s, entry, segment, t, x)
+    place = _slider_place(ahead, s, entry, segment, t, x) - _slider_place(behind, s, entry, segment, t, x)
     delta, rate = indentation_and_rate(problem, s, x)
     pressed = normal_force(ahead, s, segment, entry, delta, rate)
     return (pressed - normal_force(behind, s, segment, entry, delta, rate)) / width, place / width
@@ -131,95 +133,107 @@ def _by_law(problem, ahead, behind, past, variation, s):
 
 @inner
 def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
-    """Stick, slip or the freedom of a slider ends; where it sticks from then on, s is latched.
+    """Cross border j of a slider: renew it, and its derivative ds if it sticks from then on.
 
-    Where slip ends dt* is that of the event which ended it, if one did; where N begins to grow, ds = dξ + ξ̇ dt* with
+    Where slip ends, dt* is that of the event which ended it, if one did; where N begins to grow, ds = dξ + ξ̇ dt* with
     dt* = -dN/Ṅ.
     """
-    t, own, entry = past.now[T], slider_of(problem, s), past.entry_rate[s]
+    t, slider, entry = past.now[T], slider_of(problem, s), past.entry_rate[s]
     rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
-    was, share, by_law = own[CODE], share_of(own) / own[STIFFNESS], _by_law(problem, ahead, behind, past, variation, s)
+    code_before, share, by_law = (
+        slider[CODE],
+        friction_by_normal(slider) / slider[STIFFNESS],
+        _changes_by_parameter(problem, ahead, behind, past, variation, s),
+    )
     delta, rate = indentation_and_rate(problem, s, past.x)
     acceleration = acceleration_of(problem, s, past.x, derivatives.rate[0])
     normal_force(problem, s, past.segment[s], entry, delta, rate)
     by_delta, by_rate, by_entry = slopes_of(problem, s, entry)
-    growing, speed = by_delta * rate + by_rate * acceleration, slide_of(problem, s, t, past.x)[1]
+    normal_rate, xi_rate = by_delta * rate + by_rate * acceleration, xi_and_rate_at(problem, s, t, past.x)[1]
     out = derivatives.batch[5:8]
     renew_slider(problem, s, j, entry, past.segment[s], t, past.x, derivatives.rate[0], out)
     for c in range(derivatives.y.shape[0]):
-        pressed = by_delta * change_of(problem, variation, derivatives, past.x, c, s, 0, t)
-        pressed += by_rate * change_of(problem, variation, derivatives, past.x, c, s, 1, t)
-        pressed += by_entry * derivatives.entry[c, s]
-        found = way_change(problem, variation, derivatives, past.x, c, s, t) - share * pressed
+        normal_change = by_delta * change_of(problem, variation, derivatives, past.x, c, s, 0, t)
+        normal_change += by_rate * change_of(problem, variation, derivatives, past.x, c, s, 1, t)
+        normal_change += by_entry * derivatives.entry[c, s]
+        change = xi_change(problem, variation, derivatives, past.x, c, s, t) - share * normal_change
         if is_parameter(variation, derivatives, c):
-            pressed, found = pressed + by_law[0], found + by_law[1]
-        if was == FREE:
-            found -= speed * pressed / growing if growing != 0.0 else 0.0
+            normal_change, change = normal_change + by_law[0], change + by_law[1]
+        if code_before == FREE:
+            change -= xi_rate * normal_change / normal_rate if normal_rate != 0.0 else 0.0
         elif past.now[LAST_EVENT] == t:
-            found += (speed - share * growing) * derivatives.shift[c, problem.law.size]
-        derivatives.latched[c, _place(problem, s)] = found if own[CODE] == 0.0 else 0.0
-    _keep_together(problem, ahead, behind, variation, s)
+            change += (xi_rate - share * normal_rate) * derivatives.shift[c, problem.law.size]
+        derivatives.latched[c, _latched_place(problem, s)] = change if slider[CODE] == 0.0 else 0.0
+    _copy_slider(problem, ahead, behind, variation, s)
 
 
 @inner
-def keep_ways(problem, scratch, s):
-    """∂δ/∂y and ∂ξ/∂y of the rows at the nodes, before the motion there gives way to its changes."""
+def store_row_directions(problem, scratch, s):
+    """Store ∂δ/∂y and ∂ξ/∂y of the rows at the nodes before ``scratch.motion`` is overwritten by changes."""
     first = row_of(problem, s)
     for i in range(S):
         u, w = scratch.motion[first, 0, i], scratch.motion[first + 1, 0, i]
         for a in range(count_of(problem, s)):
-            press, rub = ways_of(problem, s, u, w, a)
-            scratch.row_ways[6 * s + 2 * a, i], scratch.row_ways[6 * s + 2 * a + 1, i] = press, rub
+            by_delta, by_xi = row_directions(problem, s, u, w, a)
+            scratch.node_directions[6 * s + 2 * a, i], scratch.node_directions[6 * s + 2 * a + 1, i] = by_delta, by_xi
 
 
 @inner
-def _forces_of_side(side, past, scratch, s, place, normals, drags):
-    """N and F_t at the nodes of a step by the laws of one side of the parameter, for the motion found."""
-    motion, slid, own, radius = scratch.motion[place], scratch.slid[s], slider_of(side, s), radius_of(side, s)
+def _forces_of_side(side, past, scratch, s, place, normals, frictions):
+    """N and F_t at the nodes by the laws of one ``side`` of the parameter, for the motion found."""
+    motion, slid, slider, radius = scratch.motion[place], scratch.slid[s], slider_of(side, s), radius_of(side, s)
     copy(motion[0], scratch.clipped, S)
     contact_forces(side, s, scratch.clipped, motion[1], past.entry_rate[s], normals)
-    slide_at_nodes(side, scratch, s)
+    xi_and_rate_at_nodes(side, scratch, s)
     for i in range(S):
-        drags[i] = friction_force(radius, own, slid[WAYS, i], normals[i])
+        frictions[i] = friction_force(radius, slider, slid[NODE_XI, i], normals[i])
 
 
 @inner
 def rubbing_by_parameter(problem, ahead, behind, tables, past, scratch, derivatives, variation, s):
-    """Forces at the nodes of a step; what N and F_t change by at fixed motion per unit of the parameter.
+    """Forces at the nodes of a step, and the changes of N and F_t at fixed motion per unit of the parameter.
 
-    The changes stand in ``derivatives.by_rows`` at the first two rows of the element.
+    The changes go to ``derivatives.by_rows`` at the first two rows of the element.
     """
     rubbing_forces(problem, tables, past, scratch, s)
-    keep_ways(problem, scratch, s)
+    store_row_directions(problem, scratch, s)
     if variation.law_step == 0.0:
         return
     first, place = row_of(problem, s), place_of(problem, s)
-    normals, drags = derivatives.by_rows[first], derivatives.by_rows[first + 1]
+    normals, frictions = derivatives.by_rows[first], derivatives.by_rows[first + 1]
     _forces_of_side(behind, past, scratch, s, place, scratch.numbers, scratch.trial)
-    _forces_of_side(ahead, past, scratch, s, place, normals, drags)
+    _forces_of_side(ahead, past, scratch, s, place, normals, frictions)
     for i in range(S):
         normals[i] = (normals[i] - scratch.numbers[i]) / (2.0 * variation.law_step)
-        drags[i] = (drags[i] - scratch.trial[i]) / (2.0 * variation.law_step)
-    slide_at_nodes(problem, scratch, s)
+        frictions[i] = (frictions[i] - scratch.trial[i]) / (2.0 * variation.law_step)
+    xi_and_rate_at_nodes(problem, scratch, s)
 
 
 @inner
 def rubbing_residual(problem, tables, scratch, derivatives, variation, node_set, level, begin, c, s, shift, place, at):
     """Right-hand sides for the changes of the forces on the rows at the nodes, in column c, into ``scratch.residual``.
 
-    The motion of the rows without the changes of forces is in ``scratch.motion``; ``at`` is where N stands.
+    ``scratch.motion`` holds the change of motion of the rows without that of the forces.
     """
-    first, m, own, slopes = row_of(problem, s), count_of(problem, s), slider_of(problem, s), scratch.row_slopes[9 * s :]
-    parameter, latched = is_parameter(variation, derivatives, c), derivatives.latched[c, _place(problem, s)]
+    first, m, slider, slopes = (
+        row_of(problem, s),
+        count_of(problem, s),
+        slider_of(problem, s),
+        scratch.row_slopes[9 * s :],
+    )
+    parameter, latched = is_parameter(variation, derivatives, c), derivatives.latched[c, _latched_place(problem, s)]
     for i in range(S):
         t = begin + tables.contact_step[level] * tables.times[node_set, i]
-        along = derivatives.entry[c, s] * scratch.slope[s, 2, i]
-        aside = share_of(own) * along - spring_of(own) * latched
+        d_normal = derivatives.entry[c, s] * scratch.slope[s, 2, i]
+        d_friction = friction_by_normal(slider) * d_normal - friction_by_xi(slider) * latched
         if parameter and variation.law_step > 0.0:
-            along, aside = along + derivatives.by_rows[first, i], aside + derivatives.by_rows[first + 1, i]
+            d_normal, d_friction = (
+                d_normal + derivatives.by_rows[first, i],
+                d_friction + derivatives.by_rows[first + 1, i],
+            )
         for a in range(m):
-            press, rub = scratch.row_ways[6 * s + 2 * a, i], scratch.row_ways[6 * s + 2 * a + 1, i]
-            change = press * along + rub * aside
+            by_delta, by_xi = scratch.node_directions[6 * s + 2 * a, i], scratch.node_directions[6 * s + 2 * a + 1, i]
+            change = by_delta * d_normal + by_xi * d_friction
             for b in range(m):
                 for d in range(2):
                     value = scratch.motion[first + b, d, i]
@@ -232,40 +246,47 @@ def rubbing_residual(problem, tables, scratch, derivatives, variation, node_set,
 
 
 @inner
-def _forces_at(problem, s, entry_rate, t, w, delta, rate, batch):
-    """N and F_t in a state of a landing."""
+def _forces_in_state(problem, s, entry_rate, t, w, delta, rate, batch):
+    """N and F_t in the state w of a landing, where δ and δ̇ are given."""
     normal = force_at(problem, s, delta, rate, entry_rate, batch)
-    return normal, friction_force(radius_of(problem, s), slider_of(problem, s), slide_of(problem, s, t, w)[0], normal)
+    return normal, friction_force(
+        radius_of(problem, s), slider_of(problem, s), xi_and_rate_at(problem, s, t, w)[0], normal
+    )
 
 
 @inner
 def add_rubbing_change(problem, ahead, behind, derivatives, variation, s, entry_rate, w, t, delta, factor, out):
-    """Add to the rates of all columns what the changes of the forces of an element do in the state w of a landing.
+    """Add the changes of an element's forces, in the state w of a landing, to the rates of all columns.
 
     The slopes of the law are in ``derivatives.batch[2:5]``.
     """
     first, m, size, batch = row_of(problem, s), count_of(problem, s), 2 * problem.k.size, derivatives.batch
     by_delta, by_rate, by_entry, rate = batch[2], batch[3], batch[4], indentation_rate(problem, s, w)
-    motion, slopes, own = derivatives.at_rows, derivatives.turned, slider_of(problem, s)
-    pressed, rubbed = 0.0, 0.0
+    motion, slopes, slider = derivatives.at_rows, derivatives.turned, slider_of(problem, s)
+    normal_by_parameter, friction_by_parameter = 0.0, 0.0
     if variation.law_step > 0.0:
-        pressed, rubbed = _forces_at(ahead, s, entry_rate, t, w, delta, rate, batch[5:8])
-        press, rub = _forces_at(behind, s, entry_rate, t, w, delta, rate, batch[5:8])
-        pressed, rubbed = (pressed - press) / (2.0 * variation.law_step), (rubbed - rub) / (2.0 * variation.law_step)
-    normal, tangential = _forces_at(problem, s, entry_rate, t, w, delta, rate, batch[5:8])
+        normal_by_parameter, friction_by_parameter = _forces_in_state(
+            ahead, s, entry_rate, t, w, delta, rate, batch[5:8]
+        )
+        press, rub = _forces_in_state(behind, s, entry_rate, t, w, delta, rate, batch[5:8])
+        normal_by_parameter, friction_by_parameter = (
+            (normal_by_parameter - press) / (2.0 * variation.law_step),
+            (friction_by_parameter - rub) / (2.0 * variation.law_step),
+        )
+    normal, tangential = _forces_in_state(problem, s, entry_rate, t, w, delta, rate, batch[5:8])
     for a in range(m):
         motion[a, 0, 0] = dot(problem.read[first + a], w, size) - problem.gap[first + a]
         motion[a, 1, 0] = dot(problem.read_rate[first + a], w, size)
     row_slopes(problem, s, motion, 0, rate, normal, tangential, by_delta, by_rate, slopes)
     for c in range(derivatives.y.shape[0]):
-        y, latched = derivatives.trial[c], derivatives.latched[c, _place(problem, s)]
-        along = by_entry * derivatives.entry[c, s]
-        aside = share_of(own) * along - spring_of(own) * latched
+        y, latched = derivatives.trial[c], derivatives.latched[c, _latched_place(problem, s)]
+        d_normal = by_entry * derivatives.entry[c, s]
+        d_friction = friction_by_normal(slider) * d_normal - friction_by_xi(slider) * latched
         if is_parameter(variation, derivatives, c):
-            along, aside = along + pressed, aside + rubbed
+            d_normal, d_friction = d_normal + normal_by_parameter, d_friction + friction_by_parameter
         for a in range(m):
-            press, rub = ways_of(problem, s, motion[0, 0, 0], motion[1, 0, 0], a)
-            change = press * along + rub * aside
+            press, rub = row_directions(problem, s, motion[0, 0, 0], motion[1, 0, 0], a)
+            change = press * d_normal + rub * d_friction
             for b in range(m):
                 for d in range(2):
                     moved = row_change(problem, variation, derivatives, y, c, first + b, d, t)

@@ -1,10 +1,12 @@
-"""Borders of laws with memory: where a step ends, and what the law latches there.
+"""Borders of laws with memory and of friction: where a step ends, and what is latched there.
 
-A law with memory tells by margins b_j(δ, δ̇) how far its borders are; all are positive inside the present segment. No
-step goes across a border: the step before ends near it, a landing in time ends on it by the secant rule, and there all
-borders are renewed whose margins have fallen to zero, also those of other elements that share the motion. Between two
-nodes a margin is watched where it is small, by the polynomial through points around its lowest node; a step whose nodes
-do not resolve the fast blocks keeps a distance of what these may add.
+Such a law has margins b_j(δ, δ̇), its event functions: all are positive inside the present segment, and one falls to
+zero on border j. No step crosses a border. A step tried that would is given up; a landing in the variable TIME then
+ends on the border, and there all borders are renewed, that is, their numbers latched anew, whose margins have fallen to
+zero, also those of other elements with the same motion.
+
+A margin is known at both ends and the nodes of a step. Where it is small at a node, it is also evaluated at points
+around this node. A step whose nodes do not resolve the fast blocks must keep away from zero by what these may add.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from solvers.compiled.kernels import (
     slider_of,
 )
 from solvers.compiled.parts import PASSED, part
-from solvers.compiled.renewals import margins, margins_before, margins_in, note_event, renew
+from solvers.compiled.renewals import count_event, margins, margins_before, margins_in, renew
 from solvers.compiled.sliding import DELTA, RATE
 from solvers.compiled.state import LAST_EVENT, T, rate_tolerance, surface_tolerance
 from solvers.exponential.contact.crossings import extremum
@@ -42,24 +44,24 @@ from solvers.exponential.contact.slider_margins import (
 )
 from solvers.problem.friction import CODE
 
-UNRESOLVED = -2
-_ON = 1e-9  # margin, in units of the largest of the step, at which a step counts as begun on the border
-_SAME = 1e-11  # the same for the sign of a node
-_TOGETHER = 1e-9  # part of its way at which a border counts as reached when another is landed on
-_MISSED = 1e-3  # margin, in units of the largest of the step, by which a landing may have missed its border
-_BEFORE = 1e-3  # part of a landing before its end
-_EARLY, _EARLIER, _LOOKS = 0.1, 1e-2, 6  # part of the time to the first node, next to it, and how often it is shortened
-_FURTHER = 8.0  # times as far is looked where the rates do not yet tell whether a margin rises
-_ILLINOIS = 6  # evaluations of a polynomial to its root
-_REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
-_NEAR = 0.2  # lowest node, in units of the largest margin, below which the motion between nodes is looked at
-_ENDS_NEAR = 0.5  # lower end of a landing, in the same units, below which what lies between its ends is looked at
-_CLEAR = 0.03  # the lowest margin between them, in the same units, that counts as above zero
+UNRESOLVED = -2  # in place of an element: the step is too long to tell whether a border is crossed
+_ON_BORDER = 1e-9  # margin, in units of its largest on the step, up to which the step counts as begun on the border
+_ROUNDING = 1e-11  # rounding of a margin, in the same units
+_TOGETHER = 1e-9  # margin, relative to its value at the start, at which a border counts as reached along with another
+_MISSED = 1e-3  # the most, in units of its largest, by which a margin may be negative after a landing on its border
+_SHORTLY = 1e-3  # part of a step or landing over which a margin is extrapolated by the rates at its end
+_FIRST_SHARE, _SHORTER, _MOST_SHARES = 0.1, 1e-2, 6  # shares of the time to the first node: first, ratio, number
+_LONGER = 8.0  # factor of the time of extrapolation until it is clear whether a margin rises
+_MOST_ILLINOIS = 6  # iterations for a root of the polynomial through the nodes
+_REST = 1e-14  # rate, in units of the reference speed, below which a rate at rest is rounding
+_WATCHED_BELOW = 0.2  # margin at a node, in units of the largest, below which the motion around the node is evaluated
+_CHECKED_BELOW = 0.5  # margin at an end of a landing, in the same units, below which a minimum inside is looked for
+_CLEAR = 0.03  # estimate of such a minimum, in the same units, that counts as positive
 
 
 @inner
 def margins_of(problem, state, scratch, s, t, x, out):
-    """Margins of element s in the state x at time t; returns δ and δ̇."""
+    """Write the margins of element s in the state x at time t into ``out``; returns δ and δ̇."""
     if rubs(problem, s):
         slider_margins_in(problem, state, scratch, s, t, x, 0.0, out)
         return scratch.point[0, DELTA], scratch.point[0, RATE]
@@ -68,7 +70,7 @@ def margins_of(problem, state, scratch, s, t, x, out):
 
 @inner
 def margins_later(problem, state, scratch, s, t, x, time, out):
-    """The same a time later than x, by the rates there."""
+    """The same at the time t + ``time``, to which the motion is extrapolated by its rate and acceleration in x."""
     if rubs(problem, s):
         slider_margins_in(problem, state, scratch, s, t, x, time, out)
         return
@@ -78,14 +80,14 @@ def margins_later(problem, state, scratch, s, t, x, time, out):
 
 
 @inlined
-def _is_without(problem, state, s):
-    """Whether an element has no borders by now: friction has none while the contact is open."""
+def _has_no_borders(problem, state, s):
+    """Whether an element has no borders now: none at all, or those of friction while its contact is open."""
     return problem.border_count[s] == 0 or (rubs(problem, s) and state.segment[s] == 0)
 
 
 @inlined
 def _margins_at_nodes(problem, tables, state, scratch, s, node_set, h):
-    """Margins at the nodes, into ``scratch.margin``."""
+    """Margins at the nodes of the step just tried, into ``scratch.margin``."""
     if rubs(problem, s):
         slider_margins_at_nodes(problem, tables, state, scratch, s, node_set, h)
         return
@@ -95,10 +97,11 @@ def _margins_at_nodes(problem, tables, state, scratch, s, node_set, h):
 
 @inner
 def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
-    """Margins at the nodes and at both ends of the step that has just been tried, their largest and their rounding.
+    """Margins at both ends and at the nodes of the step just tried, their largest values and their rounding.
 
-    The start is taken a rounding ahead of where it is, on the side to which the motion goes: a law that has not moved
-    yet may look at the sign of δ. It is looked at once more with rounding added to δ and to δ̇, and with their ripple.
+    The start is moved by the rounding of δ in the direction of the motion: before its first motion a law may depend on
+    the sign of δ. The margins there are evaluated again with the rounding of δ and of δ̇, and with the ripple of fast
+    blocks in δ and in δ̇; see `slider_margins.ENDS`.
     """
     if rubs(problem, s):
         slider_margins_on_step(problem, tables, state, scratch, s, node_set, level)
@@ -106,14 +109,14 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
     n, delta, rate = problem.k.size, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
     weight, alias = tables.ripple_weight[row_of(problem, s)], tables.alias[tables.kind[node_set], level]
     deltas, rates = scratch.local_motion[KNOWN, :ENDS], scratch.local_motion[KNOWN, ENDS : 2 * ENDS]
-    ahead, rounding = math.copysign(1.0, rate), surface_tolerance(problem, s, state.x)
+    direction, rounding = math.copysign(1.0, rate), surface_tolerance(problem, s, state.x)
     for i in range(ENDS):
-        deltas[i], rates[i] = delta + ahead * rounding, rate
+        deltas[i], rates[i] = delta + direction * rounding, rate
     deltas[1], rates[1] = indentation_and_rate(problem, s, scratch.x_new)
-    deltas[2] += ahead * rounding
-    rates[3] += ahead * max(rate_tolerance(problem, s, state.x), _REST * scratch.reference_speed[s])
-    deltas[4] += ahead * ripple_of(weight, alias, state.x, n)
-    rates[5] += ahead * rate_ripple_of(weight, problem.k, alias, state.x, n)
+    deltas[2] += direction * rounding
+    rates[3] += direction * max(rate_tolerance(problem, s, state.x), _REST * scratch.reference_speed[s])
+    deltas[4] += direction * ripple_of(weight, alias, state.x, n)
+    rates[5] += direction * rate_ripple_of(weight, problem.k, alias, state.x, n)
     margins(problem, state, s, ENDS, deltas, rates, scratch.ends)
     _margins_at_nodes(problem, tables, state, scratch, s, node_set, tables.contact_step[level])
     for j in range(problem.border_count[s]):
@@ -122,61 +125,62 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
         for i in range(S):
             largest = max(largest, abs(scratch.margin[S * j + i]))
         scratch.largest[s, j] = largest
-        scratch.noise[s, j] = max(_SAME * largest, 2.0 * (abs(ends[2] - ends[0]) + abs(ends[3] - ends[0])))
+        scratch.noise[s, j] = max(_ROUNDING * largest, 2.0 * (abs(ends[2] - ends[0]) + abs(ends[3] - ends[0])))
 
 
 @merged
-def _soon(problem, state, scratch, s, j, time):
-    """A margin so long after the start of the step, by the rates there."""
+def _extrapolated(problem, state, scratch, s, j, time):
+    """Margin j of element s a ``time`` after the start of the step, extrapolated from there."""
     margins_later(problem, state, scratch, s, state.now[T], state.x, time, scratch.fired)
     return scratch.fired[j]
 
 
 @inlined
-def _rises(problem, tables, state, scratch, s, j, time):
-    """Whether a margin rises at the start of the step: by the rates there, carried on and back until it is told."""
+def _rises_at_start(problem, tables, state, scratch, s, j, time):
+    """Whether a margin rises at the start of the step, by central differences over longer and longer times."""
     noise, rise = scratch.noise[s, j], 0.0
     while abs(rise) <= noise and time < tables.contact_step[0]:
-        rise = _soon(problem, state, scratch, s, j, time) - _soon(problem, state, scratch, s, j, -time)
-        time *= _FURTHER
+        rise = _extrapolated(problem, state, scratch, s, j, time) - _extrapolated(problem, state, scratch, s, j, -time)
+        time *= _LONGER
     return rise > 0.0
 
 
 @inlined
 def _falls_at_once(problem, tables, state, scratch, s, j, time):
-    """Whether a margin that begins at zero, and is below it after a time, has not been above it before.
+    """Whether a margin that begins at zero and is negative after ``time`` has not been positive in between.
 
-    The start is extrapolated over shorter and shorter times until the margin cannot be told from zero: a slider with a
-    strong dashpot slips one way, sticks, and slips the other way within a small part of a step. One that rises by less
-    than its noise and then falls, as where a slider at its limit still moves back a little, falls later.
+    It is extrapolated over shorter and shorter times until it cannot be told from zero: a slider with a strong dashpot
+    slips one way, sticks, and slips the other way within a small part of a step. One that first rises by less than its
+    noise, as where a slider at its limit still moves back a little, has not fallen at once.
     """
-    noise, share = scratch.noise[s, j], _EARLY
-    for _ in range(_LOOKS):
-        value = _soon(problem, state, scratch, s, j, share * time)
+    noise, share = scratch.noise[s, j], _FIRST_SHARE
+    for _ in range(_MOST_SHARES):
+        value = _extrapolated(problem, state, scratch, s, j, share * time)
         if value > noise:
             return False
         if value >= -noise:
-            return not _rises(problem, tables, state, scratch, s, j, time)
-        share *= _EARLIER
+            return not _rises_at_start(problem, tables, state, scratch, s, j, time)
+        share *= _SHORTER
     return True
 
 
 @inlined
-def _before_first_node(problem, state, scratch, s, j, before, time, h):
-    """Time at which a margin that goes on as the run begins falls to zero, if that is before the first node, or inf.
+def _before_first_node(problem, state, scratch, s, j, start, time, h):
+    """Time at which a margin, positive as the run begins, falls to zero before ``time``, the first node, or inf.
 
-    A law that has not moved yet has a margin by the sign of δ: it would not know of a motion to and fro. From the start
-    on that takes as long forth as back: a step shorter than what the run has lasted has nodes within.
+    A law that has not moved yet depends on the sign of δ, so that a motion out and back before the first node would
+    leave no trace at the nodes. Both take equally long: a step shorter than the run so far has a node within the way
+    back.
     """
-    if state.now[T] > h or before <= scratch.noise[s, j]:
+    if state.now[T] > h or start <= scratch.noise[s, j]:
         return np.inf
-    fall = before - _soon(problem, state, scratch, s, j, _BEFORE * time)
-    return _BEFORE * time * before / fall if fall > _BEFORE * before else np.inf
+    fall = start - _extrapolated(problem, state, scratch, s, j, _SHORTLY * time)
+    return _SHORTLY * time * start / fall if fall > _SHORTLY * start else np.inf
 
 
 @inlined
 def _polynomial(tables, scratch, s, j, node_set, sigma):
-    """The polynomial through a margin at the nodes."""
+    """Value at σ of the polynomial through margin j at the nodes."""
     value = 0.0
     lagrange(tables.nodes[node_set], tables.lagrange[node_set, 0], sigma, scratch.trial)
     for i in range(S):
@@ -185,10 +189,10 @@ def _polynomial(tables, scratch, s, j, node_set, sigma):
 
 
 @inlined
-def _by_nodes(tables, scratch, s, j, node_set, h, i, linear):
-    """Time at which that falls to zero just before node i, or the end; ``linear`` where it does not.
+def _root_before_node(tables, scratch, s, j, node_set, h, i, linear):
+    """Time at which this polynomial falls to zero between node i - 1 and node i, or the end, by the Illinois rule.
 
-    It is found by the Illinois rule. Landings of friction that begin with it take a fifth fewer tries.
+    Without a change of sign it is ``linear``. Landings of friction that begin with this time take a fifth fewer trials.
     """
     left = tables.nodes[node_set, i - 1] if i > 0 else 0.0
     right = tables.nodes[node_set, i] if i < S else 1.0
@@ -197,7 +201,7 @@ def _by_nodes(tables, scratch, s, j, node_set, h, i, linear):
     if not below < 0.0 < above:
         return linear
     middle, last = right, 0.0
-    for _ in range(_ILLINOIS):
+    for _ in range(_MOST_ILLINOIS):
         middle = right - (right - left) * below / (below - above)
         value = _polynomial(tables, scratch, s, j, node_set, middle)
         if value > 0.0:
@@ -209,69 +213,70 @@ def _by_nodes(tables, scratch, s, j, node_set, h, i, linear):
 
 
 @inlined
-def _crossing(problem, tables, state, scratch, s, j, node_set, h):
-    """Time after the start of the step at which a margin falls below zero by its values at the nodes, or inf.
+def _crossing_time(problem, tables, state, scratch, s, j, node_set, h):
+    """Time after the start of the step at which a margin falls below zero, by its values at the nodes and ends, or inf.
 
-    It is 0 where the margin is negative from the start on. One that begins at zero may have risen before the first
-    node: then a shorter step is asked for, which will tell. A landing may have missed its border by more than rounding
-    of this step: then a margin is negative at first, but little, rises, and crosses only if it falls again. A slip that
-    begins against its force, as dashpots make it, has a large one and ends at once.
+    It is 0 if the margin is negative from the start on. A margin that begins at zero may have risen before the first
+    node: then half the time to that node is returned, for a shorter step to decide. A landing may have missed its
+    border by more than the rounding of this step: then the margin begins slightly below zero and rises, and only a
+    later fall counts. Slip that begins against its own force, as dashpots can make it, has a strongly negative margin
+    and ends at once.
     """
     noise, before, t = scratch.noise[s, j], scratch.ends[ENDS * j], 0.0
-    near = max(_ON * scratch.largest[s, j], noise)
-    missed = state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0 and scratch.margin[S * j] > before
-    missed &= before > -_MISSED * scratch.largest[s, j]
-    if before < -near and not missed:
+    tolerance = max(_ON_BORDER * scratch.largest[s, j], noise)
+    overshot = state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0 and scratch.margin[S * j] > before
+    overshot &= before > -_MISSED * scratch.largest[s, j]
+    if before < -tolerance and not overshot:
         return 0.0
-    on = before <= near
+    begins_on = before <= tolerance
     for i in range(S + 1):
         value = scratch.margin[S * j + i] if i < S else scratch.ends[ENDS * j + 1]
         after = h * tables.times[node_set, i] if i < S else h
-        if value < -noise and not (missed and before < -noise and value > before):
+        if value < -noise and not (overshot and before < -noise and value > before):
             if i == 0 and before <= noise and _falls_at_once(problem, tables, state, scratch, s, j, after):
                 return 0.0
-            if on and i == 0:
+            if begins_on and i == 0:
                 return 0.5 * after
             share = max(before, 0.0) / (max(before, 0.0) - value)
-            return _by_nodes(tables, scratch, s, j, node_set, h, i, t + (after - t) * share)
+            return _root_before_node(tables, scratch, s, j, node_set, h, i, t + (after - t) * share)
         before, t = value, after
     first = h * tables.times[node_set, 0]
     return _before_first_node(problem, state, scratch, s, j, scratch.ends[ENDS * j], first, h)
 
 
 @inlined
-def _turns(a, b, c, first, second):
-    """Whether the parabola through (0, a), (first, b) and (second, c) falls from 0 on, but not down to b."""
+def _has_minimum_within(a, b, c, first, second):
+    """Whether the parabola through (0, a), (first, b), (second, c), with b > a, has its minimum between 0 and first."""
     rise, further = (b - a) / first, (c - b) / (second - first)
     return rise - (further - rise) * first / second < 0.0 < rise
 
 
 @inner
-def _between_nodes(problem, tables, state, scratch, s, j, node_set, h):
-    """The same where a margin is below zero between the nodes around one of its minima only.
+def _crossing_between_nodes(problem, tables, state, scratch, s, j, node_set, h):
+    """The same for a margin that is positive at all nodes, but negative near one of its minima between them.
 
-    The lowest margin may stand at an end of the step, as where it begins on the border; then it is looked at too if
-    the margin turns before the next node.
+    A minimum may be at an end of the step, as where that begins on the border; it counts if a parabola has its minimum
+    before the next node.
     """
     ends, values = scratch.ends[ENDS * j : ENDS * (j + 1)], scratch.margin[S * j : S * j + S]
-    near, t = _NEAR * scratch.largest[s, j], tables.times[node_set]
+    watched, t = _WATCHED_BELOW * scratch.largest[s, j], tables.times[node_set]
     for i in range(S):
         before, after = values[i - 1] if i > 0 else ends[0], values[i + 1] if i < S - 1 else ends[1]
-        low = values[i] <= min(before, after, near)
+        low = values[i] <= min(before, after, watched)
         if i == 0:
-            low |= before <= near and _turns(before, values[0], after, t[0], t[1])
+            low |= before <= watched and _has_minimum_within(before, values[0], after, t[0], t[1])
         elif i == S - 1:
-            low |= after <= near and _turns(after, values[i], before, 1.0 - t[i], 1.0 - t[i - 1])
+            low |= after <= watched and _has_minimum_within(after, values[i], before, 1.0 - t[i], 1.0 - t[i - 1])
         if low:
-            time = _dip(problem, tables, state, scratch, s, j, node_set, h, i)
+            time = _crossing_around(problem, tables, state, scratch, s, j, node_set, h, i)
             if time < np.inf:
                 return time
     return np.inf
 
 
 @inner
-def _dip(problem, tables, state, scratch, s, j, node_set, h, lowest):
-    """The same around one node."""
+def _crossing_around(problem, tables, state, scratch, s, j, node_set, h, lowest):
+    """The same in the interval around the node ``lowest`` of the step."""
     if rubs(problem, s):
         slider_margins_around(problem, tables, state, scratch, s, node_set, h, lowest)
     else:
@@ -292,8 +297,8 @@ def _dip(problem, tables, state, scratch, s, j, node_set, h, lowest):
 
 
 @inlined
-def _hides(scratch, s, j):
-    """Whether fast blocks, which the nodes do not resolve, may take a margin below zero between them."""
+def _may_be_hidden(scratch, s, j):
+    """Whether fast blocks, which the nodes do not resolve, may make a margin negative between them."""
     ends = scratch.ends[ENDS * j : ENDS * (j + 1)]
     ripple, lowest = abs(ends[4] - ends[0]) + abs(ends[5] - ends[0]), ends[1]
     for i in range(S):
@@ -303,23 +308,23 @@ def _hides(scratch, s, j):
 
 @inner
 def border_ahead(problem, tables, state, scratch, node_set, level):
-    """(time after the start of the step, element, border) of the first border on it.
+    """(time after the start of the step, element, border) of the first border that the step just tried crosses.
 
-    The element is -1 if there is none, and `UNRESOLVED` if the step is too long to tell.
+    (inf, -1, -1) if there is none, (inf, `UNRESOLVED`, -1) if the step is too long to tell.
     """
     first, element, border, h = np.inf, -1, -1, tables.contact_step[level]
     for s in range(problem.law.size):
         count = problem.border_count[s]
-        if _is_without(problem, state, s):
+        if _has_no_borders(problem, state, s):
             continue
         _margins_on_step(problem, tables, state, scratch, s, node_set, level)
         for j in range(count):
             if scratch.largest[s, j] <= scratch.noise[s, j]:
                 continue
-            time = _crossing(problem, tables, state, scratch, s, j, node_set, h)
+            time = _crossing_time(problem, tables, state, scratch, s, j, node_set, h)
             if time == np.inf:
-                time = _between_nodes(problem, tables, state, scratch, s, j, node_set, h)
-            if time == np.inf and _hides(scratch, s, j):
+                time = _crossing_between_nodes(problem, tables, state, scratch, s, j, node_set, h)
+            if time == np.inf and _may_be_hidden(scratch, s, j):
                 return np.inf, UNRESOLVED, -1
             if time < first:
                 first, element, border = time, s, j
@@ -327,20 +332,20 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
 
 
 @merged
-def _dips(problem, state, scratch, s, landed, w, x):
-    """Whether a margin of element s but the one landed on may be below zero between the states w and x.
+def _may_dip(problem, state, scratch, s, landed, w, x):
+    """Whether a margin of element s, but the ``landed`` one, may have a minimum below zero between the states w and x.
 
-    It is taken as the cubic through its values and rates, which is coarse: it must not even come near zero.
+    It is estimated by the cubic through both values and rates, which is coarse: a minimum near zero counts.
     """
     count, width, values = problem.border_count[s], state.x.size, scratch.ends
     d = x[width] - w[width]
     for end in range(2):
-        y, time = x if end else w, _BEFORE * (-d if end else d)
+        y, time = x if end else w, _SHORTLY * (-d if end else d)
         margins_of(problem, state, scratch, s, y[width], y, values[2 * end * count :])
         margins_later(problem, state, scratch, s, y[width], y, time, values[(2 * end + 1) * count :])
     for j in range(count):
         a, b = values[j], values[2 * count + j]
-        fall, rise = (values[count + j] - a) / (_BEFORE * d), (b - values[3 * count + j]) / (_BEFORE * d)
+        fall, rise = (values[count + j] - a) / (_SHORTLY * d), (b - values[3 * count + j]) / (_SHORTLY * d)
         known = j != landed and scratch.largest[s, j] > scratch.noise[s, j]
         if known and fall < 0.0 < rise and extremum(d, a, fall, b, rise) < _CLEAR * scratch.largest[s, j]:
             return True
@@ -349,66 +354,66 @@ def _dips(problem, state, scratch, s, landed, w, x):
 
 @part(PASSED, types.UniTuple(types.int64, 2), types.int64, types.int64, VECTOR, VECTOR)
 def passed(problem, state, scratch, element, border, w, x):
-    """(element, border) of the margin that has gone furthest below zero between the states w and x, or (-1, -1).
+    """(element, border) of the margin that is furthest below zero in x, relative to its value in w, or (-1, -1).
 
-    The border landed on is left out, and what has been carried over by rounding only. The element is `UNRESOLVED` if a
-    margin may have been below zero in between, or is so at the start: that border is passed before any step.
+    Left out are the border that is landed on, and margins negative by rounding only. (`UNRESOLVED`, -1) is returned if
+    a margin may have been negative in between, or is so in w: then its border is crossed before any step.
     """
-    worst, found, which, dips = -_TOGETHER, -1, -1, False
+    worst, found, number, may_dip = -_TOGETHER, -1, -1, False
     for s in range(problem.law.size):
         count, size = problem.border_count[s], state.x.size
-        if _is_without(problem, state, s) or (s == element and count == 1):
+        if _has_no_borders(problem, state, s) or (s == element and count == 1):
             continue
         margins_of(problem, state, scratch, s, w[size], w, scratch.ends)
         margins_of(problem, state, scratch, s, x[size], x, scratch.margin)
-        near = False
+        close = False
         for j in range(count):
             if s == element and j == border:
                 continue
-            near |= min(scratch.ends[j], scratch.margin[j]) < _ENDS_NEAR * scratch.largest[s, j]
-            dips |= scratch.ends[j] < -max(scratch.noise[s, j], _MISSED * scratch.largest[s, j])
+            close |= min(scratch.ends[j], scratch.margin[j]) < _CHECKED_BELOW * scratch.largest[s, j]
+            may_dip |= scratch.ends[j] < -max(scratch.noise[s, j], _MISSED * scratch.largest[s, j])
             if scratch.margin[j] >= -scratch.noise[s, j]:
                 continue
             share = scratch.margin[j] / max(scratch.ends[j], scratch.noise[s, j])
             if share < worst:
-                worst, found, which = share, s, j
-        dips |= near and _dips(problem, state, scratch, s, border if s == element else -1, w, x)
-    return (UNRESOLVED, -1) if dips and found < 0 else (found, which)
+                worst, found, number = share, s, j
+        may_dip |= close and _may_dip(problem, state, scratch, s, border if s == element else -1, w, x)
+    return (UNRESOLVED, -1) if may_dip and found < 0 else (found, number)
 
 
 @inlined
-def _know_rate(problem, state, scratch, s):
-    """The rate of the state, where a slider that sticks needs it: one at rest begins to slip by its acceleration."""
+def _update_rate(problem, state, scratch, s):
+    """Update ``state.rate`` where renewal needs it: a slider that sticks at rest begins to slip by its acceleration."""
     if rubs(problem, s) and slider_of(problem, s)[CODE] == 0.0:
         rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, scratch.trial)
 
 
 @inner
 def renew_border(problem, state, scratch, element, border):
-    """Renew one border in the present state."""
+    """Latch in the present state what one border of an element asks for."""
     delta, rate = margins_of(problem, state, scratch, element, state.now[T], state.x, scratch.margin)
-    _know_rate(problem, state, scratch, element)
+    _update_rate(problem, state, scratch, element)
     renew(problem, state, element, border, delta, rate)
-    note_event(state)
+    count_event(state)
 
 
 @inner
 def renew_all(problem, state, scratch, element, border):
-    """Renew the border landed on, and all whose margins fell to zero with it since ``scratch.stages[START]``.
+    """Latch in the present state what the border landed on, and all borders reached together with it, ask for.
 
-    Which ones is judged from the state alone, before any is renewed; of the same law the margins are read again after
-    each: another border of the same segment may be none of the next one. One that began at zero, as after its own
-    renewal, has risen and come back if its margin was above zero just before.
+    Reached are those whose margins were positive in ``scratch.stages[START]``, or shortly before the end, and are zero
+    now. This is judged by the state before anything is latched. After each renewal the margins of the same law are
+    evaluated again: another border of its old segment may not exist in the new one.
     """
     size = state.x.size
     delta, rate = margins_of(problem, state, scratch, element, state.now[T], state.x, scratch.margin)
     missed = 2.0 * abs(scratch.margin[border]) / scratch.largest[element, border]
-    time = _BEFORE * (state.now[T] - scratch.stages[START, size])
+    time = _SHORTLY * (state.now[T] - scratch.stages[START, size])
     for s in range(problem.law.size):
         count = problem.border_count[s]
-        if _is_without(problem, state, s):
+        if _has_no_borders(problem, state, s):
             continue
-        _know_rate(problem, state, scratch, s)
+        _update_rate(problem, state, scratch, s)
         if s == element and count == 1:
             renew(problem, state, s, border, delta, rate)
             continue
@@ -417,13 +422,13 @@ def renew_all(problem, state, scratch, element, border):
         margins_later(problem, state, scratch, s, state.now[T], state.x, -time, just_before)
         depth, speed = margins_of(problem, state, scratch, s, state.now[T], state.x, scratch.margin)
         for j in range(count):
-            before, near = max(begun[j], just_before[j]), max(scratch.noise[s, j], missed * scratch.largest[s, j])
-            near = max(near, _TOGETHER * before)
-            landed = (s == element and j == border) or (before > near and scratch.margin[j] <= near)
-            scratch.fired[j] = max(near, scratch.margin[j]) if landed else -np.inf
+            before, rounding = max(begun[j], just_before[j]), max(scratch.noise[s, j], missed * scratch.largest[s, j])
+            rounding = max(rounding, _TOGETHER * before)
+            landed = (s == element and j == border) or (before > rounding and scratch.margin[j] <= rounding)
+            scratch.fired[j] = max(rounding, scratch.margin[j]) if landed else -np.inf
         for j in range(count):
             if scratch.fired[j] >= scratch.margin[j]:
                 renew(problem, state, s, j, depth, speed)
                 if not rubs(problem, s):
                     margins_of(problem, state, scratch, s, state.now[T], state.x, scratch.margin)
-    note_event(state)
+    count_event(state)

@@ -4,21 +4,22 @@ On a step of length h the unknowns are the forces at S nodes of every stop in co
 
     δ(t_i) = free response + Σ_u Σ_j C_ij F_uj,   the same for δ̇,   F_sj ← law_s(δ(t_j), δ̇(t_j))
 
-iterated from the extrapolated polynomial of the step before. The state at the end is E(h) y + Σ kick F. The first
-step of a law with broken powers of δ uses t = h σ^κ and F = σ^λ g(σ), which restores full order at the singular start
-(see `nodes`); the last one, onto δ = 0, is one Runge–Kutta step in δ^{1/κ} (see `landing`).
+The iteration begins with the extrapolated polynomial of the step before. The state at the end is the free response plus
+the response to the forces. The first step of a law with broken powers of δ uses t = h σ^κ and F = σ^λ g(σ), which
+restores full order at the singular start (see `nodes`); the last one, onto δ = 0, is a Runge–Kutta step in δ^{1/κ} (see
+`landing`).
 
 Error estimate: let A₁ be the larger of the last two Jacobi coefficients of the force, in size, and A₂ the larger of the
 two before them. The part of the force that the polynomial leaves out is estimated by A₁ max((A₁/A₂)^{S/2}, A₁/F_max).
 Its effect on the indentation rate of every stop, in contact or not, is compared with rtol × the reference speed of that
-stop. The stop's own dashpot damps it on the way to the end of the step, less if the stop is being left. Added to it
-are the oscillation of modes too fast for the nodes, and the part of the sampled signals that their polynomials leave
-out; all nodes of their tables are looked at, which may be more than those of the step. A kink of the law between an end
-of the step and the nearest node does not show in the coefficients; there the law is compared with the polynomial.
+stop. The stop's own dashpot damps this error up to the end of the step, less if the stop is being left. Added are the
+oscillation of modes too fast for the nodes, and the part of the sampled signals that their polynomials leave out, for
+which all nodes of their tables are compared. A kink of the law between an end of the step and the nearest node does not
+show in the coefficients; there the law is compared with the polynomial.
 
-What a light element takes from a heavy structure is lost in that error. Where the slope of a law with memory changes on
-the step, the part left out must also be below 10 rtol of the largest force, or what rounding of δ and δ̇ makes of it.
-Where the slope is constant the force is as exact as the motion.
+In this error, what a light element takes from a heavy structure is lost. So, where the slope of a law with memory
+changes on the step, the part left out must also be below 10 rtol of the largest force, or below the rounding of the
+force. Where the slope is constant, the force is as exact as the motion.
 """
 
 from __future__ import annotations
@@ -72,13 +73,13 @@ from solvers.exponential.contact.nodes import S
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 from solvers.problem.friction import STIFFNESS as FRICTION_STIFFNESS
 
-_AT_END, _WITHIN = 1.5e-19, 2.7e-11  # errors of a step in ẍ = -ω² x, over (ωh)^17 and, at any point, (ωh)^9; ωh < 6
-_FADED, _MOST = 100.0, 1e5  # e^-100; radians of a run that are resolved, in some 25 000 steps
+_END_ERROR, _INNER_ERROR = 1.5e-19, 2.7e-11  # of ẍ = -ω² x: at the end, over (ωh)^17; inside, over (ωh)^9; ωh < 6
+_FADED, _MOST_RADIANS = 100.0, 1e5  # e^-100 counts as zero; more radians in a run take over 25 000 steps
 
 
 @merged
-def _alone(problem, tables, state):
-    """The stop in contact if it is the only one, on a line, and its law is a power law of the tables, else -1."""
+def _single_power_law(problem, tables, state):
+    """The stop in contact, if it is the only one, on a line, frictionless, with a tabulated power law; else -1."""
     alone, count = -1, 0
     for s in range(state.segment.size):
         if state.segment[s] > 0:
@@ -90,7 +91,10 @@ def _alone(problem, tables, state):
 
 @merged
 def _iterate(problem, tables, state, scratch, node_set, level):
-    """One iteration for the forces of all stops in contact; Σ change² and Σ force² in units of their tolerance."""
+    """One fixed-point iteration for the forces of all stops in contact.
+
+    Returns Σ change² and Σ force² over the nodes, in units of `Scratch.force_tolerance`.
+    """
     change, largest = 0.0, 0.0
     respond_all(problem, tables, state, scratch, node_set, level)
     for s in range(problem.law.size):
@@ -105,19 +109,22 @@ def _iterate(problem, tables, state, scratch, node_set, level):
 
 @merged
 def _set_accuracy(problem, tables, state, scratch, h):
-    """Tolerance of each stop's force, N: it changes no indentation rate by more than a twentieth of its tolerance.
+    """Set each stop's force tolerance, N: it changes no indentation rate by more than a twentieth of its tolerance.
 
-    Returns whether a dashpot is so strong that iterations would diverge, by its slope in the last Newton iteration.
+    Returns whether a dashpot is so strong that the fixed-point iteration would diverge, by its slope in the last Newton
+    iteration.
     """
     stiff = False
     for s in range(problem.law.size):
         if state.segment[s] > 0:
-            most = 1e-300
+            sensitivity = 1e-300
             for u in range(row_of(problem, s), row_of(problem, s + 1)):
                 for r in range(problem.gap.size):
-                    most = max(most, abs(tables.accelerance[r, u]) / scratch.reference_speed[element_of(problem, r)])
+                    sensitivity = max(
+                        sensitivity, abs(tables.accelerance[r, u]) / scratch.reference_speed[element_of(problem, r)]
+                    )
                 copy(scratch.force[u], scratch.guess[u], S)
-            scratch.force_tolerance[s] = 0.05 * scratch.accuracy[RTOL] / (h * most)
+            scratch.force_tolerance[s] = 0.05 * scratch.accuracy[RTOL] / (h * sensitivity)
             stiff |= h * own_accelerance(problem, tables, s) * scratch.viscous[s] > 1.0
     for s in range(problem.law.size if not stiff else 0):
         scratch.viscous[s] = 0.0
@@ -126,18 +133,19 @@ def _set_accuracy(problem, tables, state, scratch, h):
 
 @inlined
 def _is_last(change, before):
-    """Whether the changes still to come add up to less than the tolerance, by the last two: with r their ratio, within
-    [1/20, 0.9], the sum is change r/(1 - r).
+    """Whether the changes still to come add up to less than the tolerance, 1.
+
+    With r the ratio of the last two changes, within [1/20, 0.9], the sum is change r/(1 - r).
     """
     return change * change <= max(before - change, change / 9.0)
 
 
 @part(SOLVE, types.boolean, types.int64, types.int64)
 def solve_forces(problem, tables, state, scratch, node_set, level):
-    """Solve for the forces by fixed-point iteration, else by Newton's method; returns whether a solution was found."""
+    """Solve for the forces by fixed-point iteration, else by Newton's method; returns whether this has converged."""
     if _set_accuracy(problem, tables, state, scratch, tables.contact_step[level]):
         return newton(problem, tables, state, scratch, node_set, level)
-    before, alone = 0.0, _alone(problem, tables, state)
+    before, alone = 0.0, _single_power_law(problem, tables, state)
     law, unit = tables.power_law[max(alone, 0)], 1.0 / scratch.force_tolerance[max(alone, 0)] ** 2
     row = row_of(problem, max(alone, 0))
     own = pair_response(problem, tables, scratch, node_set, level, row, row)
@@ -156,7 +164,7 @@ def solve_forces(problem, tables, state, scratch, node_set, level):
         if not change < np.inf:
             break
         if iteration == 0:
-            before = change / 0.09  # the usual ratio of two changes is 0.3
+            before = change / 0.09  # a usual ratio of two changes, 0.3, squared
         if change <= 1e-27 * largest or (change <= 400.0 and _is_last(math.sqrt(change), math.sqrt(before))):
             return True
         if iteration > 2 and change > 0.36 * before:
@@ -168,8 +176,8 @@ def solve_forces(problem, tables, state, scratch, node_set, level):
 
 
 @merged
-def _largest(problem, tables, state, scratch, s):
-    """Largest force of a stop on the step, N, and its stiffness there, N/m."""
+def _largest_force(problem, tables, state, scratch, s):
+    """Largest force of a stop on the step, N, and its stiffness ∂F/∂δ there, N/m."""
     force, motion = force_of(problem, scratch, s), motion_of(problem, scratch, s)
     if problem.knots[s, 0] == 0.0:
         largest = max(largest8(load8(force, 0)), 0.0)
@@ -181,16 +189,17 @@ def _largest(problem, tables, state, scratch, s):
 
 
 @inlined
-def _bends(slope, largest):
-    """Whether a slope of a law changes on the step; else the force is as exact as the motion, and so is its work."""
+def _slope_changes(slope, largest):
+    """Whether a slope of the law changes on the step; otherwise its force and work are as exact as the motion."""
     return largest8(load8(slope, 0)) - least8(load8(slope, 0)) > STRAIGHT * largest
 
 
 @part(ERROR, REAL, types.int64, types.int64)
 def step_error(problem, tables, state, scratch, node_set, level):
-    """Largest error of an indentation rate by the unresolved part of the forces, in units of the stop's tolerance.
+    """Largest error of an indentation rate over the step just solved, in units of its tolerance rtol × speed.
 
-    On an entry step the nodes are those of Gauss's rule for the stop that enters, not for the others.
+    On an entry step the nodes are those of Gauss's rule for the stop that enters, not for the others, whose forces are
+    estimated at half the order.
     """
     n, h, worst = problem.k.size, tables.contact_step[level], 0.0
     for u in range(problem.gap.size):
@@ -201,7 +210,7 @@ def step_error(problem, tables, state, scratch, node_set, level):
         if is_circle(problem, s) and u == row_of(problem, s):
             own = place_of(problem, s)
             combine(tables.summary[node_set], scratch.law_force[own], S, None, scratch.summary[own])
-        largest, stiffness = _largest(problem, tables, state, scratch, s)
+        largest, stiffness = _largest_force(problem, tables, state, scratch, s)
         if node_set == 0 or s == node_set - 1:
             unresolved = unresolved_part(scratch.summary[u], largest, S // 2)
         else:
@@ -213,10 +222,10 @@ def step_error(problem, tables, state, scratch, node_set, level):
             continue
         if node_set == 0 and problem.border_count[s] > 0 and problem.knots[s, 0] < 0.0:
             viscous = largest_size(scratch.slope[s, 1])
-            if _bends(scratch.slope[s, 0], stiffness) or _bends(scratch.slope[s, 1], viscous):
+            if _slope_changes(scratch.slope[s, 0], stiffness) or _slope_changes(scratch.slope[s, 1], viscous):
                 worst = max(worst, error_of_work(problem, state, scratch, s, unresolved, largest, (stiffness, viscous)))
         ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
-        damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # across a circle's radius nothing damps
+        damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # nothing damps motion across a radius
         if rubs(problem, s):
             damped, stiffness = False, max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
         span = h * _undamped_part(problem, tables, scratch, node_set, h, s) if damped else h
@@ -224,7 +233,7 @@ def step_error(problem, tables, state, scratch, node_set, level):
     _sum_errors(problem, tables, scratch, node_set, state.now[T], h)
     for r in range(problem.gap.size):
         speed = scratch.reference_speed[element_of(problem, r)]
-        if r < row_of(problem, element_of(problem, r)) + 2:  # how fast a place turns is no measure of its friction
+        if r < row_of(problem, element_of(problem, r)) + 2:  # the third row, of rotation, keeps the reference speed
             speed = max(speed, largest_size(scratch.motion[r, 1]))
         error = scratch.per_row[r] / (scratch.accuracy[RTOL] * speed)
         if not error <= worst:
@@ -232,18 +241,18 @@ def step_error(problem, tables, state, scratch, node_set, level):
             if error != error:
                 return worst
     if state.event_record.shape[0]:
-        worst = max(worst, _error_of_derivative(problem, tables, state, scratch, h))
+        worst = max(worst, _derivative_error(problem, tables, state, scratch, h))
     return worst
 
 
 @merged
-def _error_of_derivative(problem, tables, state, scratch, h):
-    """Error of a derivative by a step too long for what the contacts stiffen, in units of the tolerance.
+def _derivative_error(problem, tables, state, scratch, h):
+    """Error of the derivative of a step, in units of rtol: the step must resolve what the contacts stiffen.
 
-    A motion at rest, or slow, lets steps grow; its neighbours are shaken. Collocation at eight nodes of Gauss takes
-    ẍ = -ω² x over a step with an error of 1.5e-19 (ωh)^17, to a point within, as where the run ends, of 2.7e-11 (ωh)^9;
-    and ẍ = -c ẋ with less than that for ω = c. What so strong a dashpot has damped away since the last event that it
-    would take too many steps is left alone: only its way back, at k/c, counts.
+    A motion at rest, or slow, lets steps grow, but neighbouring motions oscillate. Collocation at eight nodes of Gauss
+    solves ẍ = -ω² x over a step with an error of 1.5e-19 (ωh)^17, and up to a point inside, where the run may end, of
+    2.7e-11 (ωh)^9; ẍ = -c ẋ with less than that for ω = c. A strong dashpot that would take too many steps is ignored
+    once its motion has decayed since the last event; then only the slow decay rate k/c counts.
     """
     square, out, since = 0.0, scratch.local_motion[FORCES], state.now[T] - max(state.now[LAST_EVENT], 0.0)
     for s in range(problem.law.size):
@@ -259,36 +268,36 @@ def _error_of_derivative(problem, tables, state, scratch, h):
         if rubs(problem, s):
             stiffness = max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
         stiffness, damping = stiffness * mobility, largest_size(slopes[1]) * mobility
-        faded = damping**2 > 4.0 * stiffness and damping * since > _FADED and damping * state.now[T_END] > _MOST
+        faded = damping**2 > 4.0 * stiffness and damping * since > _FADED and damping * state.now[T_END] > _MOST_RADIANS
         square += (stiffness / damping if faded else math.sqrt(stiffness) + damping) ** 2
     scratch.stiffened[0] = math.sqrt(square)
     angle = scratch.stiffened[0] * h
-    error = _WITHIN * angle**9 if state.now[T] + h >= state.now[T_END] else _AT_END * angle**17
+    error = _INNER_ERROR * angle**9 if state.now[T] + h >= state.now[T_END] else _END_ERROR * angle**17
     return error / scratch.accuracy[RTOL]
 
 
 @merged
 def _undamped_part(problem, tables, scratch, node_set, h, s):
-    """Part of a step from which errors of a rate reach its end past the stop's dashpot.
+    """Part of the step, 0 to 1, over which errors of a rate survive the stop's dashpot up to the end.
 
         ∫ exp(-∫ d dσ') dσ, the inner integral from σ to 1, d = h × accelerance × slope of the law by the rate,
 
-    d constant around each node. The last nodes decide: the dashpot of a stop that is left fades.
+    with d constant around each node. The last nodes decide; the dashpot of a stop that is being left vanishes there.
     """
-    part, left, accelerance = 0.0, 1.0, own_accelerance(problem, tables, s)
+    part, transmitted, accelerance = 0.0, 1.0, own_accelerance(problem, tables, s)
     for k in range(S):
         i = S - 1 - k
         share = tables.plain[node_set, i]
         damped = share * h * accelerance * max(scratch.slope[s, 1, i], 0.0)
-        stays = math.exp(-damped)
-        part += left * share * ((1.0 - stays) / damped if damped > 1e-6 else 1.0)
-        left *= stays
+        factor = math.exp(-damped)
+        part += transmitted * share * ((1.0 - factor) / damped if damped > 1e-6 else 1.0)
+        transmitted *= factor
     return part
 
 
 @merged
 def _sum_errors(problem, tables, scratch, node_set, t, h):
-    """Errors of the rates of all rows, m/s, by the unresolved parts of forces and signals, into ``per_row``."""
+    """Errors of the rates of all rows, m/s, by unresolved forces and signals, into ``scratch.per_row``."""
     rows, error = problem.gap.size, scratch.per_row
     for r in range(rows):
         error[r] = 0.0
@@ -304,10 +313,10 @@ def _sum_errors(problem, tables, scratch, node_set, t, h):
 
 @merged
 def _hidden_kink(problem, state, scratch, s, largest):
-    """Difference, N, of law and polynomial at an end of a smooth step, where the last coefficients are smaller.
+    """Largest difference, N, of law and polynomial at the ends of a smooth step; 0 if the coefficients explain it.
 
-    Then the law has a kink between that end and the next node, within a fiftieth of the step, as with clamp=True; or it
-    saturates within that time, as hysteresis of a knee that is small beside the motion does after a border.
+    Otherwise the law has a kink between that end and the next node, within a fiftieth of the step, as with clamp=True;
+    or it saturates within that time, as hysteresis of a knee that is small beside the motion does after a border.
     """
     delta, rate = scratch.clipped[0:2], scratch.trial[0:2]
     delta[0], rate[0] = indentation_and_rate(problem, s, scratch.x_new)
@@ -315,13 +324,13 @@ def _hidden_kink(problem, state, scratch, s, largest):
     rate[1] = indentation_rate(problem, s, state.x)
     contact_forces(problem, s, delta, rate, state.entry_rate[s], scratch.trial[2:4])
     c = scratch.summary[place_of(problem, s)]
-    apart = max(abs(scratch.trial[2] - c[5]), abs(scratch.trial[3] - c[4]))
-    return apart if apart > 2.0 * max(abs(c[2]), abs(c[3])) + 1e-12 * largest else 0.0
+    difference = max(abs(scratch.trial[2] - c[5]), abs(scratch.trial[3] - c[4]))
+    return difference if difference > 2.0 * max(abs(c[2]), abs(c[3])) + 1e-12 * largest else 0.0
 
 
 @inner
 def end_state(problem, tables, state, scratch, node_set, level):
-    """State at the end of the step, into ``scratch.x_new``."""
+    """Write the block coordinates at the end of the step into ``scratch.x_new``."""
     x, n = scratch.x_new, problem.k.size
     if uses_blocks(tables):
         for e in range(2 * n):

@@ -1,13 +1,13 @@
-"""Events within a step in contact: a stop passes a border of its segment of the law, or a bend of the law.
+"""Events within a step in contact: whether a stop leaves its segment of the law, or crosses a bend of the law.
 
-The borders of all stops are checked, those out of contact included. Between two points of a step δ is taken as the
-cubic through both values and rates, around the highest node of a stop out of contact as in `peaks`; such a stop must
-also keep the distance of the ripple that fast modes may have between the nodes. With many stops, one that cannot reach
-its surface by a bound of |δ̈| is not checked further.
+All stops are checked, those out of contact included. Between two points of a step δ is the cubic through both values
+and rates; around the highest node of a stop out of contact it is interpolated as in `peaks`. Such a stop must also keep
+a distance of the ripple that fast modes may have between the nodes. With many stops, those that cannot reach their
+surface by a bound of |δ̈| are not checked further.
 
-A bend is a kink of the law that is not at a given indentation: at δ̇ = 0 for a law that damps on approach only, at F = 0
-for one that is cut where it would pull. The side of a bend is the sign of δ̇, or of the force before the cut. No step
-crosses a bend; one step ends on it.
+A bend is a kink of the law that is not at a given indentation: at δ̇ = 0 of a law that damps on approach only, at F = 0
+of a law that is cut where it would pull. Its event function is δ̇, or the force before the cut; the sign of this is the
+side of the bend. No step crosses a bend; one step ends on it.
 """
 
 from __future__ import annotations
@@ -44,16 +44,16 @@ from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import largest_indentation
 from solvers.exponential.flight import energy_norms
 
-RATE, FORCE = 1.0, 2.0  # kinds of bends in Tables.bend; 0 for a law that has none
-CLEAR, TOO_LONG = -1, -2  # of a landing: no other event before it, or one that requires shorter steps
-_ON = 1e-9  # value, in units of the largest of the step, up to which a stop counts as on its bend
-_TOGETHER = 1e-6  # share of its last value by which a stop may pass its bend when another stop lands
-_SAME = 1e-11  # value, in units of the largest of the step, up to which a node may be on the wrong side
+RATE, FORCE = 1.0, 2.0  # kinds of bends in Tables.bend, named by their event function; 0 for a law without one
+CLEAR, TOO_LONG = -1, -2  # results of `before_landing`: no other event, or one that requires shorter steps
+_ON_BEND = 1e-9  # event function, in units of its largest on the step, up to which a stop counts as on its bend
+_TOGETHER = 1e-6  # the same, relative to its value at the start, by which a bend may be crossed as another stop lands
+_ROUNDING = 1e-11  # the same, in units of its largest on the step, up to which a node may be on the wrong side
 
 
 @inner
 def extremum(d, a, slope_a, b, slope_b):
-    """Extremum of the cubic through (0, a) and (d, b) with given slopes of opposite signs."""
+    """Extremum on [0, d] of the cubic through (0, a) and (d, b) with given slopes of opposite signs."""
     mean = (b - a) / d
     c2 = (3.0 * mean - 2.0 * slope_a - slope_b) / d
     c3 = (slope_a + slope_b - 2.0 * mean) / (d * d)
@@ -64,8 +64,8 @@ def extremum(d, a, slope_a, b, slope_b):
 
 
 @inlined
-def _passes(d, a, slope_a, b, slope_b, lower, upper):
-    """Whether the cubic through two points leaves [lower, upper] between them or at the second."""
+def _cubic_leaves(d, a, slope_a, b, slope_b, lower, upper):
+    """Whether the cubic through (0, a) and (d, b) with given slopes leaves [lower, upper] between them or at d."""
     if not lower <= b <= upper:
         return True
     if slope_a > 0.0 > slope_b:
@@ -76,10 +76,10 @@ def _passes(d, a, slope_a, b, slope_b, lower, upper):
 
 
 @merged
-def _turns(rates, begin, end, up, down):
-    """Whether the rate changes its sign between two points of a step, upwards if ``up`` or downwards if ``down``."""
-    before, found, rest = begin, False, load8(rates, 0)
-    least, largest = min(begin, end, least8(rest)), max(begin, end, largest8(rest))
+def _rate_changes_sign(rates, begin, end, up, down):
+    """Whether δ̇ changes its sign between two points of a step, upwards if ``up``, or downwards if ``down``."""
+    before, found, inner = begin, False, load8(rates, 0)
+    least, largest = min(begin, end, least8(inner)), max(begin, end, largest8(inner))
     for i in range(S + 1 if least < 0.0 < largest else 0):
         after = rates[i] if i < S else end
         found |= (up and before < 0.0 < after) or (down and before > 0.0 > after)
@@ -88,8 +88,8 @@ def _turns(rates, begin, end, up, down):
 
 
 @merged
-def _passes_between(problem, tables, state, scratch, node_set, h, s, lower, upper):
-    """Whether δ leaves [lower, upper] between two points of the step or at one."""
+def _leaves_between_points(problem, tables, state, scratch, node_set, h, s, lower, upper):
+    """Whether δ of stop s leaves [lower, upper] at a node or the end of the step, or between two of them."""
     motion = motion_of(problem, scratch, s)
     t, delta, rate = 0.0, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
     for i in range(S + 1):
@@ -98,7 +98,7 @@ def _passes_between(problem, tables, state, scratch, node_set, h, s, lower, uppe
         else:
             after, delta_new = h, indentation(problem, s, scratch.x_new)
             rate_new = indentation_rate(problem, s, scratch.x_new)
-        if _passes(after - t, delta, rate, delta_new, rate_new, lower, upper):
+        if _cubic_leaves(after - t, delta, rate, delta_new, rate_new, lower, upper):
             return True
         t, delta, rate = after, delta_new, rate_new
     return False
@@ -106,7 +106,7 @@ def _passes_between(problem, tables, state, scratch, node_set, h, s, lower, uppe
 
 @part(BOUNDS, types.void, REAL)
 def _bound_rates(problem, tables, state, scratch, h):
-    """Bounds of all rows' accelerations into ``per_row``; forces are taken as twice their largest node value."""
+    """Bounds of |δ̈| of all rows on the step into ``per_row``, m/s², with forces of twice their largest node value."""
     n, rows = problem.k.size, problem.gap.size
     energy_norms(problem, state.x, scratch.norms)
     for r in range(rows):
@@ -127,7 +127,7 @@ def _bound_rates(problem, tables, state, scratch, h):
 
 
 @merged
-def _stays_away(problem, state, scratch, s, h):
+def _cannot_reach(problem, state, scratch, s, h):
     """Whether a stop out of contact cannot be reached on the step; its motion is set to that at the start."""
     if is_circle(problem, s):
         return stays_in_circle(problem, state, scratch, s, h)
@@ -138,28 +138,32 @@ def _stays_away(problem, state, scratch, s, h):
 
 
 @merged
-def _watch(problem, tables, state, scratch, node_set, level, s, carried):
-    """Motion at the nodes of a stop out of contact; returns whether the motion of the blocks has been computed."""
-    through = uses_blocks(tables)
-    if through and not carried:
+def _follow(problem, tables, state, scratch, node_set, level, s, forces_added):
+    """Compute the motion of a stop out of contact at the nodes.
+
+    With many stops the response to the forces is first added to the motion of the blocks, unless ``forces_added``;
+    returns whether it has been.
+    """
+    by_blocks = uses_blocks(tables)
+    if by_blocks and not forces_added:
         add_block_motion(problem, tables, state, scratch, node_set, level, CONTINUING, scratch.block_motion)
         add_block_motion(problem, tables, state, scratch, node_set, level, ENTERING, scratch.block_motion)
     for r in range(row_of(problem, s), row_of(problem, s + 1)):
-        if through:
+        if by_blocks:
             motion_at_nodes(problem, scratch, r, problem.gap[r], scratch.motion[r])
         else:
             respond(problem, tables, state, scratch, node_set, level, r)
     if is_circle(problem, s):
         radial_nodes(problem, scratch, s)
-    return carried or through
+    return forces_added or by_blocks
 
 
 @part(LEAVES, types.boolean, types.int64, types.int64)
 def leaves_segment(problem, tables, state, scratch, node_set, level):
     """Whether any stop may cross a border of its segment on the step."""
-    h, through = tables.contact_step[level], uses_blocks(tables)
-    carried = np.bool_(0)  # a literal would be compiled for itself
-    if through:
+    h, by_blocks = tables.contact_step[level], uses_blocks(tables)
+    forces_added = np.bool_(0)  # a literal would be compiled for itself
+    if by_blocks:
         _bound_rates(problem, tables, state, scratch, h)
     for s in range(problem.law.size):
         segment, ripple = state.segment[s], 0.0
@@ -167,9 +171,9 @@ def leaves_segment(problem, tables, state, scratch, node_set, level):
         if segment > 0 and problem.knots[s, segment - 1] == -np.inf and upper == np.inf:
             continue
         if segment == 0:
-            if through and _stays_away(problem, state, scratch, s, h):
+            if by_blocks and _cannot_reach(problem, state, scratch, s, h):
                 continue
-            carried = _watch(problem, tables, state, scratch, node_set, level, s, carried)
+            forces_added = _follow(problem, tables, state, scratch, node_set, level, s, forces_added)
             alias = tables.alias[tables.kind[node_set], level]
             ripple = ripple_of_stop(problem, tables, s, alias, state.x)
         else:
@@ -178,22 +182,24 @@ def leaves_segment(problem, tables, state, scratch, node_set, level):
         delta, within = indentation(problem, s, scratch.x_new), load8(motion[0], 0)
         lowest, highest = min(delta, least8(within)), max(delta, largest8(within))
         begin, end = scratch.start_motion[s, 1], indentation_rate(problem, s, scratch.x_new)
-        turns = _turns(motion[1], begin, end, segment > 0, upper < np.inf)
-        if not turns and lower <= lowest and highest + ripple <= upper:
+        sign_changes = _rate_changes_sign(motion[1], begin, end, segment > 0, upper < np.inf)
+        if not sign_changes and lower <= lowest and highest + ripple <= upper:
             continue
         tolerance = 8.0 * surface_tolerance(problem, s, state.x)
         if not (lower - tolerance <= lowest and highest + ripple <= upper + tolerance):
             return True
         if segment == 0 and largest_indentation(problem, tables, state, scratch, node_set, h, s) > upper + tolerance:
             return True
-        if _passes_between(problem, tables, state, scratch, node_set, h, s, lower - tolerance, upper + tolerance):
+        if _leaves_between_points(
+            problem, tables, state, scratch, node_set, h, s, lower - tolerance, upper + tolerance
+        ):
             return True
     return False
 
 
 @inlined
 def _sides(problem, tables, state, s, n, delta, rate, out):
-    """δ̇, or the force before its cut, at n points with δ >= 0; the sign is the side of the bend."""
+    """Event function of a bend, δ̇ or the force before its cut, at n points with δ >= 0, into ``out``."""
     if tables.bend[s] == RATE:
         copy(rate, out, n)
     else:
@@ -202,7 +208,7 @@ def _sides(problem, tables, state, s, n, delta, rate, out):
 
 @part(SIDE, REAL, types.int64, VECTOR, VECTOR)
 def side_at(problem, tables, state, s, x, batch):
-    """The same in the state x."""
+    """The same in the state x; ``batch`` holds three numbers."""
     batch[0] = max(indentation(problem, s, x), problem.knots[s, 0])
     batch[1] = indentation_rate(problem, s, x)
     _sides(problem, tables, state, s, 1, batch[0:1], batch[1:2], batch[2:3])
@@ -211,7 +217,7 @@ def side_at(problem, tables, state, s, x, batch):
 
 @inner
 def choose_sides(problem, tables, state, scratch):
-    """Find the side of its bend for every contact that begins now."""
+    """Set the side of its bend for every contact that begins now."""
     for s in range(problem.law.size):
         if tables.bend[s] > 0.0 and state.segment[s] > 0 and state.active[s, T_IN] == state.now[T]:
             scratch.side[s] = -1.0 if side_at(problem, tables, state, s, state.x, scratch.trial) < 0.0 else 1.0
@@ -219,10 +225,10 @@ def choose_sides(problem, tables, state, scratch):
 
 @inner
 def first_bend(problem, tables, state, scratch, node_set, level, is_new):
-    """(time after the start of the step, stop) of the first bend on it; no stop is -1.
+    """(time after the start of the step, stop) of the first bend that the step just tried crosses, or (inf, -1).
 
-    A stop that begins on its bend (``is_new``), or was taken across it by the landing of another stop, gets the side of
-    the first node. A bend of a rate, or force, within the tolerance is not an event.
+    A stop that begins on its bend (``is_new``), or has crossed it as another stop landed, gets the side of the first
+    node. An event function within its tolerance crosses nothing.
     """
     first, stop, h = np.inf, -1, tables.contact_step[level]
     for s in range(problem.law.size):
@@ -236,21 +242,21 @@ def first_bend(problem, tables, state, scratch, node_set, level, is_new):
         largest = abs(begin)
         for i in range(S + 1):
             largest = max(largest, abs(values[i]))
-        harmless = scratch.force_tolerance[s]
+        negligible = scratch.force_tolerance[s]
         if tables.bend[s] == RATE:
-            harmless = 0.01 * scratch.accuracy[RTOL] * scratch.reference_speed[s]
-        if largest <= harmless:
+            negligible = 0.01 * scratch.accuracy[RTOL] * scratch.reference_speed[s]
+        if largest <= negligible:
             continue
-        on = scratch.side[s] * begin < 0.0 or (is_new and abs(begin) <= _ON * largest)
-        if on and scratch.side[s] * values[0] < -_SAME * largest:
+        begins_on = scratch.side[s] * begin < 0.0 or (is_new and abs(begin) <= _ON_BEND * largest)
+        if begins_on and scratch.side[s] * values[0] < -_ROUNDING * largest:
             scratch.side[s] = -scratch.side[s]
         before, t = begin, 0.0
         for i in range(S + 1):
             after = h * tables.times[node_set, i] if i < S else h
-            if scratch.side[s] * values[i] < -_SAME * largest:
-                way = before / (before - values[i]) if scratch.side[s] * before > 0.0 else 0.0
-                if t + way * (after - t) < first:
-                    first, stop = t + way * (after - t), s
+            if scratch.side[s] * values[i] < -_ROUNDING * largest:
+                share = before / (before - values[i]) if scratch.side[s] * before > 0.0 else 0.0
+                if t + share * (after - t) < first:
+                    first, stop = t + share * (after - t), s
                     scratch.bend_values[S + 1] = largest
                 break
             before, t = values[i], after
@@ -259,10 +265,11 @@ def first_bend(problem, tables, state, scratch, node_set, level, is_new):
 
 @inner
 def before_landing(problem, tables, state, scratch, stop, bends, w, x):
-    """Other events between the states w and x, which end in times, besides the landing of ``stop``.
+    """Whether anything but the landing of ``stop`` happens between the states w and x, which end in times.
 
-    Returns `CLEAR`, `TOO_LONG`, or another stop that has crossed a border of its segment. A peak must not lie within a
-    landing, whose steps have no interpolant.
+    Returns `CLEAR`, `TOO_LONG`, or another stop that has crossed a border of its segment. ``bends`` tells that the
+    landing is on a bend or border; then a maximum of δ of ``stop`` counts, too. No peak may lie inside a landing, which
+    has no dense output.
     """
     size, width = 2 * problem.k.size, state.x.size
     d = x[width] - w[width]
@@ -278,15 +285,14 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
             lower = problem.knots[s, segment - 1] - tolerance if segment > 0 else -np.inf
             if not lower <= b <= upper:
                 return s
-            if long and _passes(d, a, slope_a, b, slope_b, lower, upper):
+            if long and _cubic_leaves(d, a, slope_a, b, slope_b, lower, upper):
                 return TOO_LONG
         if not long or segment == 0 or is_open(problem, s):
             continue
         if not begins_and_ends(problem, s):
             continue
-        rest = (
-            -_TOGETHER * slope_a if problem.opening[s] >= 0 else 0.0
-        )  # a law that opens may have a border where δ̇ falls to zero
+        # a law that opens may have a border where δ̇ falls to zero
+        rest = -_TOGETHER * slope_a if problem.opening[s] >= 0 else 0.0
         if slope_a > 0.0 and slope_b < rest and (s != stop or tables.bend[s] != RATE):
             return TOO_LONG
         if s != stop and tables.bend[s] > 0.0:
@@ -302,34 +308,35 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
 
 @merged
 def force_turns(work, column, width, known, sign):
-    """Whether a force, the rate of the impulse over that of time, has a maximum above ``known`` inside a landing.
+    """Whether ``sign`` times a force has a maximum above ``known`` inside the landing just taken.
 
-    It is the force times ``sign``.
+    At a stage the force is the rate of its impulse, in a ``column`` of the stages, over that of time, in column
+    ``width``.
     """
-    if work[0, width] == 0.0 or _at_stage(work, column, width, sign, 0) < 0.5 * known:
-        return False  # too far below the peak for a higher maximum, or it begins at an entry
+    if work[0, width] == 0.0 or _force_at_stage(work, column, width, sign, 0) < 0.5 * known:
+        return False  # it begins at an entry, or is too far below the peak for a higher maximum
     last, highest = STAGES - 1 if work[STAGES - 1, width] != 0.0 else STAGES - 2, known
     for i in range(1, last):
-        if _at_stage(work, column, width, sign, i) > highest:
-            highest = _at_stage(work, column, width, sign, i)
-    ends = max(_at_stage(work, column, width, sign, 0), _at_stage(work, column, width, sign, last))
+        if _force_at_stage(work, column, width, sign, i) > highest:
+            highest = _force_at_stage(work, column, width, sign, i)
+    ends = max(_force_at_stage(work, column, width, sign, 0), _force_at_stage(work, column, width, sign, last))
     if max(highest, ends) <= known:
         return False
     turns = highest > ends
     for i, j, k in ((0, 1, 2), (8, 10, last)):
-        turns |= _turns_at(work, column, width, sign, i, j, k)
+        turns |= _has_maximum(work, column, width, sign, i, j, k)
     return turns
 
 
 @inlined
-def _at_stage(work, column, width, sign, i):
-    """A force, times the sign, at a stage."""
+def _force_at_stage(work, column, width, sign, i):
+    """``sign`` times a force, N, at stage i."""
     return sign * work[i, column] / work[i, width]
 
 
 @merged
 def _pulls_inside(work, column, width):
-    """Whether a law would pull at an inner stage of a landing."""
+    """Whether the force of a law is negative at an inner stage of a landing."""
     pulls = False
     for i in range(1, STAGES - 1):
         pulls |= work[i, column] / work[i, width] < 0.0
@@ -337,10 +344,10 @@ def _pulls_inside(work, column, width):
 
 
 @inlined
-def _turns_at(work, column, width, sign, i, j, k):
-    """Whether the parabola through a force at three stages has its maximum between them."""
-    a, b = _at_stage(work, column, width, sign, i), _at_stage(work, column, width, sign, j)
-    c = _at_stage(work, column, width, sign, k)
+def _has_maximum(work, column, width, sign, i, j, k):
+    """Whether the parabola through a force at stages i, j, k has its maximum between them."""
+    a, b = _force_at_stage(work, column, width, sign, i), _force_at_stage(work, column, width, sign, j)
+    c = _force_at_stage(work, column, width, sign, k)
     rise, fall = (b - a) / (C[j] - C[i]), (c - b) / (C[k] - C[j])
     bend = (fall - rise) / (C[k] - C[i])
     return bend < 0.0 and rise - bend * (C[j] - C[i]) > 0.0 > fall + bend * (C[k] - C[j])

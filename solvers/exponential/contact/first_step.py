@@ -27,30 +27,36 @@ from solvers.exponential.contact.peaks import pressed_speed, state_peaks
 from solvers.exponential.flight import energy_norms
 from solvers.exponential.tables import EXPONENT, STIFFNESS
 
-LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN, BALANCED = range(7)  # places in Scratch.control
-ENTRY, SEGMENT = 1, 2  # values of NEW: the first step of a contact, or of a segment of its law; 0 for other steps
-_LEAST = 1e-60  # m/s, of a reference speed, and of an impact
-_PRESSED = 1e-3  # the least in units of the speed which the force would give: what presses at rest moves by rounding
+LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN, BALANCED = range(7)
+"""Places in Scratch.control: level and node set of the last step; kind of the next one, see below; stop that entered
+last; level of the next step; 1 once the run has begun; 1 if it keeps the energy balance."""
+ENTRY, SEGMENT = 1, 2  # values of NEW: first step of a contact, or of a segment of its law; 0: any other step
+_LEAST_SPEED = 1e-60  # m/s: lower bound of a reference speed, and of the speed of an impact
+_PRESSED_SHARE = 1e-3  # of `pressed_speed` as a reference speed: a stop at rest under a force moves by rounding
 
 
 @part(BEGIN, types.void, types.int64)
 def begin_steps(problem, tables, state, scratch, stop):
-    """Reference speeds, first step and nodes after ``stop`` has entered, changed its segment, or left."""
+    """Set reference speeds, level and nodes of the next step after ``stop`` has entered, changed its segment, or left.
+
+    The reference speed of a stop that enters or is open is the largest of |δ̇|, a tenth of the bound of |δ̇| by the
+    energy of the blocks, and 1e-3 of `pressed_speed`, m/s.
+    """
     control, others = scratch.control, False
     energy_norms(problem, state.x, scratch.norms)
     for s in range(problem.law.size):
         speed = abs(indentation_rate(problem, s, state.x))
-        before = state.segment[s] > 0 and state.active[s, T_IN] < state.now[T]
-        if before:
+        in_contact_before = state.segment[s] > 0 and state.active[s, T_IN] < state.now[T]
+        if in_contact_before:
             scratch.reference_speed[s] = max(scratch.reference_speed[s], speed)
         else:
             reached = 0.1 * dot(tables.rate_weight[row_of(problem, s)], scratch.norms, problem.k.size)
             if is_circle(problem, s) or rubs(problem, s):
-                across = dot(tables.rate_weight[row_of(problem, s) + 1], scratch.norms, problem.k.size)
-                reached = math.hypot(reached, 0.1 * across)
-            pressed = _PRESSED * pressed_speed(problem, tables, state, s, scratch.trial)
-            scratch.reference_speed[s] = max(speed, reached, pressed, _LEAST)
-        others |= before
+                second = dot(tables.rate_weight[row_of(problem, s) + 1], scratch.norms, problem.k.size)
+                reached = math.hypot(reached, 0.1 * second)
+            pressed = _PRESSED_SHARE * pressed_speed(problem, tables, state, s, scratch.trial)
+            scratch.reference_speed[s] = max(speed, reached, pressed, _LEAST_SPEED)
+        others |= in_contact_before
     control[NODE_SET], control[NEW] = 0, SEGMENT
     if state.segment[stop] > 0 and state.active[stop, T_IN] == state.now[T]:
         wanted = _first_step(problem, tables, state, scratch, stop)
@@ -62,8 +68,8 @@ def begin_steps(problem, tables, state, scratch, stop):
 
 @merged
 def _contact_time(problem, tables, scratch, s, speed):
-    """Duration, s, of an impact at this speed on one stop alone, from the law's energy: T = 3.2 δ_m/v."""
-    speed = max(speed, _LEAST)
+    """Duration, s, of an impact at a speed on one stop alone: T = 3.2 δ_m/v, where the law stores the energy at δ_m."""
+    speed = max(speed, _LEAST_SPEED)
     accelerance = max(own_accelerance(problem, tables, s), 1e-300)
     target = 0.5 * speed * speed / accelerance
     law, p = tables.power_law[s], tables.exponent[s]
@@ -80,7 +86,7 @@ def _contact_time(problem, tables, scratch, s, speed):
 
 @merged
 def _first_step(problem, tables, state, scratch, stop):
-    """Level of the first step of a contact, a share of the duration of an impact on this stop alone."""
+    """Level of the first step of a contact: a share of the duration of an impact on this stop alone."""
     speed = abs(indentation_rate(problem, stop, state.x))
     duration = _contact_time(problem, tables, scratch, stop, max(speed, 1e-3 * scratch.reference_speed[stop]))
     if scratch.first_step_share[stop] == 0.0:
@@ -91,19 +97,19 @@ def _first_step(problem, tables, state, scratch, stop):
 
 @merged
 def entry_nodes(problem, tables, state, stop, level):
-    """Node set of the next step: of an entry if a force with broken exponent has just begun, first that of ``stop``."""
-    found, while_ago = 0, 1e-6 * tables.contact_step[level]
+    """Node set of the next step: that of a stop just entered, whose force has broken powers, first ``stop``; else 0."""
+    found, just_now = 0, 1e-6 * tables.contact_step[level]
     for s in range(state.segment.size):
         if state.segment[s] == 1 and tables.time_exponent[1 + s] > 1.0 and (found == 0 or s == stop):
             rate = indentation_rate(problem, s, state.x)
-            if indentation(problem, s, state.x) <= while_ago * rate + 4.0 * surface_tolerance(problem, s, state.x):
+            if indentation(problem, s, state.x) <= just_now * rate + 4.0 * surface_tolerance(problem, s, state.x):
                 found = 1 + s
     return found
 
 
 @inlined
 def level_of(tables, h):
-    """Level of the longest contact step up to h, or of the shortest of all."""
+    """Level of the longest contact step up to h, or of the shortest one if that is longer."""
     last = tables.contact_step.size - 1
     j = min(max(int(np.ceil(2.0 * math.log2(tables.contact_step[0] / h))), 0), last)
     return j + 1 if tables.contact_step[j] > h and j < last else j
@@ -111,7 +117,7 @@ def level_of(tables, h):
 
 @inner
 def latest_entered(state):
-    """The stop in contact with the latest entry."""
+    """The stop in contact that was entered last, or -1."""
     stop = -1
     for s in range(state.segment.size):
         if state.segment[s] > 0 and (stop < 0 or state.active[s, T_IN] >= state.active[stop, T_IN]):

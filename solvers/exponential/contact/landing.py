@@ -1,21 +1,23 @@
-"""Locating the end of a contact, or of a segment of its law: one Runge–Kutta step that lands on the border.
+"""Event location: one Runge–Kutta step, called a landing, ends where a contact or a segment of its law ends.
 
-It is a step of DOP853 with t among the unknowns, in a variable in which the motion is smooth:
+It is a step of DOP853 with t among the unknowns. The independent variable is one in which the motion is smooth:
 
-    INDENTATION   dt = dδ/δ̇         lands exactly on a kink, or on another stop's surface
-    ROOT          dt = κ u^{κ-1} du/δ̇, u = δ^{1/κ}, κ as at entry: lands exactly on δ = 0, where δ^{3/2} is singular
-    TIME          dt                lands on a bend or border by the secant rule; the force is continuous there
-    SINCE         dt = κ u^{κ-1} du, u = (t - t_in)^{1/κ}: the same from an entry on, where δ^{3/2} is singular
+    INDENTATION   dt = dδ/δ̇                                ends exactly on a knot, or on the surface of a stop
+    ROOT          dt = κ u^{κ-1} du/δ̇, u = δ^{1/κ}         ends exactly on δ = 0, where δ^{3/2} is singular
+    TIME          dt                                       ends on a bend or border, by the secant rule
+    SINCE         dt = κ u^{κ-1} du, u = (t - t_in)^{1/κ}  the same in a step from an entry on, singular like δ^{3/2}
 
-A border of friction just before δ = 0 is landed on in the variable of `ROOT` too. The node polynomial of the step tried
-tells bends and borders to 1e-5 of their time and better; what is left is made up from the end of the first landing by
-the midpoint rule, so that most of them take one Runge–Kutta step.
+with κ as at entry. The first two know the length of the step beforehand. The others iterate for a zero of the *event
+function* of a bend or border (`_event_function`); forces are continuous there. A border of friction just before δ = 0
+is located in the variable of `ROOT` too. The polynomial through the nodes of the step tried before gives the time to
+about 1e-5 of its length; the correction is one step of the midpoint rule, so that most landings take one Runge–Kutta
+step.
 
-The unknowns are [p, v, energy balance, t, u]. The fastest block moves by less than `landing_reach` radians, within
-which the step of every block is exact to the tolerance. The error by the forces is estimated by a tenth of the embedded
-fifth-order difference, for every stop in units of its own tolerance: in these variables this is a few times the true
-error, while DOP853's own mixed estimate is below it. All of it counts where the stop's dashpot is too strong for an
-explicit step. A landing stays within a cell of sampled signals, whose kinks the difference does not see.
+The unknowns are [p, v, energy balance, t, u]. A landing lasts at most `landing_reach` radians of the fastest block, up
+to which DOP853 is exact to the tolerance for every block. The error by the forces is estimated by a tenth of the
+embedded difference of order five, in units of each stop's tolerance: in these variables this is a few times the true
+error, while DOP853's own estimate, of orders five and three, is below it. The whole difference counts where a dashpot
+is too strong for an explicit step. A landing stays within a cell of sampled signals: the difference misses their kinks.
 """
 
 from __future__ import annotations
@@ -25,7 +27,7 @@ import math
 import numpy as np
 
 from solvers.compiled.dop853_tableau import E3, E5, STAGES
-from solvers.compiled.friction import drawn
+from solvers.compiled.friction import spring_stretch
 from solvers.compiled.kernels import (
     abs_dot,
     contact_gradient,
@@ -47,7 +49,7 @@ from solvers.compiled.kernels import (
     slider_of,
 )
 from solvers.compiled.parts import PASSED
-from solvers.compiled.sliding import WAY, slider_force, way_tolerance
+from solvers.compiled.sliding import XI, slider_force, xi_tolerances
 from solvers.compiled.state import (
     CALLS,
     LANDING,
@@ -80,35 +82,35 @@ from solvers.exponential.contact.node_response import (
 from solvers.exponential.contact.peaks import state_peaks
 from solvers.problem.friction import CODE, PEAK, STIFFNESS
 
-_MOST_TRIES = 8  # to find the step that ends at an output time, or on a bend
-_SMALL = 1e-4  # part of a landing by which its length may change without another step: the rule's error is its cube
-_BEGINS_THERE = 1e-6  # margin, in units of its largest, with which a landing begins on the border that it ends on
-_STILL = 1e-10  # margin, in units of its largest, from which on trials that do not halve it have met its rounding
-_MOST_VERTICES = 6  # of parabolas, to a maximum inside a landing
-_MOST_HALVINGS = 40  # the same on a border, whose margin may hardly change but at the start
-_PART = 0.1  # of the embedded difference that counts as the error
-_PART_OF_FOURTH = 1e-2  # with u = δ^{1/4}: terms t² = u⁸ are exact in the step, and all of the difference
-_OF_SLOPES, _MOST_SLOPE = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
-_OF_LARGEST = 1e-11  # of a margin, in units of its largest, that is rounding
-_LAST = 0.09  # indentation, in units of the deepest, from which the last step is tried
-_LAST_ROOT, _MOST_ROOT = 0.2, 0.25  # the same of u = δ^{1/2}, / reach², and at most: its error grows like u⁹
+_MOST_TRIALS = 8  # iterations for the step that ends at an output time, or on a bend
+_MIDPOINT_UP_TO = 1e-4  # change of a landing's length, relative, that the midpoint rule makes: its error is the cube
+_ON_BORDER = 1e-6  # margin, in units of its largest, below which a landing begins on the border that it ends on
+_STAGNATION = 1e-10  # margin, in units of its largest, below which trials that do not halve it show its rounding
+_MOST_VERTICES = 6  # parabolas to the maximum of |F_t| inside a landing
+_MOST_BORDER_TRIALS = 40  # the same on a border: its margin may change only near the start, which bisection must find
+_ERROR_SHARE = 0.1  # part of the embedded difference that counts as the error
+_ERROR_SHARE_FOURTH_ROOT = 1e-2  # the same with u = δ^{1/4}: terms t² = u⁸, exact in the step, make up the difference
+_DERIVATIVE_SHARE, _MOST_FACTOR = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
+_ROUNDING = 1e-11  # rounding of a margin, in units of its largest
+_LAST_STEP = 0.09  # indentation, in units of the deepest, below which a landing on δ = 0 is tried
+_LAST_STEP_ROOT, _MOST_ROOT = 0.2, 0.25  # the same with u = δ^{1/2}, over reach², and at most: errors grow like u⁹
 
 
 def landing_reach(rtol: float) -> float:
-    """Angle, rad, of the fastest block up to which DOP853's error, 7e-8 θ⁹, is below a tenth of rtol."""
+    """Longest landing as an angle |λ|max t, rad, at which DOP853's error 7e-8 θ⁹ for a block is a tenth of rtol."""
     return min((0.1 * rtol / 7e-8) ** (1.0 / 9.0), 1.5)
 
 
 @inner
-def _error(problem, scratch, part):
-    """Largest error of an indentation rate in the step just taken, in units of the stop's tolerance.
+def _rate_error(problem, scratch, share):
+    """Largest error of an indentation rate in the step just taken, in units of the tolerance rtol × reference speed.
 
-    It is estimated by a ``part`` of the embedded difference.
+    It is a ``share`` of the embedded difference of order five.
     """
     worst = 0.0
     combine(scratch.stages, E5, STAGES, None, scratch.stages[DIFFERENCE])
     for r in range(problem.gap.size):
-        error = part * abs_dot(problem.read_rate[r], scratch.stages[DIFFERENCE], 2 * problem.k.size)
+        error = share * abs_dot(problem.read_rate[r], scratch.stages[DIFFERENCE], 2 * problem.k.size)
         error /= scratch.accuracy[RTOL] * scratch.reference_speed[element_of(problem, r)]
         if not error <= worst:
             worst = error
@@ -116,73 +118,80 @@ def _error(problem, scratch, part):
 
 
 @inlined
-def _difference(problem, r, d, span):
-    """An embedded difference of rate and displacement of a row, as a rate, m/s.
+def _rate_difference(problem, r, d, span):
+    """Error of row r by an embedded difference ``d`` of the state: that of δ̇ plus that of δ over the ``span``, m/s.
 
-    The changes of the displacement are summed with their signs: where dashpots couple the modes it reads rates v of the
-    blocks, which a force changes at once, while their sum stays.
+    The terms of δ are summed with their signs. Where dashpots couple the modes, δ reads the blocks' rates v too, which
+    a force changes at once while their sum in δ stays.
     """
     size = 2 * problem.k.size
     return abs_dot(problem.read_rate[r], d, size) + abs(dot(problem.read[r], d, size)) / span
 
 
 @inlined
-def _mixed(fifth, third):
-    """The error that two embedded differences tell of."""
+def _combined_estimate(fifth, third):
+    """DOP853's error estimate e₅²/√(e₅² + 0.01 e₃²) from its embedded differences of order five and three."""
     return fifth * fifth / math.hypot(fifth, 0.1 * third) if fifth > 0.0 else fifth
 
 
 @inlined
-def _error_of_work_in_time(problem, state, scratch, s, span):
-    """The same of the force of an element with memory, the rate of its impulse, as a mean over the step."""
-    work, impulse, largest = scratch.stages, 2 * problem.k.size + 3 + 2 * s, 1e-300
+def _memory_force_error(problem, state, scratch, s, span):
+    """Error of the force of element s, which has memory, over a landing of length ``span``, in units of its tolerance.
+
+    The embedded differences of the impulse over the span are errors of the mean force. 0 if the slopes of the law are
+    equal at both ends: then the force is as exact as the motion.
+    """
+    work, impulse, largest_force = scratch.stages, 2 * problem.k.size + 3 + 2 * s, 1e-300
     deltas, rates, slope = scratch.clipped[0:2], scratch.trial[0:2], scratch.slope[s, :, 0:2]
     deltas[0], rates[0] = indentation_and_rate(problem, s, work[START])
     deltas[1], rates[1] = indentation_and_rate(problem, s, work[LANDED])
     contact_gradient(problem, s, deltas, rates, state.entry_rate[s], slope[0], slope[1], slope[2])
     by_delta, by_rate = max(abs(slope[0, 0]), abs(slope[0, 1])), max(abs(slope[1, 0]), abs(slope[1, 1]))
-    bent = abs(slope[0, 0] - slope[0, 1]) > STRAIGHT * by_delta or abs(slope[1, 0] - slope[1, 1]) > STRAIGHT * by_rate
-    if not bent:  # the force is as exact as the motion
+    varies = abs(slope[0, 0] - slope[0, 1]) > STRAIGHT * by_delta or abs(slope[1, 0] - slope[1, 1]) > STRAIGHT * by_rate
+    if not varies:
         return 0.0
     for i in range(1, STAGES):
-        largest = max(largest, abs(work[i, impulse]) / work[i, state.x.size])
-    unresolved = _mixed(abs(work[DIFFERENCE, impulse]), abs(work[BATCH, impulse])) / span
-    return error_of_work(problem, state, scratch, s, unresolved, largest, (by_delta, by_rate))
+        largest_force = max(largest_force, abs(work[i, impulse]) / work[i, state.x.size])
+    unresolved = _combined_estimate(abs(work[DIFFERENCE, impulse]), abs(work[BATCH, impulse])) / span
+    return error_of_work(problem, state, scratch, s, unresolved, largest_force, (by_delta, by_rate))
 
 
 @inner
 def _error_in_time(problem, state, scratch, span):
-    """The same of a step in time, from both embedded differences of rate and indentation, and of memory's forces."""
+    """Largest error of a landing in the variable TIME or SINCE, in units of the tolerance.
+
+    It is that of δ and δ̇ of all rows by both embedded differences, and that of the forces of elements with memory.
+    """
     fifth, third, worst = scratch.stages[DIFFERENCE], scratch.stages[BATCH], 0.0
     combine(scratch.stages, E5, STAGES, None, fifth)
     combine(scratch.stages, E3, STAGES, None, third)
     for r in range(problem.gap.size):
-        error = _mixed(_difference(problem, r, fifth, span), _difference(problem, r, third, span))
+        error = _combined_estimate(_rate_difference(problem, r, fifth, span), _rate_difference(problem, r, third, span))
         error /= scratch.accuracy[RTOL] * scratch.reference_speed[element_of(problem, r)]
         if not error <= worst:
             worst = error
     for s in range(problem.law.size):
         if problem.border_count[s] > 0 and problem.knots[s, 0] < 0.0:
-            worst = max(worst, _error_of_work_in_time(problem, state, scratch, s, span))
+            worst = max(worst, _memory_force_error(problem, state, scratch, s, span))
     return worst
 
 
 @merged
-def _goes_ahead(scratch, size):
-    """Whether time goes forward in every stage of the step just taken.
+def _time_increases(scratch, size):
+    """Whether dt/d(variable) > 0 at every stage of the step just taken.
 
-    If it does not, the stop turns back before the border, the step passes a pole of 1/δ̇, and its embedded difference
-    is no estimate. At δ = 0, where the last stages of `ROOT` end, dt/du = 0 up to rounding.
+    If it is not, the stop turns back before the border: the step passes a pole of 1/δ̇, and its embedded difference is
+    no error estimate. At δ = 0, where the last stages of `ROOT` end, dt/du is 0 up to rounding.
     """
-    ahead = True
+    increases = True
     for i in range(STAGES):
-        ahead &= scratch.stages[i, size] >= -1e-9 * scratch.stages[0, size]
-    return ahead
+        increases &= scratch.stages[i, size] >= -1e-9 * scratch.stages[0, size]
+    return increases
 
 
 @inner
 def _step(problem, tables, state, scratch, variable, stop, span):
-    """A step from ``scratch.stages[START]`` to ``scratch.stages[LANDED]``."""
+    """Take a DOP853 step of length ``span`` from ``scratch.stages[START]`` to ``scratch.stages[LANDED]``."""
     state.count[CALLS] += landing_step(
         *(problem, tables, scratch.control[BALANCED] > 0, np.bool_(0), variable, stop, span, scratch.stages[START]),
         *(state.segment, state.entry_rate, scratch.side, scratch.stages),
@@ -190,8 +199,8 @@ def _step(problem, tables, state, scratch, variable, stop, span):
 
 
 @inner
-def _move(problem, tables, state, scratch, variable, stop, span):
-    """Go on from ``scratch.stages[LANDED]`` by a small part of the step that led there."""
+def _midpoint_step(problem, tables, state, scratch, variable, stop, span):
+    """Continue from ``scratch.stages[LANDED]`` by a short step of the midpoint rule; the stages stay as they are."""
     copy(scratch.stages[LANDED], scratch.stages[WITHIN], scratch.stages.shape[1])
     state.count[CALLS] += landing_step(
         *(problem, tables, scratch.control[BALANCED] > 0, np.bool_(1), variable, stop, span, scratch.stages[WITHIN]),
@@ -201,53 +210,56 @@ def _move(problem, tables, state, scratch, variable, stop, span):
 
 @merged
 def _length_to(problem, tables, state, scratch, variable, stop, span, landed, time):
-    """Length of the step that ends, in ``scratch.stages[LANDED]``, at a time before the landing; inf if not found."""
+    """Length of the step that ends at ``time``, which is before ``landed``; inf if Newton's method fails.
+
+    ``span`` is the length of the step that ends at ``landed``. The end state is left in ``scratch.stages[LANDED]``.
+    """
     w, x, size, tries = scratch.stages[START], scratch.stages[LANDED], state.x.size, 0
     t = w[size]
-    left = (landed - time) / (landed - t) if landed > t else 0.0
+    remaining = (landed - time) / (landed - t) if landed > t else 0.0
     kappa = tables.time_exponent[1 + stop]
-    length = span * (1.0 - (left ** (1.0 / kappa) if variable == ROOT else left))
+    length = span * (1.0 - (remaining ** (1.0 / kappa) if variable == ROOT else remaining))
     if variable == SINCE:
-        length = span * (1.0 - left) ** (1.0 / kappa)
+        length = span * (1.0 - remaining) ** (1.0 / kappa)
     while True:
         _step(problem, tables, state, scratch, variable, stop, length)
-        late, tries = x[size] - time, tries + 1
+        delay, tries = x[size] - time, tries + 1
         pace = 1.0 if variable >= TIME else indentation_rate(problem, stop, x)  # d(variable)/dt
         if variable in (ROOT, SINCE):
             pace /= kappa * raised(x[size + 1], kappa - 1.0)
-        if not abs(late) > 1e-15 * landed or not abs(pace) < np.inf or tries == _MOST_TRIES:
-            return length if abs(late) <= 1e-6 * (landed - t) + 1e-15 * landed else np.inf
-        length -= late * pace
+        if not abs(delay) > 1e-15 * landed or not abs(pace) < np.inf or tries == _MOST_TRIALS:
+            return length if abs(delay) <= 1e-6 * (landed - t) + 1e-15 * landed else np.inf
+        length -= delay * pace
 
 
 @merged
 def _begin_peaks(problem, state, scratch):
-    """Raise the peak forces by those at the start of a landing, which its first stage has computed."""
+    """Raise the peak forces by the forces at the start of a landing, which are rates of its first stage."""
     work, size, first = scratch.stages, state.x.size, 2 * problem.k.size + 3
     for s in range(state.segment.size if work[0, size] != 0.0 else 0):
         if state.segment[s] > 0:
             column = first + 2 * s
             state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], work[0, column] / work[0, size])
             if rubs(problem, s):
-                own, column = slider_of(problem, s), problem.friction[s, 1] + 1
-                own[PEAK] = max(own[PEAK], abs(work[0, column] / work[0, size]))
+                slider, column = slider_of(problem, s), problem.friction[s, 1] + 1
+                slider[PEAK] = max(slider[PEAK], abs(work[0, column] / work[0, size]))
 
 
 @inner
-def _drag(problem, tables, state, scratch, variable, stop, length, s):
-    """|F_t| of stop s after a part of a landing."""
+def _friction_after(problem, tables, state, scratch, variable, stop, length, s):
+    """|F_t|, N, of stop s after a step of some length from the start of the landing."""
     x = scratch.stages[LANDED]
     _step(problem, tables, state, scratch, variable, stop, length)
     return abs(slider_force(problem, s, state.segment[s], state.entry_rate[s], x[state.x.size], x))
 
 
 @inner
-def _peak_of_drag(problem, tables, state, scratch, variable, stop, span, s):
-    """Raise the largest |F_t| of stop s by its maximum inside a landing, by vertices of parabolas."""
-    a, b, c, own = 0.0, 0.5 * span, span, slider_of(problem, s)
-    low = _drag(problem, tables, state, scratch, variable, stop, a, s)
-    best = _drag(problem, tables, state, scratch, variable, stop, b, s)
-    high = _drag(problem, tables, state, scratch, variable, stop, c, s)
+def _locate_friction_peak(problem, tables, state, scratch, variable, stop, span, s):
+    """Raise the largest |F_t| of stop s by its maximum inside a landing, found by successive parabolas."""
+    a, b, c, slider = 0.0, 0.5 * span, span, slider_of(problem, s)
+    low = _friction_after(problem, tables, state, scratch, variable, stop, a, s)
+    best = _friction_after(problem, tables, state, scratch, variable, stop, b, s)
+    high = _friction_after(problem, tables, state, scratch, variable, stop, c, s)
     for _ in range(_MOST_VERTICES):
         rise, fall = (b - a) * (best - high), (c - b) * (best - low)
         if not rise + fall > 0.0:
@@ -255,7 +267,7 @@ def _peak_of_drag(problem, tables, state, scratch, variable, stop, span, s):
         vertex = b - 0.5 * ((b - a) * rise - (c - b) * fall) / (rise + fall)
         if not a < vertex < c or abs(vertex - b) <= 1e-6 * span:
             break
-        value = _drag(problem, tables, state, scratch, variable, stop, vertex, s)
+        value = _friction_after(problem, tables, state, scratch, variable, stop, vertex, s)
         if value >= best:
             a, low, c, high = (a, low, b, best) if vertex < b else (b, best, c, high)
             b, best = vertex, value
@@ -263,12 +275,12 @@ def _peak_of_drag(problem, tables, state, scratch, variable, stop, span, s):
             a, low = vertex, value
         else:
             c, high = vertex, value
-    own[PEAK] = max(own[PEAK], best)
+    slider[PEAK] = max(slider[PEAK], best)
 
 
 @inlined
-def _turns(problem, scratch, width, s):
-    """Whether |F_t| has a maximum above its peak inside the landing whose stages are there."""
+def _friction_peaks_inside(problem, scratch, width, s):
+    """Whether |F_t| of stop s has a maximum inside the landing just taken that is above its peak so far."""
     work, column = scratch.stages, problem.friction[s, 1] + 1
     sign = math.copysign(1.0, work[0, column] + work[STAGES - 2, column])
     return force_turns(work, column, width, slider_of(problem, s)[PEAK], sign)
@@ -276,16 +288,17 @@ def _turns(problem, scratch, width, s):
 
 @inner
 def _accept(problem, tables, state, scratch, variable, stop, level, span):
-    """Move the state to the landing in ``scratch.stages[LANDED]``, or to the end of the run; write samples between.
+    """Move the state to the landing in ``scratch.stages[LANDED]``, or to the end of the run if that is earlier.
 
-    The level is the indentation landed on, inf if it is a bend or border.
+    Samples that are due in between are written. ``level`` is the indentation at which the landing ends, inf for a bend
+    or border. Returns False, without moving the state, if the step to an output time is not found.
     """
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
     landed, t, t_end = x[size], state.now[T], state.now[T_END]
     _begin_peaks(problem, state, scratch)
     if is_planar(problem):
         for s in range(problem.friction.shape[0]):
-            turns = rubs(problem, s) and state.segment[s] > 0 and _turns(problem, scratch, size, s)
+            turns = rubs(problem, s) and state.segment[s] > 0 and _friction_peaks_inside(problem, scratch, size, s)
             scratch.unresolved[s] = 1.0 if turns else 0.0
     copy(x, state.x, size)
     while True:
@@ -307,104 +320,109 @@ def _accept(problem, tables, state, scratch, variable, stop, level, span):
     if is_planar(problem):
         for s in range(problem.friction.shape[0]):
             if scratch.unresolved[s] > 0.0:
-                _peak_of_drag(problem, tables, state, scratch, variable, stop, span, s)
+                _locate_friction_peak(problem, tables, state, scratch, variable, stop, span, s)
     if state.event_record.shape[0]:
         write_event(state, LANDING, t, landed, span, variable, stop, w)
     state.now[T] = landed
     if is_circle(problem, stop) and level < np.inf and landed < t_end:
         land_on_circle(problem, state, scratch, stop, level)
-    if variable != ROOT or landed == t_end:  # at a knot the force may fall
+    if variable != ROOT or landed == t_end:  # beyond a knot the force may be smaller
         state_peaks(problem, state, scratch, state.x)
     return True
 
 
 @inlined
-def _furthest(problem, tables, state, scratch):
-    """Longest landing, s: within the reach of the fastest block, and within a cell of the sampled signals.
+def _longest_time(problem, tables, state, scratch):
+    """Longest landing, s: `landing_reach` over the fastest rate, and at most a cell of the sampled signals.
 
-    If a derivative is asked for, also within the reach of what the contacts stiffen.
+    For the derivative of a run it is also `landing_reach` over the frequency to which contacts stiffen the structure.
     """
-    furthest = scratch.accuracy[REACH] / tables.fastest
+    longest = scratch.accuracy[REACH] / tables.fastest
     if state.event_record.shape[0]:
-        furthest = min(furthest, scratch.accuracy[REACH] / max(scratch.stiffened[0], 1e-300))
-    return min(furthest, problem.table_dt[0]) if problem.table_dt.size else furthest
+        longest = min(longest, scratch.accuracy[REACH] / max(scratch.stiffened[0], 1e-300))
+    return min(longest, problem.table_dt[0]) if problem.table_dt.size else longest
 
 
 @merged
-def _slopes_by_forces(problem, tables, state, stop, w, x):
-    """Error of the derivative by that of the motion: a force like δ^{3/2} that errs by e has a slope that errs by e/δ.
+def _derivative_factor(problem, tables, state, stop, w, x):
+    """Error of the derivative of a landing over that of its motion, at most `_MOST_FACTOR`.
 
-    With derivatives in units of the largest motion of a stop's place, another stop counts that was entered just now.
+    A force like δ^{3/2} that errs by e has a slope that errs by e/δ. Derivatives are measured in units of the largest
+    motion of a stop's place, so the factor is large just after another stop than ``stop`` has been entered.
     """
-    most = 0.0
+    factor = 0.0
     for s in range(problem.law.size):
         if s != stop and state.segment[s] > 0 and tables.time_exponent[1 + s] > 1.0:
             deepest = max(indentation(problem, s, w), indentation(problem, s, x))
-            most = max(most, abs_dot(problem.read[row_of(problem, s)], w, 2 * problem.k.size) / max(deepest, 1e-300))
-    return min(most, _MOST_SLOPE)
+            factor = max(
+                factor, abs_dot(problem.read[row_of(problem, s)], w, 2 * problem.k.size) / max(deepest, 1e-300)
+            )
+    return min(factor, _MOST_FACTOR)
 
 
 @inlined
-def _level(problem, state, stop, direction):
-    """Indentation at the border of the stop's segment in a direction."""
+def _knot(problem, state, stop, direction):
+    """Indentation, m, at the upper (direction 1) or lower (-1) border of the stop's segment."""
     return problem.knots[stop, state.segment[stop] - (1 if direction < 0 else 0)]
 
 
 @inlined
-def may_land(problem, tables, state, scratch, stop, direction, near):
-    """Whether a border of ``stop``, about ``near`` s ahead, is so near that one step may land on it.
+def may_land(problem, tables, state, scratch, stop, direction, time_to_border):
+    """Whether a landing on the border of ``stop`` in a direction, about ``time_to_border`` s ahead, is worth a trial.
 
-    δ and δ̇ of the stops at the start of the step are in ``scratch.start_motion``.
+    It reads δ and δ̇ at the start of the step from ``scratch.start_motion``.
     """
     delta, rate = scratch.start_motion[stop, 0], scratch.start_motion[stop, 1]
-    if near > _furthest(problem, tables, state, scratch) or abs(rate) <= rate_tolerance(problem, stop, state.x):
+    if time_to_border > _longest_time(problem, tables, state, scratch) or abs(rate) <= rate_tolerance(
+        problem, stop, state.x
+    ):
         return False
     if direction < 0 and state.segment[stop] == 1:
-        last = _LAST
+        limit = _LAST_STEP
         if tables.time_exponent[1 + stop] == 2.0:
-            last = min(_LAST_ROOT * scratch.accuracy[REACH] ** 2, _MOST_ROOT)
-        return delta <= last * state.active[stop, PEAK_DELTA]
-    level = _level(problem, state, stop, direction)
+            limit = min(_LAST_STEP_ROOT * scratch.accuracy[REACH] ** 2, _MOST_ROOT)
+        return delta <= limit * state.active[stop, PEAK_DELTA]
+    level = _knot(problem, state, stop, direction)
     return state.segment[stop] == 0 or abs(level - delta) <= 0.2 * max(level, delta)
 
 
 @merged
-def _part_of_error(problem, tables, state, scratch, variable, stop):
-    """Part of the embedded difference that counts as the error of the landing just tried."""
-    part = _PART_OF_FOURTH if variable == ROOT and tables.time_exponent[1 + stop] == 4.0 else _PART
-    if scratch.viscous[stop] > 0.0:  # too strong a dashpot for an explicit step
-        part = 1.0
+def _error_share(problem, tables, state, scratch, variable, stop):
+    """Share of the embedded difference of the landing just taken that counts as its error."""
+    share = _ERROR_SHARE_FOURTH_ROOT if variable == ROOT and tables.time_exponent[1 + stop] == 4.0 else _ERROR_SHARE
+    if scratch.viscous[stop] > 0.0:  # set where the dashpot is too strong for an explicit step
+        share = 1.0
     if state.event_record.shape[0]:
         w, x = scratch.stages[START], scratch.stages[LANDED]
-        part = max(part, _OF_SLOPES * _slopes_by_forces(problem, tables, state, stop, w, x))
-    return part
+        share = max(share, _DERIVATIVE_SHARE * _derivative_factor(problem, tables, state, stop, w, x))
+    return share
 
 
 @merged
-def land(problem, tables, state, scratch, stop, direction, near):
-    """Try to land on a border of ``stop``, about ``near`` s ahead.
+def land(problem, tables, state, scratch, stop, direction, time_to_border):
+    """Try to land on the border of ``stop`` in a direction, 1 up or -1 down, about ``time_to_border`` s ahead.
 
-    Returns ``stop`` if it succeeded, another stop whose border is crossed before, or -1. A border of a law with memory
-    that is passed before is noted in ``scratch.landed``.
+    Returns ``stop`` after a landing, another stop if that crosses a border before, else -1. If -1 is due to a border of
+    a law with memory that is crossed before, ``scratch.landed`` holds its element and number.
     """
     size, t, rate = state.x.size, state.now[T], scratch.start_motion[stop, 1]
     scratch.landed[0] = -1
-    if not may_land(problem, tables, state, scratch, stop, direction, near):
+    if not may_land(problem, tables, state, scratch, stop, direction, time_to_border):
         return -1
-    furthest, kappa = _furthest(problem, tables, state, scratch), tables.time_exponent[1 + stop]
+    longest, kappa = _longest_time(problem, tables, state, scratch), tables.time_exponent[1 + stop]
     leaving = direction < 0 and state.segment[stop] == 1
     start_landing(problem, tables, state, scratch, stop, np.int64(ROOT))
     w, x = scratch.stages[START], scratch.stages[LANDED]
     variable = ROOT if leaving and kappa > 1.0 else INDENTATION
-    span = -w[size + 1] if variable == ROOT else _level(problem, state, stop, direction) - scratch.start_motion[stop, 0]
+    span = -w[size + 1] if variable == ROOT else _knot(problem, state, stop, direction) - scratch.start_motion[stop, 0]
     _step(problem, tables, state, scratch, variable, stop, span)
-    landed, part = x[size], _part_of_error(problem, tables, state, scratch, variable, stop)
-    width = surface_tolerance(problem, stop, state.x) / abs(rate)  # a distance may be that much rounding
-    if not t <= landed <= t + min(4.0 * near, furthest) + width:
+    landed, share = x[size], _error_share(problem, tables, state, scratch, variable, stop)
+    time_rounding = surface_tolerance(problem, stop, state.x) / abs(rate)  # the distance may be rounding
+    if not t <= landed <= t + min(4.0 * time_to_border, longest) + time_rounding:
         return -1
     if not (
-        _goes_ahead(scratch, size)
-        and _error(problem, scratch, part) <= 1.0
+        _time_increases(scratch, size)
+        and _rate_error(problem, scratch, share) <= 1.0
         and direction * indentation_rate(problem, stop, x) >= 0.0  # it has not turned back
     ):
         return -1
@@ -415,25 +433,26 @@ def land(problem, tables, state, scratch, stop, direction, near):
             other = TOO_LONG
     if other != CLEAR:
         return max(other, -1)
-    level = _level(problem, state, stop, direction)
-    done = _accept(problem, tables, state, scratch, variable, stop, level, span)
-    return stop if done else -1
+    level = _knot(problem, state, stop, direction)
+    accepted = _accept(problem, tables, state, scratch, variable, stop, level, span)
+    return stop if accepted else -1
 
 
 @inlined
-def _apart(problem, tables, state, scratch, stop, border, x, sign):
-    """What falls to zero where a landing in time ends: the margin of a border, or if that is -1 the side of a bend.
+def _event_function(problem, tables, state, scratch, stop, border, x, sign):
+    """(value, sign) of the event function whose zero a landing locates, in the state x.
 
-    Of a slider that sticks, with a sign that is not 0, it is the margin against slip that way: it has no kink where
-    F_t turns. Where |F_t| is too large, that way is the sign of F_t. Returned with the sign.
+    It is the margin of a border, or with ``border`` -1 the side of a bend. A slider that sticks, given a sign σ that is
+    not 0, has μN - σF_t, which is smooth where F_t changes sign, unlike its margin μN - |F_t|. A negative margin sets σ
+    to the sign of F_t.
     """
     if border < 0:
         return side_at(problem, tables, state, stop, x, scratch.trial), sign
     margins_of(problem, state, scratch, stop, x[state.x.size], x, scratch.margin)
     value = scratch.margin[border]
     if is_planar(problem) and sign != 0.0:
-        own = slider_of(problem, stop)
-        force = own[STIFFNESS] * drawn(radius_of(problem, stop), own, scratch.point[1, WAY])
+        slider = slider_of(problem, stop)
+        force = slider[STIFFNESS] * spring_stretch(radius_of(problem, stop), slider, scratch.point[1, XI])
         if value < 0.0:
             sign = math.copysign(1.0, force)
         value += abs(force) - sign * force
@@ -441,16 +460,16 @@ def _apart(problem, tables, state, scratch, stop, border, x, sign):
 
 
 @merged
-def _rises(problem, state, scratch, s, border, value, time):
-    """Whether a margin of a value was lower so long before the landing, by the rates there."""
+def _was_below(problem, state, scratch, s, border, value, time):
+    """Whether a margin was below its present ``value`` a ``time`` before the landing: then it has risen to zero."""
     x = scratch.stages[LANDED]
     margins_later(problem, state, scratch, s, x[state.x.size], x, -time, scratch.ends)
     return scratch.ends[border] < value
 
 
 @inlined
-def _opens(problem, tables, state, scratch, stop):
-    """Whether one step may end where a stop with friction opens: up to there the motion is smooth in u only."""
+def _may_end_at_opening(problem, tables, state, scratch, stop):
+    """Whether a landing may end where a stop with friction opens; the motion is smooth only in u = δ^{1/κ} there."""
     delta, rate = scratch.start_motion[stop, 0], scratch.start_motion[stop, 1]
     if not (rubs(problem, stop) and state.segment[stop] == 1 and tables.time_exponent[1 + stop] > 1.0 and rate < 0.0):
         return False
@@ -458,130 +477,134 @@ def _opens(problem, tables, state, scratch, stop):
 
 
 @inlined
-def _power(tables, stop):
-    """Exponent of u with which N ends where a stop opens, as a rule."""
+def _margin_power(tables, stop):
+    """Power of u in which the margin of a slider that sticks is taken as linear before its stop opens, where N → 0."""
     return tables.time_exponent[1 + stop] + 1.0
 
 
 @merged
-def _begin_at_opening(problem, tables, state, scratch, stop, border, near):
-    """Way in u of a landing on a border before a stop opens; the scale of its margin up to there is noted.
+def _guess_before_opening(problem, tables, state, scratch, stop, border, guess):
+    """(length in u, sign) of the first trial of a landing on a border of friction before its stop opens.
 
-    The place is guessed from margins at both ends for a slider that sticks, with the way it slips; else, and where a
-    margin that begins at zero rises before it falls, from the time as if δ̇ stayed, with 0.
+    A slider that sticks has its margin taken at the start and at the opening, with the sign of the slip that begins.
+    Otherwise, and where the margin begins at zero, the length follows from the ``guess`` of the time with δ̇ constant,
+    and the sign is 0. Largest margin and rounding up to the opening go to ``scratch``.
     """
-    u, delta, own = scratch.stages[START, state.x.size + 1], scratch.start_motion[stop, 0], slider_of(problem, stop)
-    w, kappa, sticks = scratch.stages[START], tables.time_exponent[1 + stop], 1.0 if own[CODE] == 0.0 else 0.0
-    begin, _ = _apart(problem, tables, state, scratch, stop, border, w, 0.0)
+    u, delta, slider = scratch.stages[START, state.x.size + 1], scratch.start_motion[stop, 0], slider_of(problem, stop)
+    w, kappa, sticks = scratch.stages[START], tables.time_exponent[1 + stop], 1.0 if slider[CODE] == 0.0 else 0.0
+    begin, _ = _event_function(problem, tables, state, scratch, stop, border, w, 0.0)
     _step(problem, tables, state, scratch, np.int64(ROOT), stop, -u)
-    end, sign = _apart(problem, tables, state, scratch, stop, border, scratch.stages[LANDED], sticks)
+    end, sign = _event_function(problem, tables, state, scratch, stop, border, scratch.stages[LANDED], sticks)
     largest = max(abs(begin), abs(scratch.margin[border]))
-    rounding = own[STIFFNESS] * way_tolerance(problem, stop, state.now[T], state.x)[0]
-    scratch.largest[stop, border], scratch.noise[stop, border] = largest, max(_OF_LARGEST * largest, 2.0 * rounding)
-    if sticks > 0.0 and end < 0.0 and begin > _BEGINS_THERE * largest:
-        begin, _ = _apart(problem, tables, state, scratch, stop, border, w, sign)
-        return u * (1.0 - (end / (end - begin)) ** (1.0 / _power(tables, stop))), sign
-    left = max(1.0 + near * scratch.start_motion[stop, 1] / delta, 0.0) if delta > 0.0 else 0.0
-    return u * (1.0 - left ** (1.0 / kappa)), 0.0
+    rounding = slider[STIFFNESS] * xi_tolerances(problem, stop, state.now[T], state.x)[0]
+    scratch.largest[stop, border], scratch.noise[stop, border] = largest, max(_ROUNDING * largest, 2.0 * rounding)
+    if sticks > 0.0 and end < 0.0 and begin > _ON_BORDER * largest:
+        begin, _ = _event_function(problem, tables, state, scratch, stop, border, w, sign)
+        return u * (1.0 - (end / (end - begin)) ** (1.0 / _margin_power(tables, stop))), sign
+    remaining = max(1.0 + guess * scratch.start_motion[stop, 1] / delta, 0.0) if delta > 0.0 else 0.0
+    return u * (1.0 - remaining ** (1.0 / kappa)), 0.0
 
 
 @merged
-def _is_exact(problem, tables, state, scratch, variable, stop, time):
-    """Whether the landing just tried, so long, is within the tolerance."""
+def _within_tolerance(problem, tables, state, scratch, variable, stop, time):
+    """Whether the error of the landing just taken, of length ``time`` s, is within the tolerance."""
     if variable != ROOT:
         return _error_in_time(problem, state, scratch, time) <= 1.0
-    part = _part_of_error(problem, tables, state, scratch, variable, stop)
-    return _goes_ahead(scratch, state.x.size) and _error(problem, scratch, part) <= 1.0
+    share = _error_share(problem, tables, state, scratch, variable, stop)
+    return _time_increases(scratch, state.x.size) and _rate_error(problem, scratch, share) <= 1.0
 
 
 @inlined
-def _between(above, below):
-    """A time between two, of which the first may be zero, or smaller by powers of ten."""
-    return math.sqrt(above * below) if above > 0.0 else 1e-3 * below
+def _bisect(low, high):
+    """Geometric mean of a bracket, whose lower end may be smaller by powers of ten; 1e-3 ``high`` if that end is 0."""
+    return math.sqrt(low * high) if low > 0.0 else 1e-3 * high
 
 
 @inlined
-def _secant(span, value, before, apart, end, power):
-    """Where a margin is zero by two trials, if it is a straight line in (end - span)^power."""
+def _secant(span, margin, span_before, margin_before, end, power):
+    """Zero of a margin from two trials by the secant rule, with the margin linear in (end - span)^power."""
     if power == 1.0:
-        return span - value * (span - before) / (value - apart)
-    left, more = (end - span) ** power, (end - before) ** power
-    return end - max(left - value * (left - more) / (value - apart), 0.0) ** (1.0 / power)
+        return span - margin * (span - span_before) / (margin - margin_before)
+    root, root_before = (end - span) ** power, (end - span_before) ** power
+    return end - max(root - margin * (root - root_before) / (margin - margin_before), 0.0) ** (1.0 / power)
 
 
 @merged
-def _meet(problem, tables, state, scratch, stop, border, search):
-    """Find the bend or border by the secant rule; (span, what is left of its margin), or NaN.
+def _locate(problem, tables, state, scratch, stop, border, search):
+    """Locate a zero of the event function by the secant rule, safeguarded by a bracket; (length, remaining value).
 
-    A trial that differs little from the one before goes on from there.
+    The value is NaN if there is no zero up to ``longest``. Trials that differ little are steps of the midpoint rule
+    from the last one. ``search`` is (variable, sign of its direction, first trial, longest, scale of the event
+    function, tolerance, sign of `_event_function`).
     """
-    variable, way, span, furthest, largest, enough, sign = search
-    x, before, power = scratch.stages[LANDED], 0.0, _power(tables, stop) if sign != 0.0 else 1.0
-    apart, sign = _apart(problem, tables, state, scratch, stop, border, scratch.stages[START], sign)
-    begins_there = (apart if border >= 0 else abs(apart)) <= _BEGINS_THERE * largest
-    least = 0.0 if border >= 0 and not begins_there else 0.1 * span
-    if begins_there:  # the secant needs another point
-        before = 0.9 * span
-        _step(problem, tables, state, scratch, variable, stop, way * before)
-        apart, sign = _apart(problem, tables, state, scratch, stop, border, x, sign)
-    above, below = before if apart > 0.0 else 0.0, furthest
-    for _ in range(_MOST_TRIES if border < 0 else _MOST_HALVINGS):
-        if abs(span - before) <= _SMALL * span:
-            _move(problem, tables, state, scratch, variable, stop, way * (span - before))
+    variable, forward, span, longest, largest, tolerance, sign = search
+    x, span_before, power = scratch.stages[LANDED], 0.0, _margin_power(tables, stop) if sign != 0.0 else 1.0
+    value_before, sign = _event_function(problem, tables, state, scratch, stop, border, scratch.stages[START], sign)
+    begins_on_border = (value_before if border >= 0 else abs(value_before)) <= _ON_BORDER * largest
+    shortest = 0.0 if border >= 0 and not begins_on_border else 0.1 * span
+    if begins_on_border:  # the secant needs another point
+        span_before = 0.9 * span
+        _step(problem, tables, state, scratch, variable, stop, forward * span_before)
+        value_before, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign)
+    low, high = span_before if value_before > 0.0 else 0.0, longest
+    for _ in range(_MOST_TRIALS if border < 0 else _MOST_BORDER_TRIALS):
+        if abs(span - span_before) <= _MIDPOINT_UP_TO * span:
+            _midpoint_step(problem, tables, state, scratch, variable, stop, forward * (span - span_before))
         else:
-            _step(problem, tables, state, scratch, variable, stop, way * span)
-        value, sign = _apart(problem, tables, state, scratch, stop, border, x, sign)
-        following = _secant(span, value, before, apart, furthest, power)
-        still = abs(following - span) <= 1e-15 * span and border >= 0
-        if still or abs(value) <= enough or 0.5 * abs(apart) <= abs(value) <= _STILL * largest:
+            _step(problem, tables, state, scratch, variable, stop, forward * span)
+        value, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign)
+        next_span = _secant(span, value, span_before, value_before, longest, power)
+        stagnates = abs(next_span - span) <= 1e-15 * span and border >= 0
+        if stagnates or abs(value) <= tolerance or 0.5 * abs(value_before) <= abs(value) <= _STAGNATION * largest:
             break
         if border >= 0:
-            above, below = (span, below) if value > 0.0 else (above, span)
-            if (below < furthest or way < 0.0) and not above < following < below:
-                following = _between(above, below)
-                if rubs(problem, stop):  # not back to where it begins
-                    following = max(following, 2.0 * least)
-        if not least < following <= furthest or following == span:
+            low, high = (span, high) if value > 0.0 else (low, span)
+            if (high < longest or forward < 0.0) and not low < next_span < high:
+                next_span = _bisect(low, high)
+                if rubs(problem, stop):  # the landing may begin on the same border
+                    next_span = max(next_span, 2.0 * shortest)
+        if not shortest < next_span <= longest or next_span == span:
             return span, np.nan
-        before, apart, span = span, value, following
+        span_before, value_before, span = span, value, next_span
     return span, value
 
 
 @merged
-def land_on_bend(problem, tables, state, scratch, stop, border, near):
-    """Try to land on the bend of ``stop``, or on a border of its law, about ``near`` s ahead; whether it succeeded.
+def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess):
+    """Try to land on border ``border`` of ``stop``, on its bend if that is -1, about ``guess`` s ahead; whether it did.
 
-    A border that is passed before is noted in ``scratch.landed``: -1 if none is, and less if that cannot be told.
+    If another border is crossed before, ``scratch.landed`` holds its element and number; its first entry is -1 if there
+    is none, `UNRESOLVED` if a shorter step must tell.
     """
-    furthest, largest = _furthest(problem, tables, state, scratch), scratch.bend_values[scratch.bend_values.size - 1]
-    enough, sign = 1e-10 * largest, 0.0
-    if border >= 0:  # one that is missed by more may seem to be passed the other way by the next step
-        largest, enough = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
+    limit, largest = _longest_time(problem, tables, state, scratch), scratch.bend_values[scratch.bend_values.size - 1]
+    tolerance, sign = 1e-10 * largest, 0.0
+    if border >= 0:  # if it were missed by more, the next step might cross it in the wrong direction
+        largest, tolerance = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
     scratch.landed[0] = -1
-    if not 0.0 < near <= furthest:
+    if not 0.0 < guess <= limit:
         return False
-    variable, root, way = np.int64(TIME), 1.0, 1.0  # a literal would be compiled for itself
+    variable, exponent, forward = np.int64(TIME), 1.0, 1.0  # a literal would be compiled for itself
     if border >= 0 and scratch.control[NEW] and scratch.control[NODE_SET] == stop + 1:
-        variable, root = np.int64(SINCE), 1.0 / tables.time_exponent[stop + 1]
+        variable, exponent = np.int64(SINCE), 1.0 / tables.time_exponent[stop + 1]
     start_landing(problem, tables, state, scratch, stop, variable)
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
-    furthest, span = furthest**root, near**root
-    if border >= 0 and variable == TIME and _opens(problem, tables, state, scratch, stop):
-        variable, way, furthest = np.int64(ROOT), -1.0, w[size + 1]
-        span, sign = _begin_at_opening(problem, tables, state, scratch, stop, border, near)
-        largest, enough = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
-    search = variable, way, span, furthest, largest, enough, sign
-    span, value = _meet(problem, tables, state, scratch, stop, border, search)
+    limit, span = limit**exponent, guess**exponent
+    if border >= 0 and variable == TIME and _may_end_at_opening(problem, tables, state, scratch, stop):
+        variable, forward, limit = np.int64(ROOT), -1.0, w[size + 1]
+        span, sign = _guess_before_opening(problem, tables, state, scratch, stop, border, guess)
+        largest, tolerance = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
+    search = variable, forward, span, limit, largest, tolerance, sign
+    span, value = _locate(problem, tables, state, scratch, stop, border, search)
     time = span if variable == TIME else x[size] - w[size]
-    if not (abs(value) <= 1e-6 * largest and _is_exact(problem, tables, state, scratch, variable, stop, time)):
+    if not (abs(value) <= 1e-6 * largest and _within_tolerance(problem, tables, state, scratch, variable, stop, time)):
         return False
-    rises = border >= 0 and _rises(problem, state, scratch, stop, border, value, 1e-3 * time)
-    if rises or before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
-        return False  # it has been below zero before, or another surface or bend is in the way
+    crossed_upward = border >= 0 and _was_below(problem, state, scratch, stop, border, value, 1e-3 * time)
+    if crossed_upward or before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
+        return False  # the margin was below zero before, or another surface or bend is crossed first
     scratch.landed[0], scratch.landed[1] = passed(problem, state, scratch, stop, border, w, x)
     if scratch.landed[0] != -1:
         return False
     lower, upper = problem.knots[stop, state.segment[stop] - 1], problem.knots[stop, state.segment[stop]]
     if not lower < indentation(problem, stop, x) < upper:
         return False
-    return _accept(problem, tables, state, scratch, variable, stop, np.inf, way * span)
+    return _accept(problem, tables, state, scratch, variable, stop, np.inf, forward * span)

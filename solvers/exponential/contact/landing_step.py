@@ -1,4 +1,4 @@
-"""The Runge–Kutta step of a landing: one of DOP853 with t among the unknowns; see `landing` for its variables."""
+"""The Runge–Kutta step of a landing: DOP853 with t among the unknowns; the variables are explained in `landing`."""
 
 from __future__ import annotations
 
@@ -43,12 +43,15 @@ from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 
 INDENTATION, ROOT, TIME, SINCE = range(4)
 MIDPOINT = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 1.0]])
-_CHOICE = types.boolean, types.boolean, types.int64, types.int64  # types of with_energy, short, variable, stop
+_CHOICE = types.boolean, types.boolean, types.int64, types.int64  # with_energy, short, variable, stop
 
 
 @inner
 def _force_of_law(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batch):
-    """The same by the law's own function, on its side of a knot."""
+    """Force, N, of stop s by its law's compiled function, which is evaluated within its segment, not on a knot.
+
+    A law cut at zero is taken without the cut if the step begins on its pushing side, ``side`` > 0, else as zero.
+    """
     batch[0], batch[1], batch[2] = off_knots(problem, s, segment, max(delta, problem.knots[s, 0])), delta_dot, 0.0
     if tables.bend[s] != FORCE:
         law_forces(problem, s, 1, batch[0:1], batch[1:2], entry_rate, batch[2:3])
@@ -59,7 +62,7 @@ def _force_of_law(problem, tables, s, segment, delta, delta_dot, side, entry_rat
 
 @merged
 def _force(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batch):
-    """Force of stop s; a law cut at zero force is continued as on the side of the cut where the step began."""
+    """Force, N, of stop s; power laws are evaluated here, others called. No cut at zero acts within the step."""
     law = tables.power_law[s]
     if law[EXPONENT] > 0.0:
         deep = max(delta, 0.0)
@@ -70,7 +73,7 @@ def _force(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batc
 
 @merged
 def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, out, batch):
-    """Derivative of the unknowns ``w`` = [state, t, u] by the chosen variable, times its span; number of law calls."""
+    """Write d[state, t, u]/d(variable) × ``span`` at w = [state, t, u] into ``out``; returns the law calls."""
     n, calls, pace = problem.k.size, 0, np.nan
     size, t = 2 * n, width_of(problem)
     for b in range(n):
@@ -116,9 +119,9 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
 
 @part(LANDING_STEP, types.int64, *_CHOICE, REAL, VECTOR, INTEGERS, VECTOR, VECTOR, MATRIX)
 def landing_step(problem, tables, with_energy, short, variable, stop, span, w, segment, entry_rate, side, work):
-    """One DOP853 step of the chosen variable from ``w`` to ``work[LANDED]``, stages in ``work``; count of law calls.
+    """One DOP853 step of length ``span`` in the variable from ``w`` to ``work[LANDED]``; number of law calls.
 
-    A short one is a step of the midpoint rule; it leaves the stages as they are.
+    The stages stay in ``work``. A ``short`` step is one of the midpoint rule, which leaves them as they are.
     """
     batch, trial, calls = work[BATCH], work[LANDED], 0
     stages, tableau, count = (work[STAGES:], MIDPOINT, 2) if short else (work, A, STAGES)
@@ -133,7 +136,7 @@ def landing_step(problem, tables, with_energy, short, variable, stop, span, w, s
 
 @inner
 def start_landing(problem, tables, state, scratch, stop, variable):
-    """Put the state at the start of a landing of ``stop``, with t and u, into ``scratch.stages[START]``."""
+    """Write [state, t, u] at the start of a landing of ``stop`` into ``scratch.stages[START]``; u is 0 for `SINCE`."""
     w, size, delta = scratch.stages[START], state.x.size, max(indentation(problem, stop, state.x), 0.0)
     copy(state.x, w, size)
     kappa, root = tables.time_exponent[1 + stop], math.sqrt(delta)

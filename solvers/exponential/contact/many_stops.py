@@ -1,10 +1,10 @@
 """Contact steps with many stops: forces move the blocks, and the motion of a stop is a sum over the blocks.
 
-Up to `block_tables.FEW` stops there are tables of the response of each stop to each force. Their size, and the part a
-step must load, grow with the square of the number of stops. With more stops ``scratch.block_motion`` holds p and v of
+Up to `block_tables.FEW` stops there are tables of the response of each stop to each force. Their size, and what a step
+reads of them, grow with the square of the number of stops. With more stops ``scratch.block_motion`` holds p and v of
 all blocks at the nodes, without forces or with all of them. The response of one stop to the force of another is summed
-up when both are in contact for the first time, and kept in a pool of bounded size; with many in contact at once the
-blocks take less time than all pairs.
+up when both are in contact for the first time, and kept in a pool of bounded size; with many in contact at once, sums
+over the blocks are cheaper than sums over all pairs.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from solvers.exponential.contact.nodes import S
 from solvers.exponential.responses import fill_pair
 
 SIGNALS, CONTINUING, ENTERING = range(3)  # groups of inputs: signals, forces without and with the weight σ^λ
-FEW_AT_ONCE = 24  # rows in contact whose pairs on some step lengths all have room in the pool
-POOL = 4093  # pairs of rows and step lengths, a kilobyte each; prime, so that few of one step share a place
+FEW_AT_ONCE = 24  # rows in contact whose pairs, at some step lengths each, all fit into the pool
+POOL = 4093  # pairs of rows and step lengths, 1 kB each; a prime, so that few pairs of one step share an index
 
 
 @inlined
 def uses_blocks(tables):
-    """Whether there are more rows than have tables of their own."""
+    """Whether there are too many rows for tables of each pair of them."""
     return tables.node_propagator.shape[1] > 0
 
 
 @inlined
 def enters(problem, node_set, u):
-    """Whether input u is a force of the element that enters on a step with given nodes."""
+    """Whether input u is a force of the element that enters on a step with these nodes."""
     return u < problem.gap.size and element_of(problem, u) == node_set - 1
 
 
 @inlined
 def weighting_of(problem, tables, node_set, u):
-    """Index of the weighting of input u on a step with given nodes."""
+    """Index of the weighting of input u, a force or signal, on a step with these nodes."""
     return tables.entering[node_set] if enters(problem, node_set, u) else tables.kind[node_set]
 
 
@@ -47,15 +47,15 @@ def pair_response(problem, tables, scratch, node_set, level, r, u):
     """(S, 2S): displacement and rate of row r at the nodes from the node values of input u."""
     weighting = weighting_of(problem, tables, node_set, u)
     if uses_blocks(tables):
-        matrix = scratch.pair_pool[_in_pool(problem, tables, scratch, weighting, level, r, u)]
+        matrix = scratch.pair_pool[_pool_index(problem, tables, scratch, weighting, level, r, u)]
     else:
         matrix = tables.forced[weighting, level, u, r]
     return matrix
 
 
 @part(PAIR, types.int64, *[types.int64] * 4)
-def _in_pool(problem, tables, scratch, weighting, level, r, u):
-    """Index of that response in the pool, for many rows; it is summed up if another pair has its place."""
+def _pool_index(problem, tables, scratch, weighting, level, r, u):
+    """Index of the same response in ``scratch.pair_pool``; it replaces another pair with the same index if need be."""
     key = ((weighting * tables.contact_step.size + level) * problem.gap.size + r) * scratch.force.shape[0] + u + 1
     place = key % scratch.pool_keys.size
     if scratch.pool_keys[place] != key:
@@ -70,7 +70,7 @@ def _in_pool(problem, tables, scratch, weighting, level, r, u):
 
 @part(FREE_BLOCKS, types.void, types.int64, types.int64, VECTOR)
 def free_block_motion(problem, tables, scratch, node_set, level, x):
-    """All blocks at the nodes from the state at the start of the step, without forces."""
+    """Write p and v of all blocks at the nodes, from the state x at the start of the step and without forces."""
     n, block_motion = problem.k.size, scratch.block_motion
     ahead = tables.node_propagator[tables.kind[node_set], level]
     for b in range(n):
@@ -82,7 +82,7 @@ def free_block_motion(problem, tables, scratch, node_set, level, x):
 
 @inner
 def _sum_pushes(problem, tables, state, scratch, force, node_set, group):
-    """State rates of the blocks by one group of inputs, at the nodes, into ``scratch.block_force``; whether any act."""
+    """Rates of the blocks by one group of inputs at the nodes, into ``scratch.block_force``; False if none acts."""
     rows, size, own, found = problem.gap.size, problem.k.size, tables.block_response.shape[3] // 2, False
     for u in range(force.shape[0]):
         if (u >= rows) != (group == SIGNALS) or (u < rows and not acts(problem, state, u)):
@@ -100,7 +100,7 @@ def _sum_pushes(problem, tables, state, scratch, force, node_set, group):
 
 @part(PUSHED_BLOCKS, types.void, *[types.int64] * 3, MATRIX)
 def add_block_motion(problem, tables, state, scratch, node_set, level, group, motion):
-    """Add the response to the present forces of one group, or to the signals, to blocks' motion at the nodes."""
+    """Add the response to one group of inputs, signals or forces, to the blocks' motion at the nodes."""
     if not _sum_pushes(problem, tables, state, scratch, scratch.force, node_set, group):
         return
     n, own, block_force = problem.k.size, tables.block_response.shape[3] // 2, scratch.block_force
@@ -117,7 +117,7 @@ def add_block_motion(problem, tables, state, scratch, node_set, level, group, mo
 
 @part(PUSHED_END, types.void, MATRIX, types.int64, types.int64, VECTOR)
 def add_end_response(problem, tables, state, scratch, force, node_set, level, x):
-    """Add the response at the end of the step to forces and signals to a state."""
+    """Add the response to all forces and signals, at the end of the step, to the state x."""
     n, own = problem.k.size, tables.block_response.shape[3] // 2
     for group in range(0 if problem.table_dt.size else 1, 3):
         if not _sum_pushes(problem, tables, state, scratch, force, node_set, group):
@@ -158,7 +158,7 @@ def respond_through_blocks(problem, tables, state, scratch, node_set, level):
 
 @part(STOP_AT_NODES, types.void, types.int64, REAL, MATRIX)
 def motion_at_nodes(problem, scratch, r, gap, out):
-    """Displacement + gap and rate of row r at the nodes from the blocks, less ``gap``."""
+    """Displacement less ``gap``, and rate, of row r at the nodes from the motion of the blocks."""
     size = 2 * problem.k.size
     store8(out[0], 0, splat8(-gap))
     combine(scratch.block_motion, problem.read[r], size, out[0], out[0])

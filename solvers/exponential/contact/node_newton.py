@@ -1,4 +1,4 @@
-"""Newton's method for the forces of a contact step, for stiff or strongly damped laws."""
+"""Newton's method for the forces of a contact step, where stiff or strongly damped laws need it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MOST_ITERATIONS = 16
 
 @inner
 def linearise(problem, tables, state, scratch, node_set, level):
-    """J = 1 - ∂law/∂(δ, δ̇) ∂(δ, δ̇)/∂F at the nodes of all rows in contact, one after the other; returns its size."""
+    """Write J = 1 - ∂law/∂(δ, δ̇) ∂(δ, δ̇)/∂F, over nodes and rows in contact, into ``scratch.jacobian``; its size."""
     for s in range(problem.law.size):
         if state.segment[s] > 0:
             motion, slope = motion_of(problem, scratch, s), scratch.slope[s]
@@ -43,7 +43,7 @@ def linearise(problem, tables, state, scratch, node_set, level):
 
 @inner
 def _linearise_row(problem, tables, state, scratch, node_set, level, r, begin):
-    """Write what row r adds to J, from its row ``begin`` on."""
+    """Write the S rows of J that belong to row r, from its row ``begin`` on."""
     slope, pushes, column = scratch.slope[element_of(problem, r)], r == row_of(problem, element_of(problem, r)), 0
     for u in range(problem.gap.size):
         if not acts(problem, state, u):
@@ -89,8 +89,8 @@ def substitute(matrix, pivots, n, x):
 
 
 @merged
-def _note_viscosity(state, scratch):
-    """Largest slopes of the forces by their rates, into ``scratch.viscous``."""
+def _store_rate_slopes(state, scratch):
+    """Largest |∂F/∂δ̇| at the nodes of every stop in contact, N s/m, into ``scratch.viscous``."""
     for s in range(state.segment.size):
         if state.segment[s] > 0:
             scratch.viscous[s] = 0.0
@@ -100,7 +100,7 @@ def _note_viscosity(state, scratch):
 
 @part(NEWTON, types.boolean, types.int64, types.int64)
 def newton(problem, tables, state, scratch, node_set, level):
-    """Solve for the forces by Newton's method, where the fixed-point iteration diverges; whether it converged."""
+    """Solve for the forces by Newton's method, where fixed-point iteration diverges; whether it converged."""
     for _ in range(MOST_ITERATIONS):
         place = 0
         respond_all(problem, tables, state, scratch, node_set, level)
@@ -116,7 +116,7 @@ def newton(problem, tables, state, scratch, node_set, level):
         factorise(scratch.jacobian, scratch.pivots, n)
         substitute(scratch.jacobian, scratch.pivots, n, scratch.residual)
         found, place = True, 0
-        _note_viscosity(state, scratch)
+        _store_rate_slopes(state, scratch)
         for r in range(problem.gap.size):
             s = element_of(problem, r)
             if state.segment[s] == 0:

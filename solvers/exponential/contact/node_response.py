@@ -41,17 +41,14 @@ DIFFERENCE, BATCH, LANDED, WITHIN, START = range(STAGES + 1, STAGES + 6)
 """Rows of `Scratch.stages` behind the stages of a landing's Runge–Kutta step and the rate at its end: the embedded
 difference; numbers for one law call; trial states, at last the one landed on; a state within a step, for the energy
 balance; the state at the start of a landing, or at the end of a run within a step."""
-DELTAS, RATES, FORCES, KNOWN = range(
-    4
-)  # rows of `Scratch.local_motion`: m, m/s, N at points around a node; the values they are interpolated from
-
-
+DELTAS, RATES, FORCES, KNOWN = range(4)
+"""Rows of `Scratch.local_motion`: m, m/s, N at points around a node, and the values they are interpolated from."""
 RTOL, REACH = range(2)  # places in Scratch.accuracy
-_KINK = 1e-2  # of a smooth signal the jumps are a tenth of this or less, see `solvers.problem.common_grid`
-STRAIGHT = 1e-9  # change of a law's slope on a step, in units of the slope, up to which it is none
-_OF_WORK = 10.0  # part of the largest force of a law with memory, in units of rtol, that a step may leave out
-_ROUNDINGS = 4.0  # that coefficients of a force show beside those of its values
-_SEEN = 4.0  # times the last two coefficients of a signal: a difference up to this is what they stand for
+_KINK_JUMP = 1e-2  # jump of a third derivative, over signal/dt³, that is a kink; smooth signals have a tenth
+STRAIGHT = 1e-9  # change of a law's slope on a step, in units of the slope, that is rounding
+_WORK_TOLERANCE = 10.0  # part of a force, in units of rtol × the largest force, that a step may leave out for its work
+_ROUNDINGS = 4.0  # rounding of the coefficients of a force, in units of that of its values
+_RESOLVED = 4.0  # times the last two coefficients of a signal: differences up to this are estimated by them already
 
 
 class Scratch(NamedTuple):
@@ -67,7 +64,7 @@ class Scratch(NamedTuple):
     terms: Annotated[Any, "14, 2*N8"]  # derivatives of the state
     signal_terms: Annotated[Any, "tables, 6"]  # value and derivatives of every sampled signal
     values: Annotated[Any, "14"]  # coefficients of a polynomial
-    norms: Annotated[Any, "N"]  # energy norms of the blocks, √J
+    norms: Annotated[Any, "N"]  # energy norms of the blocks, √(v² + k p²), √J
     signal_bounds: Annotated[Any, "L"]  # bounds of the sampled signals on some cells
     per_row: Annotated[Any, "R"]  # bounds of |δ̈| in m/s², errors of δ in m, or of δ̇ in m/s
     split_state: Annotated[Any, "6, 2, N8"]  # p and v of the blocks, of several states; see `energy.flight_balance`
@@ -75,45 +72,45 @@ class Scratch(NamedTuple):
     clipped: Annotated[Any, "S"]  # indentations of one stop at the nodes, not below 0
     free: Annotated[Any, "R, 2, S"]  # the same without contact forces
     force: Annotated[Any, "R+L, S"]  # forces on the rows, then values of the signals
-    law_force: Annotated[Any, "R+A, S"]  # forces on the rows by the laws, for the motion at hand, those of circles
-    trial: Annotated[Any, "S"]  # numbers of one moment
+    law_force: Annotated[Any, "R+A, S"]  # forces on the rows by the laws for the present motion, then the radial ones
+    trial: Annotated[Any, "S"]  # eight numbers for use within a function
     summary: Annotated[Any, "R+A, 8"]  # of forces, see Tables.summary
     previous: Annotated[Any, "R, S"]  # forces of the last accepted step
     slope: Annotated[Any, "E, 3, S"]  # derivatives of the laws at the nodes by δ, δ̇ and entry rate
     turned: Annotated[Any, "5*A, 2, S"]  # slopes of the components of circles' forces, see `circles.contact`
-    residual: Annotated[Any, "R*S"]  # N, then the changes of the forces
+    residual: Annotated[Any, "R*S"]  # N: of Newton's method, then its changes of the forces
     pivots: Annotated[Any, "int R*S"]  # of the LU factors
     stages: Annotated[Any, "stages, W8"]  # states and rates, rows as named above
     reference_speed: Annotated[Any, "E"]  # m/s: an error of an indentation rate is measured in rtol × reference speed
     first_step_share: Annotated[Any, "E"]  # of a contact's duration that its first step may take; 0: unknown
-    force_tolerance: Annotated[Any, "E"]  # N: change of a force within which it counts as found
+    force_tolerance: Annotated[Any, "E"]  # N: change of a force in an iteration below which it counts as converged
     unresolved: Annotated[Any, "R"]  # N s: impulse that the polynomials of a step leave out
-    guess: Annotated[Any, "R, S"]  # forces the iterations begin with
-    viscous: Annotated[Any, "E"]  # N s/m: slope of a force by its rate, where Newton's method has found it; else 0
+    guess: Annotated[Any, "R, S"]  # forces from which the iterations begin
+    viscous: Annotated[Any, "E"]  # N s/m: slope of a force by its rate, from the last Newton iteration; 0 if not needed
     local_motion: Annotated[Any, "4, 3*S"]  # rows as named above, see `peaks`
-    side: Annotated[Any, "E"]  # +1 or -1: side of its law's bend on which each stop is, see `crossings`
+    side: Annotated[Any, "E"]  # +1 or -1: sign of the event function of each stop's bend, see `crossings`
     side_at_begin: Annotated[Any, "E"]  # the same at the start of the step tried
-    bend_values: Annotated[Any, "S+2"]  # of one stop at the nodes and at the end, then the largest, see `crossings`
+    bend_values: Annotated[Any, "S+2"]  # event function of a bend at the nodes and at the end, then its largest size
     accuracy: Annotated[Any, "2"]  # rtol; radians of the fastest block that a landing may take
-    stiffened: Annotated[Any, "1"]  # rad/s: what the contacts' slopes make of the speed of a step's neighbours
+    stiffened: Annotated[Any, "1"]  # rad/s: frequency of the structure as stiffened by the contacts, for derivatives
     duration: Annotated[Any, "1"]  # s: estimate for the contact begun last, as if nothing else acted on the body
     energy_sums: Annotated[Any, "2+L, numbers"]  # see `energy.flight_balance` and `contact_balance`
     energy: Annotated[Any, "3"]  # J, see `energy.check`
-    control: Annotated[Any, "int 7"]  # of the step control, places named in `step`
+    control: Annotated[Any, "int 7"]  # integers of the step control, places named in `first_step`
     start_motion: Annotated[Any, "E, 2"]  # δ and δ̇ at the start of the step
     node_time: Annotated[Any, "S"]  # s, of the nodes of the step tried
-    slid: Annotated[Any, "G, 4, S"]  # ξ, ξ̇ and F_t at the nodes, then numbers of a moment; see `circles.friction`
+    slid: Annotated[Any, "G, 4, S"]  # ξ, ξ̇ and F_t at the nodes, then scratch; see `circles.friction`
     row_slopes: Annotated[Any, "9*G, 2, S"]  # of forces on the rows of an element with friction, by these
-    row_ways: Annotated[Any, "6*G, S"]  # ∂δ/∂y and ∂ξ/∂y of each of its rows at the nodes, for the tangent
-    point: Annotated[Any, "2, 6"]  # motion of an element with friction, see `compiled.sliding`
+    node_directions: Annotated[Any, "6*G, S"]  # ∂δ/∂y and ∂ξ/∂y of each of its rows at the nodes, for Newton's method
+    point: Annotated[Any, "2, 6"]  # motion of an element with friction, now and extrapolated, see `compiled.sliding`
     numbers: Annotated[Any, "S"]  # for a law call
     margin: Annotated[Any, "B*S"]  # margins of an element's borders at points, row by row; see `borders`
-    ends: Annotated[Any, "6*B"]
-    fired: Annotated[Any, "B"]
+    ends: Annotated[Any, "6*B"]  # margins of an element's borders at the ends of a step or landing; see `borders`
+    fired: Annotated[Any, "B"]  # margins of an element's borders in one state
     largest: Annotated[Any, "E, B"]  # largest margins on the step tried last
     noise: Annotated[Any, "E, B"]  # their rounding
-    border: Annotated[Any, "int 1"]  # border that ends the step tried last, -1 for a bend
-    landed: Annotated[Any, "int 2"]  # element and border that a landing in time has found to lie before its own, or -1
+    border: Annotated[Any, "int 1"]  # border that the step tried last crosses first, -1 if it is a bend
+    landed: Annotated[Any, "int 2"]  # element and border that a landing would cross first, see `landing`; else -1
     block_motion: Annotated[Any, "2*M, S"]  # p and v at the nodes; as the next two see `many_stops`
     block_force: Annotated[Any, "2*M, S"]  # state rates of the blocks by the forces at the nodes
     pair_weights: Annotated[Any, "M8"]  # products of a read row with the push of another row
@@ -127,7 +124,7 @@ class Scratch(NamedTuple):
 
 @merged
 def sample_signals(problem, tables, scratch, node_set, t, h):
-    """Values of the sampled signals at the nodes of a step."""
+    """Values of the sampled signals at the nodes of a step of length h from time t, into rows of ``scratch.force``."""
     for j in range(problem.table_dt.size):
         for i in range(S):
             scratch.force[problem.gap.size + problem.table_load[j], i] = table_value(
@@ -143,7 +140,10 @@ def largest_size(values):
 
 @inlined
 def unresolved_part(coefficients, largest, power):
-    """Estimate of the part that a polynomial leaves out, from its last four coefficients."""
+    """Estimate of the part of a function that its polynomial leaves out, from its last four coefficients.
+
+    With A₁ the larger of the last two, A₂ that of the two before: A₁ max((A₁/A₂)^power, A₁/largest).
+    """
     before = max(abs(coefficients[0]), abs(coefficients[1]))
     last = max(abs(coefficients[2]), abs(coefficients[3]))
     if last <= 1e-14 * largest:
@@ -154,21 +154,21 @@ def unresolved_part(coefficients, largest, power):
 
 @inlined
 def error_of_work(problem, state, scratch, s, unresolved, largest, slopes):
-    """Part of a force that a step leaves out, N, in units of what the work of an element with memory may err by.
+    """Part of a force that a step leaves out, N, in units of its tolerance for the work of an element with memory.
 
-    With the slopes of the law by δ and δ̇, what rounding of these makes of the force is no error of the step.
+    ``slopes`` of the law by δ and δ̇ give the rounding of the force, which is no error of the step.
     """
     rounding = slopes[0] * surface_tolerance(problem, s, state.x) + slopes[1] * rate_tolerance(problem, s, state.x)
-    allowed = _OF_WORK * scratch.accuracy[RTOL] * max(largest, state.active[s, PEAK_FORCE])
+    allowed = _WORK_TOLERANCE * scratch.accuracy[RTOL] * max(largest, state.active[s, PEAK_FORCE])
     return max(unresolved - _ROUNDINGS * rounding, 0.0) / allowed
 
 
 @inner
 def unresolved_signal(problem, tables, scratch, node_set, j, t, h):
-    """The same of a sampled signal on a step from t on; an entry step integrates it at half the order.
+    """Estimate of the part of sampled signal j that its polynomial leaves out; on an entry step at half the order.
 
     What lies between the nodes, such as a short pulse, does not show in the coefficients: there the table is compared.
-    Where the table has kinks the coefficients fall too slowly to tell what they leave out: it is integrated.
+    Where the table has kinks, the coefficients decay too slowly to show it: there the difference is integrated.
     """
     values, c = scratch.force[problem.gap.size + problem.table_load[j]], scratch.trial
     largest, dt, start = largest_size(values), problem.table_dt[j], problem.table_start[j]
@@ -176,8 +176,8 @@ def unresolved_signal(problem, tables, scratch, node_set, j, t, h):
     found = unresolved_part(c, largest, S // 2 if node_set == 0 else 1)
     first, beyond = start + int(t / dt) + 1, min(start + int((t + h) / dt) + 1, problem.table_start[j + 1])
     if beyond - first > S:
-        apart, mean = _between_nodes(problem, c, tables.time_exponent[node_set], j, first, beyond, t, h)
-        if apart > _SEEN * max(abs(c[2]), abs(c[3])) + 1e-12 * largest:
+        difference, mean = _between_nodes(problem, c, tables.time_exponent[node_set], j, first, beyond, t, h)
+        if difference > _RESOLVED * max(abs(c[2]), abs(c[3])) + 1e-12 * largest:
             found = max(found, mean)
     if _has_kinks(problem, j, first, beyond, largest):
         found = max(found, _missed_impulse(problem, tables, values, node_set, j, t, h))
@@ -186,20 +186,20 @@ def unresolved_signal(problem, tables, scratch, node_set, j, t, h):
 
 @inner
 def _between_nodes(problem, coefficients, time_exponent, j, first, beyond, t, h):
-    """Largest and mean difference of a signal from its polynomial at the nodes of its table."""
+    """Largest and mean difference of a signal from its polynomial, at the nodes of its table within the step."""
     dt, start, largest, total, power = problem.table_dt[j], problem.table_start[j], 0.0, 0.0, 1.0 / time_exponent
     for node in range(first, beyond):
         place = ((node - start) * dt - t) / h
         if power < 1.0:
             place = place**power
-        apart = abs(problem.table[node, 0] - _legendre(coefficients, 2.0 * place - 1.0))
-        largest, total = max(largest, apart), total + apart
+        difference = abs(problem.table[node, 0] - _legendre(coefficients, 2.0 * place - 1.0))
+        largest, total = max(largest, difference), total + difference
     return largest, total / (beyond - first)
 
 
 @inner
 def _has_kinks(problem, j, first, beyond, largest):
-    """Whether the third derivative jumps by much at a node: by more than `_KINK` of the signal over dt³."""
+    """Whether the third derivative of a signal jumps at a node of its table by more than `_KINK_JUMP` × largest/dt³."""
     dt, table, most = problem.table_dt[j], problem.table, 0.0
     last = problem.table_start[j + 1] - 1
     for node in range(max(first, problem.table_start[j] + 1), min(beyond, last)):
@@ -208,18 +208,18 @@ def _has_kinks(problem, j, first, beyond, largest):
             60.0 * (a[0] - 2.0 * b[0] + c[0]) + 24.0 * dt * (a[1] - c[1]) + 3.0 * dt * dt * (a[2] - 6.0 * b[2] + c[2])
         )
         most = max(most, abs(jump))
-    return most > _KINK * largest
+    return most > _KINK_JUMP * largest
 
 
 @inner
 def _missed_impulse(problem, tables, values, node_set, j, t, h):
-    """Mean of the signal less its polynomial on the step, and the same of their products with 2 τ/h - 1, in size."""
+    """|mean| over the step of signal less polynomial; on a smooth step also of the difference times 2τ/h - 1."""
     dt, impulse, moment = problem.table_dt[j], 0.0, 0.0
     last = min(int((t + h) / dt), problem.table_start[j + 1] - problem.table_start[j] - 2)
     for cell in range(min(int(t / dt), last), last + 1):
         begin, end = max(t / dt - cell, 0.0), (t + h) / dt - cell if cell == last else 1.0
-        a = _moments(problem, j, cell, begin)
-        b = _moments(problem, j, cell, end)
+        a = _cell_moments(problem, j, cell, begin)
+        b = _cell_moments(problem, j, cell, end)
         impulse += b[0] - a[0]
         moment += (b[1] - a[1]) + (cell - (t + 0.5 * h) / dt) * (b[0] - a[0])
     impulse, moment = impulse * dt / h, moment * 2.0 * dt * dt / (h * h)
@@ -231,8 +231,8 @@ def _missed_impulse(problem, tables, values, node_set, j, t, h):
 
 
 @inlined
-def _moments(problem, j, cell, x):
-    """∫ s and ∫ s u from the start of a cell to u = x, in units of its length."""
+def _cell_moments(problem, j, cell, x):
+    """∫ s du and ∫ s u du from the start of a cell to u = x, u in units of the cell's length."""
     s0, s1, s2, c3, c4, c5 = quintic(problem, j, cell)
     plain = s0 + x * (s1 / 2.0 + x * (s2 / 3.0 + x * (c3 / 4.0 + x * (c4 / 5.0 + x * c5 / 6.0))))
     first = s0 / 2.0 + x * (s1 / 3.0 + x * (s2 / 4.0 + x * (c3 / 5.0 + x * (c4 / 6.0 + x * c5 / 7.0))))
@@ -241,7 +241,7 @@ def _moments(problem, j, cell, x):
 
 @inlined
 def _legendre(coefficients, x):
-    """A polynomial from its Legendre coefficients, in the order of `Tables.tail`."""
+    """Value at x in [-1, 1] of a polynomial from its Legendre coefficients, which are in the order of `Tables.tail`."""
     before, now, half = 1.0, x, S // 2
     total = coefficients[half] + x * coefficients[half + 1]
     for k in range(2, S):
@@ -252,23 +252,23 @@ def _legendre(coefficients, x):
 
 @inner
 def free_response(problem, tables, state, scratch, node_set, level):
-    """Motion of the rows at the nodes without contact forces, signals included, into ``scratch.free``.
+    """Motion of the rows at the nodes without contact forces, but with signals, into ``scratch.free``.
 
-    With many rows it is done for those in contact only.
+    With many rows only those in contact are computed.
     """
-    rows, size, through = problem.gap.size, 2 * problem.k.size, uses_blocks(tables)
+    rows, size, by_blocks = problem.gap.size, 2 * problem.k.size, uses_blocks(tables)
     if is_planar(problem):
         for i in range(S):
             scratch.node_time[i] = state.now[T] + tables.contact_step[level] * tables.times[node_set, i]
     if problem.table_dt.size:
         sample_signals(problem, tables, scratch, node_set, state.now[T], tables.contact_step[level])
-    if through:
+    if by_blocks:
         free_block_motion(problem, tables, scratch, node_set, level, state.x)
         if problem.table_dt.size:
             add_block_motion(problem, tables, state, scratch, node_set, level, SIGNALS, scratch.block_motion)
     for r in range(rows):
         free = scratch.free[r]
-        if through:
+        if by_blocks:
             if acts(problem, state, r):
                 motion_at_nodes(problem, scratch, r, problem.gap[r], free)
             continue
@@ -292,7 +292,7 @@ def respond(problem, tables, state, scratch, node_set, level, r):
 
 @inner
 def respond_all(problem, tables, state, scratch, node_set, level):
-    """The same of all rows in contact."""
+    """The same of all rows in contact, through the blocks if that is cheaper."""
     if prefers_blocks(problem, tables, state):
         respond_through_blocks(problem, tables, state, scratch, node_set, level)
         return
@@ -303,7 +303,7 @@ def respond_all(problem, tables, state, scratch, node_set, level):
 
 @inlined
 def own_accelerance(problem, tables, s):
-    """-δ̈ of a stop per newton of its own, 1/kg; of a circle the larger one of its rows."""
+    """-δ̈ of a stop per newton of its own force, 1/kg; of a circle the larger one of its rows."""
     row = row_of(problem, s)
     if is_circle(problem, s):
         return max(tables.accelerance[row, row], tables.accelerance[row + 1, row + 1])
@@ -312,19 +312,19 @@ def own_accelerance(problem, tables, s):
 
 @merged
 def motion_of(problem, scratch, s):
-    """(2, S) indentation and rate of stop s at the nodes."""
+    """(2, S) δ, m, and δ̇, m/s, of stop s at the nodes."""
     return scratch.motion[place_of(problem, s)]
 
 
 @merged
 def force_of(problem, scratch, s):
-    """(S,) force of stop s at the nodes."""
+    """(S,) force, N, of stop s at the nodes; of a circle that along the radius."""
     return scratch.force[row_of(problem, s)] if not is_circle(problem, s) else scratch.law_force[place_of(problem, s)]
 
 
 @inlined
 def ripple_of_stop(problem, tables, s, alias, x):
-    """The error of `ripple_of` of a stop's indentation."""
+    """Error of a stop's indentation between the nodes by fast blocks, m; see `ripple_of`."""
     row, n = row_of(problem, s), problem.k.size
     ripple = ripple_of(tables.ripple_weight[row], alias, x, n)
     if is_circle(problem, s):
@@ -334,7 +334,7 @@ def ripple_of_stop(problem, tables, s, alias, x):
 
 @reordered
 def ripple_of(ripple_weight, alias, x, n):
-    """Error, m, of a row's displacement between the nodes, by blocks that oscillate faster than the nodes resolve."""
+    """Bound, m, of the error of a row's displacement between the nodes, by blocks too fast for the nodes."""
     error = 0.0
     for b in range(n):
         error += ripple_weight[b] * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))

@@ -4,9 +4,10 @@ A force is given by its values F_j at S nodes σ_j of (0, 1), t = h σ^κ:
 
     F(t) = w(σ) Σ_j L_j(σ) F_j / w(σ_j),
 
-*smooth*: κ = 1, w = 1, Gauss–Legendre nodes; *entry*: w = σ^λ, Gauss–Jacobi nodes for the weight σ^{λ+κ-1}. A force
-whose terms begin like δ^p, p one of some powers, is at t = 0 a series in t^{1/κ} if all κp are whole numbers, and
-begins with t^{λ/κ}, λ/κ the smallest p: κ = 2, λ = 3 for Hertz's law, κ = 4, λ = 1 for that of Tsuji.
+*smooth*: κ = 1, w = 1, Gauss–Legendre nodes; *entry*: w = σ^λ, Gauss–Jacobi nodes for the weight σ^{λ+κ-1}. A force is
+a sum of terms that begin like δ^p, with one or more powers p. After an entry at t = 0 it is a series in t^{1/κ} if all
+κp are whole numbers, and begins with t^{λ/κ}, λ/κ the smallest p: κ = 2, λ = 3 for Hertz's law, κ = 4, λ = 1 for that
+of Tsuji.
 """
 
 from __future__ import annotations
@@ -21,17 +22,17 @@ import numpy as np
 from solvers.compiled.kernels import kernel
 
 S: Any = np.int64(8)  # nodes of a contact step: 6 is a little faster at 1e-6, 10 and 12 bring nothing
-# (a plain 8 is a type of its own: numba would compile functions for it and for other whole numbers)
-_CHECKED = (np.arange(24) + 0.5) / 24  # points where the interpolant of the nodes is compared
-_NODES_FIRST = [*range(S), *range(S + 1, 2 * S + 1), S, 2 * S + 1]
-PHASES = np.geomspace(1e-2, 1e4, 600)  # ω h
-LOCAL = -np.cos(np.pi * np.arange(S) / (S - 1))  # Chebyshev points of an interval in which a maximum is sought
-MONOMIALS = np.ascontiguousarray(np.linalg.inv(np.vander(LOCAL, increasing=True)).T)
+# (numba would compile functions twice, for the literal 8 and for other integers)
+_CHECKED = (np.arange(24) + 0.5) / 24  # points of (0, 1) where the interpolant through the nodes is compared
+_NODES_FIRST = [*range(S), *range(S + 1, 2 * S + 1), S, 2 * S + 1]  # Hermite data: those at the start last
+PHASES = np.geomspace(1e-2, 1e4, 600)  # ω h at which `NodeSets.alias` is tabulated
+LOCAL = -np.cos(np.pi * np.arange(S) / (S - 1))  # Chebyshev points in which a function around a node is interpolated
+MONOMIALS = np.ascontiguousarray(np.linalg.inv(np.vander(LOCAL, increasing=True)).T)  # coefficients from values
 
 
 @kernel
 def lagrange(nodes, weights, sigma, out):
-    """Lagrange polynomials of the nodes at σ, each times its weight × Π (σ_j - σ_i)."""
+    """Lagrange polynomials at σ: Π_{i≠j} (σ - σ_i) × weight j, 1 at their node if that is 1/Π (σ_j - σ_i)."""
     for j in range(nodes.size):
         value = weights[j]
         for i in range(nodes.size):
@@ -42,13 +43,13 @@ def lagrange(nodes, weights, sigma, out):
 
 @lru_cache(maxsize=8)
 def gauss(count: int) -> Any:
-    """Gauss–Legendre points and weights on (0, 1): (2, count)."""
+    """(2, count) Gauss–Legendre points and weights on (0, 1)."""
     x, w = np.polynomial.legendre.leggauss(count)
     return np.array([0.5 * (1.0 + x), 0.5 * w])
 
 
 def so_far(points: Any) -> Any:
-    """(q, r): integral from 0 to point q of (0, 1) of the polynomial that is 1 at point r and 0 at the others."""
+    """(q, r) integral from 0 to point q of (0, 1) of the polynomial that is 1 at point r and 0 at the others."""
     legendre = np.polynomial.legendre
     x, one = 2.0 * points - 1.0, np.eye(len(points))
     integrals = [legendre.legval(x, legendre.legint(row, lbnd=-1.0)) for row in one]
@@ -56,7 +57,7 @@ def so_far(points: Any) -> Any:
 
 
 def gauss_jacobi(beta: float) -> Any:
-    """S points on (-1, 1) and weights for (1 + x)^β, their sum 1/(β + 1); (S, S): Jacobi coefficients from values.
+    """S points on (-1, 1), weights for (1 + x)^β of sum 1/(β + 1), and (S, S) Jacobi coefficients from point values.
 
     The points are eigenvalues of the matrix of the recurrence (Golub, Welsch, Math. Comp. 23, 1969).
     """
@@ -73,7 +74,10 @@ def gauss_jacobi(beta: float) -> Any:
 
 
 class _NodeSet(NamedTuple):
-    """Nodes of one kind of contact step, t = h σ^κ, F = σ^λ × polynomial; κ and λ are its exponents."""
+    """Nodes σ of one kind of contact step, t = h σ^κ, F = σ^λ × polynomial; κ and λ are its exponents.
+
+    ∫F dt = h Σ weights F; ``spectrum`` gives the Jacobi coefficients of the polynomial from the values of F.
+    """
 
     time_exponent: float
     weight_exponent: float
@@ -83,7 +87,7 @@ class _NodeSet(NamedTuple):
 
 
 def _node_set(time_exponent: float, weight_exponent: float) -> _NodeSet:
-    """Gauss–Jacobi nodes on (0, 1) for the weight of ∫F dt, and the polynomial's coefficients from node values."""
+    """Node set of given κ and λ, with Gauss–Jacobi nodes for the weight of ∫F dt."""
     x, w, spectrum = gauss_jacobi(weight_exponent + time_exponent - 1.0)
     sigma = 0.5 * (1.0 + x)
     scale = sigma ** (-weight_exponent)
@@ -93,14 +97,14 @@ def _node_set(time_exponent: float, weight_exponent: float) -> _NodeSet:
 class NodeSets(NamedTuple):
     """The node sets of a problem: that of smooth steps, then one per stop, for the step on which it enters contact.
 
-    Many stops have equal nodes. So the large tables are indexed by the kind of the nodes, or by the weighting of a
-    force: a kind, with or without the weight σ^λ.
+    Many stops have equal nodes. So large tables are indexed by *kind*, the distinct (κ, λ), or by *weighting*: of plain
+    forces one for each kind, then one for each kind with a weight σ^λ.
     """
 
-    kind: Any  # (f,) of each node set; also the weighting of forces without the weight
+    kind: Any  # (f,) kind of each node set; also the weighting of plain forces on it
     entering: Any  # (f,) weighting of the force of the stop that enters
     kinds: Any  # (kinds,) a node set of each kind
-    weightings: Any  # (weightings, 2) a node set of each, and 1 for the weight σ^λ
+    weightings: Any  # (weightings, 2) a node set of each, then 1 with the weight σ^λ, 0 without
     time_exponent: Any  # (f,)
     weight_exponent: Any
     nodes: Any  # (f, S), as the rest in `Tables`
@@ -119,7 +123,7 @@ class NodeSets(NamedTuple):
 
 
 def series_of(law: Any) -> tuple[float, float]:
-    """(κ, λ) of a law's force at entry; see the module."""
+    """(κ, λ) of a law's force at entry; see the module. κ = 2 if no κ <= 4 makes all κp whole numbers."""
     powers = getattr(law, "powers", None) or ((0.0, law.exponent) if law.jump else (law.exponent,))
     for time_exponent in (1.0, 2.0, 4.0):
         if all(abs(time_exponent * p - round(time_exponent * p)) < 1e-9 for p in powers):
@@ -164,7 +168,7 @@ def node_sets_of(series: tuple[tuple[float, float], ...]) -> NodeSets:
 
 
 def _summary(node_set: _NodeSet) -> Any:
-    """(S, 8): last four coefficients, values and slopes dF/dσ at start and end, from node values."""
+    """(S, 8) last four coefficients, values and slopes dF/dσ at start and end, from node values of a force."""
     rows = np.zeros((8, S))
     rows[:4] = node_set.spectrum[-4:]
     rows[4:6] = _interpolation(node_set.nodes, np.array([0.0, 1.0]))
@@ -175,7 +179,7 @@ def _summary(node_set: _NodeSet) -> Any:
 
 
 def _plain_weights(node_set: _NodeSet) -> Any:
-    """(S,) weights of ∫ (polynomial through node values) dt/h, without the force's weight σ^λ."""
+    """(S,) weights of ∫ F dt/h of a force without the weight σ^λ, from its values at the nodes."""
     points, weights = gauss(12)
     return (weights * node_set.time_exponent * points ** (node_set.time_exponent - 1.0)) @ _interpolation(
         node_set.nodes, points
@@ -183,7 +187,7 @@ def _plain_weights(node_set: _NodeSet) -> Any:
 
 
 def _work_weights(nodes: Any) -> Any:
-    """(S, S + 1): ∫ F dδ = Σ F_i weight_ij (δ_j - δ₀) of polynomials, F through the nodes, δ through ends and nodes."""
+    """(S, S + 1) weights of ∫ F dδ = Σ F_i weight_ij (δ_j - δ₀); nodes interpolate F, nodes and ends δ."""
     points, weights = gauss(S)
     places = np.append(nodes, [1.0, 0.0])
     slopes = _interpolation(places, points) @ _differentiation(places)
@@ -191,7 +195,7 @@ def _work_weights(nodes: Any) -> Any:
 
 
 def _brackets(node_set: _NodeSet) -> Any:
-    """(S, 2) ends of the interval between the neighbours of every node."""
+    """(S, 2) ends in σ of the interval between the neighbours of every node."""
     ends = np.concatenate(([0.0], node_set.nodes, [1.0]))
     return np.column_stack((ends[:-2], ends[2:]))
 
@@ -223,12 +227,12 @@ def _interpolate_locally(node_set: _NodeSet, begin: float, end: float) -> Any:
 
 
 def _tail(nodes: Any) -> Any:
-    """(S, 8): last four Legendre coefficients of the polynomial through node values, then the first four."""
+    """(S, 8) last four Legendre coefficients of the polynomial through node values, then the first four."""
     return np.roll(np.linalg.inv(np.polynomial.legendre.legvander(2.0 * nodes - 1.0, S - 1)), 4, axis=0).T
 
 
 def _differentiation(nodes: Any) -> Any:
-    """Slopes at the nodes of the polynomial through node values (Trefethen, Spectral Methods in MATLAB, Chapter 6)."""
+    """Slopes at the nodes of the polynomial through values there (Trefethen, Spectral Methods in MATLAB, Chapter 6)."""
     apart, weights = nodes[:, None] - nodes + np.eye(len(nodes)), _weights(nodes)
     out = weights / (weights[:, None] * apart)
     np.fill_diagonal(out, 0.0)
@@ -237,7 +241,7 @@ def _differentiation(nodes: Any) -> Any:
 
 
 def _alias(node_set: _NodeSet) -> Any:
-    """(P,) largest error between a family's nodes of the interpolant of e^{iωt}."""
+    """(P,) largest error between the nodes of the interpolant of e^{iωt}, at `PHASES`."""
     waves = np.exp(1j * np.outer(node_set.nodes**node_set.time_exponent, PHASES))
     exact = np.exp(1j * np.outer(_CHECKED**node_set.time_exponent, PHASES))
     found = np.einsum("ij,jk", _interpolation(node_set.nodes, _CHECKED), waves)  # BLAS would start its threads for it
@@ -250,7 +254,7 @@ def _weights(nodes: Any) -> Any:
 
 
 def _interpolation(nodes: Any, points: Any) -> Any:
-    """Lagrange matrix (points, nodes)."""
+    """(points, nodes) values at points of the polynomial through node values."""
     out = np.empty((len(points), len(nodes)))
     row, weights = np.empty(len(nodes)), _weights(nodes)
     for i, x in enumerate(points):
@@ -260,7 +264,7 @@ def _interpolation(nodes: Any, points: Any) -> Any:
 
 
 def _extensions(node_set: _NodeSet, smooth: _NodeSet) -> Any:
-    """Extrapolation of a step's force to the nodes of the next smooth step, 2^{-(i-2)/2} times as long."""
+    """(5, S, S) extrapolation of a step's force to the nodes of a smooth next step, 2^{-(i-2)/2} times as long."""
     out = np.empty((5, S, S))
     for i in range(5):
         times = 1.0 + 2.0 ** (-0.5 * (i - 2)) * smooth.nodes

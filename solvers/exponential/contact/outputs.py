@@ -1,4 +1,4 @@
-"""Outputs of a contact step: works, peaks and state at its end, samples inside it, a row of the event record."""
+"""Outputs of a contact step: works, peaks and state at its end, samples inside it, its event record."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ from solvers.exponential.contact.peaks import state_peaks, step_peaks
 from solvers.exponential.contact.slider_margins import peak_of_friction
 from solvers.exponential.energy.quadrature import state_within
 
-_BRIEF = 1.0  # radians of the fastest block in which nodes miss nothing of δ̇, and δ - δ₀ may be lost in the digits of δ
+_BRIEF = 1.0  # radians of the fastest block up to which nodes resolve δ̇; δ - δ₀ may be rounding of δ
 
 
 @merged
 def sample_step(problem, tables, energy_tables, state, scratch, node_set, level):
-    """Write the samples inside the converged step, and the state at the end of the run if it is inside."""
+    """Write the samples inside the converged step, and the state at the end of the run, if inside, for `end_run`."""
     t, h, begin, row, t_end = state.now[T], tables.contact_step[level], 0.0, state.x, state.now[T_END]
     while True:
         due = state.due[state.count[SAMPLED]]
@@ -53,7 +53,7 @@ def sample_step(problem, tables, energy_tables, state, scratch, node_set, level)
 
 @merged
 def end_run(problem, tables, state, scratch, node_set, level):
-    """End the run within the step, in the state that `sample_step` has put into ``scratch.stages[START]``."""
+    """End the run within the step, in the state that `sample_step` has written into ``scratch.stages[START]``."""
     x, t_end = scratch.stages[START], state.now[T_END]
     share = (t_end - state.now[T]) / tables.contact_step[level]
     place = share ** (1.0 / tables.time_exponent[node_set])
@@ -82,10 +82,11 @@ def record_forces(problem, state, scratch, kind, ended, node_set, level):
 
 @inlined
 def _work(problem, tables, scratch, node_set, s):
-    """Work, J, of a plain force over the step: ∫ F dδ, F a polynomial through the nodes, δ one through ends and nodes.
+    """Work, J, of a plain force over the step: ∫ F dδ with F interpolated in the nodes, δ in nodes and ends.
 
-    The sum of F δ̇ at the nodes would be wrong where the force hardly changes: there steps grow until fast blocks
-    oscillate between the nodes. A constant force does F times the way between the ends, whatever lies between.
+    The quadrature of F δ̇ at the nodes would be wrong where the force hardly changes: there steps grow until fast
+    blocks oscillate between the nodes. A constant force does the work F × (change of δ), whatever the motion in
+    between.
     """
     begin, force = scratch.start_motion[s, 0], force_of(problem, scratch, s)
     combine(tables.work[node_set], force, S, None, scratch.trial)
@@ -96,7 +97,7 @@ def _work(problem, tables, scratch, node_set, s):
 
 @merged
 def finish_step(problem, tables, state, scratch, node_set, level):
-    """Move the state to the end of the step; update works, impulses and peaks of the contacts."""
+    """Move the state to the end of the converged step; update works, impulses and peaks of the contacts."""
     size, h = 2 * problem.k.size, tables.contact_step[level]
     brief = h * tables.fastest <= _BRIEF
     for s in range(problem.law.size):

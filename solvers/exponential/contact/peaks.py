@@ -1,8 +1,9 @@
 """Largest indentation and force of a contact: maxima of the interpolants of each step, not of its node values.
 
-Between the neighbours of the highest node, δ and δ̇ at eight points are interpolated from δ and δ̇ at all nodes and at
-the start of the step by Hermite's polynomial of degree 17; the forces there are those of the law. The maximum of the
-polynomial through these points is closer to that of the motion than the motion is to the exact one.
+In the interval between the neighbours of the highest node, δ and δ̇ at eight points are interpolated by Hermite's
+polynomial of degree 17 through δ and δ̇ at all nodes and at the start of the step; the forces there are those of the
+law. The maximum of the polynomial through these points differs less from that of the motion than the motion from the
+exact one.
 """
 
 from __future__ import annotations
@@ -31,13 +32,13 @@ from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RAT
 from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S
 from solvers.problem.friction import PEAK
 
-_MOST = 6  # Newton steps to a maximum
-_LOWER = 0.95  # share of a peak below which node values have no higher one between them
+_MOST_NEWTON_STEPS = 6  # to a maximum
+_BELOW_PEAK = 0.95  # of a peak: if all node values are below, no higher maximum is between them
 
 
 @inlined
-def _local(coefficients, x):
-    """Value, slope and half the curvature of a polynomial at x."""
+def _evaluate(coefficients, x):
+    """Value, slope and half the second derivative of a polynomial at x."""
     value, slope, curvature = coefficients[S - 1], 0.0, 0.0
     for k in range(S - 2, -1, -1):
         curvature = curvature * x + slope
@@ -47,7 +48,7 @@ def _local(coefficients, x):
 
 
 @merged
-def _guess(values, place):
+def _parabola_vertex(values, place):
     """Vertex of the parabola through a point of `LOCAL` and its neighbours, and these; at an end the point itself."""
     if place == 0 or place == S - 1:
         return LOCAL[place], LOCAL[max(place - 1, 0)], LOCAL[min(place + 1, S - 1)]
@@ -71,12 +72,12 @@ def local_maximum(values, limit, coefficients):
     combine(MONOMIALS, values, S, None, coefficients)
     best = values[place]
     if limit < 1.0:
-        best = max(best, _local(coefficients, limit)[0])
-    x, low, high = _guess(values, place)
+        best = max(best, _evaluate(coefficients, limit)[0])
+    x, low, high = _parabola_vertex(values, place)
     high = min(high, limit)
     x = min(x, high)
-    for _ in range(_MOST):
-        value, slope, curvature = _local(coefficients, x)
+    for _ in range(_MOST_NEWTON_STEPS):
+        value, slope, curvature = _evaluate(coefficients, x)
         best = max(best, value)
         if not curvature < 0.0:
             break
@@ -88,7 +89,7 @@ def local_maximum(values, limit, coefficients):
 
 
 @inlined
-def _highest(tables, values, node_set, limit):
+def _highest_node(tables, values, node_set, limit):
     """Index of the largest node value up to σ = limit, or -1."""
     if limit >= 1.0 and values[S - 1] >= largest8(load8(values, 0)):
         return S - 1
@@ -101,7 +102,7 @@ def _highest(tables, values, node_set, limit):
 
 @inner
 def motion_around(problem, tables, state, scratch, node_set, h, s, place):
-    """Indentations and rates of stop s around a node of the step from the state, into ``scratch.local_motion``."""
+    """Indentations and rates of stop s at points around a node of the step, into ``scratch.local_motion``."""
     local_motion, motion, known = scratch.local_motion, motion_of(problem, scratch, s), scratch.local_motion[KNOWN]
     copy(motion[0], known, S)
     for i in range(S):
@@ -115,32 +116,32 @@ def motion_around(problem, tables, state, scratch, node_set, h, s, place):
 
 @merged
 def largest_indentation(problem, tables, state, scratch, node_set, h, s):
-    """Largest indentation of stop s around its highest node of a step."""
-    place = _highest(tables, motion_of(problem, scratch, s)[0], node_set, 1.0)
+    """Largest indentation of stop s, m, around its highest node of a step."""
+    place = _highest_node(tables, motion_of(problem, scratch, s)[0], node_set, 1.0)
     motion_around(problem, tables, state, scratch, node_set, h, s, place)
     return local_maximum(scratch.local_motion[DELTAS], 1.0, scratch.trial)
 
 
 @inlined
-def _below(state, s, column, values):
-    """Whether all node values are so far below a peak that there is no higher one between them."""
-    return largest8(load8(values, 0)) < _LOWER * state.active[s, column]
+def _all_below_peak(state, s, column, values):
+    """Whether all node values are so far below the peak in a column of ``state.active`` that none between is higher."""
+    return largest8(load8(values, 0)) < _BELOW_PEAK * state.active[s, column]
 
 
 @inner
 def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
-    """Raise the peaks of stop s by a converged step of length h, up to σ = limit, from ``state.x`` on."""
+    """Raise the peaks of stop s by the converged step of length h from ``state.x``, up to σ = ``limit``."""
     seen, motion, force = -1, motion_of(problem, scratch, s)[0], force_of(problem, scratch, s)
-    if limit >= 1.0 and _below(state, s, PEAK_FORCE, force) and _below(state, s, PEAK_DELTA, motion):
+    if limit >= 1.0 and _all_below_peak(state, s, PEAK_FORCE, force) and _all_below_peak(state, s, PEAK_DELTA, motion):
         return
     summary, start = scratch.summary[place_of(problem, s)], scratch.start_motion[s]
     for column, values, d in ((PEAK_FORCE, force, 0), (PEAK_DELTA, motion, 1)):
         known = state.active[s, column]
-        place = _highest(tables, values, node_set, limit)
+        place = _highest_node(tables, values, node_set, limit)
         if place >= 0:
             state.active[s, column] = max(known, values[place])
         if limit >= 1.0:
-            if values[place] < _LOWER * known:
+            if values[place] < _BELOW_PEAK * known:
                 continue
             if place == S - 1 and (summary[7] if d == 0 else indentation_rate(problem, s, scratch.x_new)) >= 0.0:
                 continue  # still rising at the end, where the next step begins
@@ -183,14 +184,14 @@ def state_peaks(problem, state, scratch, x):
             state.active[s, PEAK_DELTA] = max(state.active[s, PEAK_DELTA], batch[0])
             state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], batch[2])
             if rubs(problem, s):
-                own = slider_of(problem, s)
+                slider = slider_of(problem, s)
                 force = slider_force(problem, s, state.segment[s], state.entry_rate[s], state.now[T], x)
-                own[PEAK] = max(own[PEAK], abs(force))
+                slider[PEAK] = max(slider[PEAK], abs(force))
 
 
 @inner
 def pressed_speed(problem, tables, state, s, batch):
-    """Speed, m/s, that the force of a stop in contact would give on a way as long as its indentation, √(|F δ|/m)."""
+    """Speed, m/s, that the force of a stop in contact would give over a distance δ, √(|F δ|/m); 0 if it is open."""
     delta = indentation(problem, s, state.x)
     if state.segment[s] == 0 or abs(delta) <= surface_tolerance(problem, s, state.x):
         return 0.0

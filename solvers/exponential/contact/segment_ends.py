@@ -1,7 +1,7 @@
-"""Where a segment of a law ends, a step ends: on a surface or knot, on a bend, or on a border of a law with memory.
+"""The end of a segment of a law: a step ends on a surface or knot, on a bend, or on a border of a law with memory.
 
-Another stop may meet its own border before; then that is landed on. What follows is the next segment: the other side
-of a bend, or numbers latched anew.
+If another stop reaches its own border before, that is landed on instead. Then the next segment begins: the next one of
+the law, the other side of a bend, or one with newly latched numbers.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from solvers.compiled.kernels import REAL, indentation
 from solvers.compiled.parts import FIRST_END, GO_BEYOND, LAND, LAND_IN_TIME, part
 from solvers.exponential.contact.borders import UNRESOLVED, border_ahead, renew_all, renew_border
 from solvers.exponential.contact.crossings import first_bend
-from solvers.exponential.contact.landing import land, land_on_bend
+from solvers.exponential.contact.landing import land, land_on_bend_or_border
 from solvers.exponential.contact.node_response import LANDED
 
 
 @part(LAND, types.UniTuple(types.int64, 2), types.int64, types.int64, REAL)
-def land_first(problem, tables, state, scratch, stop, direction, near):
-    """Land on the border met first, be it that of another stop; (stop, direction), or (-1, 0) if not possible."""
+def land_first(problem, tables, state, scratch, stop, direction, time_to_border):
+    """Land on the border reached first, be it that of another stop; (stop, direction), or (-1, 0) on failure."""
     for _ in range(problem.law.size + 1):
-        landed = land(problem, tables, state, scratch, stop, direction, near)
+        landed = land(problem, tables, state, scratch, stop, direction, time_to_border)
         if landed == stop or landed < 0:
             return landed, direction
         above = indentation(problem, landed, scratch.stages[LANDED]) > problem.knots[landed, state.segment[landed]]
@@ -31,9 +31,10 @@ def land_first(problem, tables, state, scratch, stop, direction, near):
 
 @part(FIRST_END, types.Tuple((REAL, types.int64)), types.int64, types.int64, types.boolean)
 def first_end(problem, tables, state, scratch, node_set, level, is_new):
-    """(time after the start of the step tried, stop) of the first bend or border on it; no stop is -1.
+    """(time after the start of the step just tried, stop) of the first bend or border that it crosses, or (inf, -1).
 
-    Of a border ``scratch.border`` holds which it is, else -1. The stop is `UNRESOLVED` if the step is too long to tell.
+    ``scratch.border`` gets the number of the border, -1 of a bend. The stop is `UNRESOLVED` if the step is too long to
+    decide.
     """
     first, stop = first_bend(problem, tables, state, scratch, node_set, level, is_new)
     time, element, border = border_ahead(problem, tables, state, scratch, node_set, level)
@@ -45,10 +46,14 @@ def first_end(problem, tables, state, scratch, node_set, level, is_new):
 
 @part(LAND_IN_TIME, types.Tuple((types.int64, types.boolean)), types.int64, REAL)
 def land_in_time(problem, tables, state, scratch, stop, first):
-    """Land on a bend or border of ``stop``, or on a border met before; (stop, whether it succeeded)."""
-    border, near = scratch.border[0], first
+    """Land on the bend or border of ``stop``, ``first`` s ahead, or on a border reached before; (stop, success).
+
+    ``scratch.border`` holds the number of the border, -1 of a bend, before and after. "In time" as the variable is
+    `TIME`.
+    """
+    border, guess = scratch.border[0], first
     for _ in range(problem.law.size + 1):
-        if land_on_bend(problem, tables, state, scratch, stop, border, near):
+        if land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess):
             scratch.border[0] = border
             return stop, True
         if scratch.border[0] < 0 or scratch.landed[0] < 0:
@@ -59,7 +64,7 @@ def land_in_time(problem, tables, state, scratch, stop, first):
 
 @part(GO_BEYOND, types.void, types.int64, types.boolean)
 def go_beyond(problem, state, scratch, stop, alone):
-    """What ends on a bend goes on beyond it: the other side, or numbers latched on a border."""
+    """Begin what follows a bend, or a border and, unless ``alone``, others reached with it."""
     border = scratch.border[0]
     if border < 0:
         scratch.side[stop] = -scratch.side[stop]

@@ -1,9 +1,9 @@
-"""Margins of a slider in a step of the main method, see `compiled.sliding`: at the nodes, at its ends, between nodes.
+"""Margins of a slider in a step of the main method: at the nodes, at its ends, between nodes; see `compiled.sliding`.
 
-They depend on ξ, ξ̇ and, in slip, Ṅ besides δ and δ̇. Ṅ of a law with a dashpot needs δ̈: in a state it follows from the
-equations of motion, at the nodes from the polynomial through δ̇ there and at the start of the step. Where a law bends at
-δ̇ = 0 its N_δ̇ jumps, and with it the margin of slip, perhaps below zero: on the bend, where δ̇ is rounding, the margin is
-that of the side on which the law is.
+They depend on ξ, ξ̇ and, in slip, Ṅ besides δ and δ̇. Ṅ of a law with a dashpot needs δ̈. In a state this follows from
+the equations of motion, at the nodes from the polynomial through δ̇ there and at the start of the step. Where a law
+bends at δ̇ = 0, its N_δ̇ jumps, and with it the margin of slip, perhaps below zero. So on the bend, where δ̇ is
+rounding, the margin is taken on the side on which the law is.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from solvers.compiled.kernels import (
     radius_of,
     rhs,
     row_of,
-    slide_of,
     slider_of,
+    xi_and_rate_at,
 )
 from solvers.compiled.parts import RUB_AROUND, RUB_IN, RUB_MARGINS, RUB_PEAK, part
 from solvers.compiled.simd import largest8, load8, size8
@@ -30,47 +30,54 @@ from solvers.compiled.sliding import (
     ACCELERATION,
     POINT,
     RATE,
-    motion_of_slider,
+    motion_without_accelerations,
     move_point,
     normal_forces,
     normal_slopes,
     point_of,
     slider_margins,
-    way_tolerance,
+    xi_tolerances,
 )
 from solvers.compiled.state import T, rate_tolerance, surface_tolerance
 from solvers.compiled.sums import above, combine
-from solvers.exponential.circles.friction import SPARE, SPEEDS, TANGENTIAL, WAYS, slide_at_nodes, way_beside
+from solvers.exponential.circles.friction import (
+    NODE_XI,
+    NODE_XI_RATE,
+    SPARE,
+    TANGENTIAL,
+    xi_and_rate_at_nodes,
+    xi_continued,
+)
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL_SLOPES, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
 from solvers.exponential.tables import EXPONENT
 from solvers.problem.friction import CODE, CUT, FREE, MU, PEAK, PRESSES, SLIDES, STIFFNESS
 
-ENDS = 6  # numbers in `Scratch.ends` for a border
-_SAME = 1e-11  # margin, in units of the largest of the step, that is rounding
-_DIFFERENCED = 1e-8  # the same where it contains the slope of a polynomial
-_REST = 1e-14  # rate, in units of the reference speed, at which what has come to rest turns no more
-_TINY = 1e-300  # m
-_SHARE = 1e-6  # of δ and δ̇ at a node, by which slopes of N are differenced
-_ON_BEND = 1e-9  # δ̇, in units of the reference speed, within which a landing on a bend at δ̇ = 0 may miss it
+ENDS = 6  # margins in `Scratch.ends` for a border: at start, end; at the start with rounding, then ripple, in δ and δ̇
+_ROUNDING = 1e-11  # rounding of a margin, in units of its largest on the step
+_SLOPE_ROUNDING = 1e-8  # the same of a margin that contains the slope of a polynomial
+_REST = 1e-14  # rate, in units of the reference speed, below which a rate at rest is rounding
+_TINY = 1e-300  # m, keeps N/δ finite
+_DIFFERENCE_STEP = 1e-6  # relative step in δ and δ̇ for differences of the slopes of N
+_ON_BEND = 1e-9  # δ̇, in units of the reference speed, that a landing on a bend at δ̇ = 0 may leave
 
 
 @inlined
-def _slips(own):
+def _slips(slider):
     """Whether a slider slips."""
-    return abs(own[CODE]) == 1.0
+    return abs(slider[CODE]) == 1.0
 
 
 @inlined
-def _pulls(problem, s):
-    """Whether N depends on the rate, so that it may pull."""
+def _rate_dependent(problem, s):
+    """Whether N depends on δ̇, so that it may pull, and the slider has two borders."""
     return problem.border_count[s] > PRESSES
 
 
 @inlined
-def _on_its_side(problem, scratch, s, rate):
-    """δ̇, with the sign of the side of a law's bend where it is rounding; `Scratch.side` is 0 of a law without one."""
+def _rate_on_side(problem, scratch, s, rate):
+    """δ̇, or if that is rounding on the wrong side of the law's bend, a tiny rate on its side."""
     side, rounding = scratch.side[s], _ON_BEND * scratch.reference_speed[s]
     on = slider_of(problem, s)[CUT] < 0.0 and side * rate <= 0.0 and abs(rate) <= rounding
     return side * _TINY if on and side != 0.0 else rate
@@ -78,22 +85,25 @@ def _on_its_side(problem, scratch, s, rate):
 
 @part(RUB_IN, types.void, types.int64, types.float64, VECTOR, types.float64, VECTOR)
 def slider_margins_in(problem, state, scratch, s, t, x, later, out):
-    """Margins of an element with friction in the state x at time t, or a time later by its rates, which are left."""
+    """Margins of element s in the state x at time t, or extrapolated by ``later``, s.
+
+    ``scratch.point`` is left with its motion in both.
+    """
     point, moved = scratch.point[0], scratch.point[1]
-    if later != 0.0 or (slider_of(problem, s)[CODE] != 0.0 and _pulls(problem, s)):
+    if later != 0.0 or (slider_of(problem, s)[CODE] != 0.0 and _rate_dependent(problem, s)):
         rhs(problem, t, x, state.segment, state.entry_rate, state.rate, scratch.numbers)
         point_of(problem, s, t, x, state.rate, point)
         move_point(point, later, moved)
     else:
-        motion_of_slider(problem, s, t, x, point)
+        motion_without_accelerations(problem, s, t, x, point)
         copy(point, moved, POINT)
-    moved[RATE] = _on_its_side(problem, scratch, s, moved[RATE])
+    moved[RATE] = _rate_on_side(problem, scratch, s, moved[RATE])
     slider_margins(problem, s, state.segment[s], state.entry_rate[s], moved, out)
 
 
 @merged
-def _slopes_of_rates(tables, scratch, node_set, h, s, rates, out):
-    """δ̈ at the nodes, from δ̇ there and at the start."""
+def _node_accelerations(tables, scratch, node_set, h, s, rates, out):
+    """δ̈ at the nodes: slopes of the polynomial through δ̇ there and at the start."""
     nodes, weights, start = tables.nodes[node_set], tables.lagrange[node_set, 0], scratch.start_motion[s, 1]
     own = 1.0
     for i in range(S):
@@ -110,8 +120,8 @@ def _slopes_of_rates(tables, scratch, node_set, h, s, rates, out):
 
 @inlined
 def _slopes(problem, tables, state, s, delta, rate, normal, slope):
-    """N_δ and N_δ̇ at S points; of a power law that only pushes N_δ = p N/δ."""
-    if _pulls(problem, s):
+    """N_δ and N_δ̇ at S points; of a power law that only pushes N_δ = p N/δ, N_δ̇ = 0."""
+    if _rate_dependent(problem, s):
         normal_slopes(problem, s, S, delta, rate, state.entry_rate[s], slope[0], slope[1], slope[2])
         return
     for i in range(S):
@@ -119,93 +129,105 @@ def _slopes(problem, tables, state, s, delta, rate, normal, slope):
 
 
 @inner
-def _margins_at(problem, tables, state, scratch, s, delta, rate, speeds, drags, twice):
-    """Margins at S points into ``scratch.margin``, from N there in ``scratch.numbers``; ``twice`` is δ̈."""
-    own, margin, normal, slope = slider_of(problem, s), scratch.margin, scratch.numbers, scratch.slope[s]
-    slips, mu = _slips(own), own[MU]
+def _margins_at(problem, tables, state, scratch, s, delta, rate, xi_rates, forces, accelerations):
+    """Margins at S points into ``scratch.margin``, from N in ``scratch.numbers``, δ, δ̇, ξ̇, F_t and δ̈."""
+    slider, margin, normal, slope = slider_of(problem, s), scratch.margin, scratch.numbers, scratch.slope[s]
+    slips, mu = _slips(slider), slider[MU]
     if slips and mu > 0.0:
         _slopes(problem, tables, state, s, delta, rate, normal, slope)
     for i in range(S):
-        if _pulls(problem, s):
+        if _rate_dependent(problem, s):
             margin[S + i] = normal[i] if slips else 1.0
-        if own[CODE] == FREE:
+        if slider[CODE] == FREE:
             margin[i] = -normal[i]
         elif not slips:
-            margin[i] = mu * normal[i] - abs(drags[i])
+            margin[i] = mu * normal[i] - abs(forces[i])
         else:
-            margin[i] = own[CODE] * speeds[i]
+            margin[i] = slider[CODE] * xi_rates[i]
             if mu > 0.0:
-                growing = slope[0, i] * rate[i]
-                growing += slope[1, i] * twice[i] if slope[1, i] != 0.0 else 0.0
-                margin[i] -= mu / own[STIFFNESS] * growing
+                normal_rate = slope[0, i] * rate[i]
+                normal_rate += slope[1, i] * accelerations[i] if slope[1, i] != 0.0 else 0.0
+                margin[i] -= mu / slider[STIFFNESS] * normal_rate
 
 
 @inner
 def slider_margins_at_nodes(problem, tables, state, scratch, s, node_set, h):
-    """Margins at the nodes, into ``scratch.margin``; N and F_t there are known, but N without a cut at zero."""
-    place, slid, own = place_of(problem, s), scratch.slid[s], slider_of(problem, s)
+    """Margins at the nodes of the step just tried, into ``scratch.margin``.
+
+    N and F_t there are known; only of a law that is cut at zero N is evaluated again, without the cut.
+    """
+    place, slid, slider = place_of(problem, s), scratch.slid[s], slider_of(problem, s)
     motion = scratch.motion[place]
     above(motion[0], problem.knots[s, 0], scratch.clipped)
     copy(scratch.law_force[place], scratch.numbers, S)
-    if own[CUT] >= 0.0:
+    if slider[CUT] >= 0.0:
         normal_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], scratch.numbers)
-    if _slips(own) and _pulls(problem, s):
-        _slopes_of_rates(tables, scratch, node_set, h, s, motion[1], slid[SPARE])
+    if _slips(slider) and _rate_dependent(problem, s):
+        _node_accelerations(tables, scratch, node_set, h, s, motion[1], slid[SPARE])
     _margins_at(
-        problem, tables, state, scratch, s, scratch.clipped, motion[1], slid[SPEEDS], slid[TANGENTIAL], slid[SPARE]
+        problem,
+        tables,
+        state,
+        scratch,
+        s,
+        scratch.clipped,
+        motion[1],
+        slid[NODE_XI_RATE],
+        slid[TANGENTIAL],
+        slid[SPARE],
     )
 
 
 @merged
-def _sensitivities(problem, tables, state, scratch, s):
-    """How much both margins at the last node change with δ, and with δ̇, per unit: (own, own, N, N), in size.
+def _margin_slopes(problem, tables, state, scratch, s):
+    """|slopes| of both margins at the last node: of the own one by δ and δ̇, then of N by δ and δ̇.
 
-    In slip the margin has slopes of N, which are differenced; those of a power law that only pushes are known.
+    In slip the margin contains slopes of N, which are differenced; of a power law that only pushes they are known.
     """
-    own, numbers, motion = slider_of(problem, s), scratch.local_motion, scratch.motion[place_of(problem, s)]
+    slider, numbers, motion = slider_of(problem, s), scratch.local_motion, scratch.motion[place_of(problem, s)]
     deltas, rates, slopes = numbers[KNOWN, :3], numbers[KNOWN, 3:6], numbers[FORCES]
     delta, rate = max(motion[0, S - 1], problem.knots[s, 0]), motion[1, S - 1]
-    if not _pulls(problem, s):
+    if not _rate_dependent(problem, s):
         p = tables.power_law[s, EXPONENT]
-        along, share = p * scratch.numbers[S - 1] / max(delta, _TINY), own[MU] / own[STIFFNESS]
-        if not _slips(own):
-            return own[MU] * along, 0.0, along, 0.0
-        return share * abs((p - 1.0) * along * rate) / max(delta, _TINY), share * along, along, 0.0
-    by = _SHARE * max(delta, 1e-300), _SHARE * max(abs(rate), scratch.reference_speed[s])
+        by_delta, share = p * scratch.numbers[S - 1] / max(delta, _TINY), slider[MU] / slider[STIFFNESS]
+        if not _slips(slider):
+            return slider[MU] * by_delta, 0.0, by_delta, 0.0
+        return share * abs((p - 1.0) * by_delta * rate) / max(delta, _TINY), share * by_delta, by_delta, 0.0
+    by = _DIFFERENCE_STEP * max(delta, 1e-300), _DIFFERENCE_STEP * max(abs(rate), scratch.reference_speed[s])
     deltas[0], deltas[1], deltas[2] = delta, delta + by[0], delta
     rates[0], rates[1], rates[2] = rate, rate, rate + by[1]
     normal_slopes(problem, s, 3, deltas, rates, state.entry_rate[s], slopes[0:3], slopes[3:6], slopes[6:9])
-    along, aside = abs(slopes[0]), abs(slopes[3])
-    if own[CODE] == FREE:
-        return along, aside, along, aside
-    if not _slips(own):
-        return own[MU] * along, own[MU] * aside, along, aside
-    twice, share = scratch.slid[s, SPARE, S - 1], own[MU] / own[STIFFNESS]
-    growing = slopes[0] * rate + slopes[3] * twice
-    first = abs(slopes[1] * rate + slopes[4] * twice - growing) / by[0]
-    second = abs(slopes[2] * (rate + by[1]) + slopes[5] * twice - growing) / by[1]
-    return share * first, share * second, along, aside
+    by_delta, by_rate = abs(slopes[0]), abs(slopes[3])
+    if slider[CODE] == FREE:
+        return by_delta, by_rate, by_delta, by_rate
+    if not _slips(slider):
+        return slider[MU] * by_delta, slider[MU] * by_rate, by_delta, by_rate
+    acceleration, share = scratch.slid[s, SPARE, S - 1], slider[MU] / slider[STIFFNESS]
+    normal_rate = slopes[0] * rate + slopes[3] * acceleration
+    first = abs(slopes[1] * rate + slopes[4] * acceleration - normal_rate) / by[0]
+    second = abs(slopes[2] * (rate + by[1]) + slopes[5] * acceleration - normal_rate) / by[1]
+    return share * first, share * second, by_delta, by_rate
 
 
 @part(RUB_MARGINS, types.void, *[types.int64] * 3)
 def slider_margins_on_step(problem, tables, state, scratch, s, node_set, level):
-    """Margins at the nodes and both ends of the step tried, largest ones and rounding, as `borders` has them of laws.
+    """Margins at the nodes and ends of the step just tried, their largest values and rounding, as in `borders`.
 
-    The point at the start stays in ``scratch.point[0]``.
+    The motion at the start stays in ``scratch.point[0]``.
     """
-    h, ends, own, t = tables.contact_step[level], scratch.ends, slider_of(problem, s), state.now[T]
-    slide_at_nodes(problem, scratch, s)
+    h, ends, slider, t = tables.contact_step[level], scratch.ends, slider_of(problem, s), state.now[T]
+    xi_and_rate_at_nodes(problem, scratch, s)
     slider_margins_at_nodes(problem, tables, state, scratch, s, node_set, h)
-    of_delta, of_rate, of_normal, of_its_rate = _sensitivities(problem, tables, state, scratch, s)
+    of_delta, of_rate, of_normal, of_its_rate = _margin_slopes(problem, tables, state, scratch, s)
     slider_margins_in(problem, state, scratch, s, t + h, scratch.x_new, 0.0, scratch.fired)
     for j in range(problem.border_count[s]):
         ends[ENDS * j + 1] = scratch.fired[j]
     slider_margins_in(problem, state, scratch, s, t, state.x, 0.0, scratch.fired)
-    way, speed = way_tolerance(problem, s, t, state.x)
+    xi, xi_rate = xi_tolerances(problem, s, t, state.x)
     rest = _REST * scratch.reference_speed[s]
     delta, rate = surface_tolerance(problem, s, state.x), max(rate_tolerance(problem, s, state.x), rest)
     ripple, faster = _ripples(problem, tables, state, s, tables.alias[tables.kind[node_set], level])
-    slips, of_way = _slips(own), own[STIFFNESS] if own[CODE] == 0.0 else 0.0
+    slips, of_way = _slips(slider), slider[STIFFNESS] if slider[CODE] == 0.0 else 0.0
     for j in range(problem.border_count[s]):
         by, of_speed = (of_delta, of_rate, of_way), 1.0 if slips else 0.0
         if j == PRESSES:
@@ -216,15 +238,15 @@ def slider_margins_on_step(problem, tables, state, scratch, s, node_set, level):
         if j == SLIDES or slips:
             end[4] += (by[0] + by[2]) * ripple + of_speed * faster
         largest = max(abs(end[0]), abs(end[1]), largest8(size8(load8(scratch.margin[S * j :], 0))))
-        noise = by[0] * delta + by[1] * rate + by[2] * way + of_speed * max(speed, rest)
-        differenced = j == SLIDES and slips and _pulls(problem, s)
+        noise = by[0] * delta + by[1] * rate + by[2] * xi + of_speed * max(xi_rate, rest)
+        differenced = j == SLIDES and slips and _rate_dependent(problem, s)
         scratch.largest[s, j] = largest
-        scratch.noise[s, j] = max((_DIFFERENCED if differenced else _SAME) * largest, 2.0 * noise)
+        scratch.noise[s, j] = max((_SLOPE_ROUNDING if differenced else _ROUNDING) * largest, 2.0 * noise)
 
 
 @inlined
 def _ripples(problem, tables, state, s, alias):
-    """Errors of δ or ξ, m, and of their rates, m/s, by blocks that the nodes do not resolve."""
+    """Bounds of the errors of δ or ξ, m, and of their rates, m/s, by blocks that the nodes do not resolve."""
     ripple, faster, first = 0.0, 0.0, row_of(problem, s)
     for r in range(first, first + 2):
         ripple += ripple_of(tables.ripple_weight[r], alias, state.x, problem.k.size)
@@ -233,18 +255,18 @@ def _ripples(problem, tables, state, s, alias):
 
 
 @merged
-def _slide_around(problem, tables, state, scratch, node_set, h, s, place):
-    """ξ and ξ̇ around a node, behind δ and δ̇ there, into row `FORCES` of ``scratch.local_motion``."""
+def _tangential_motion_around(problem, tables, state, scratch, node_set, h, s, place):
+    """ξ and ξ̇ at points around a node, into row `FORCES` of ``scratch.local_motion``; δ and δ̇ are there already."""
     known, slid, out = scratch.local_motion[KNOWN], scratch.slid[s], scratch.local_motion[FORCES]
-    way, speed = (
-        way_beside(problem, scratch, s, state.now[T], state.x, 0),
-        slide_of(problem, s, state.now[T], state.x)[1],
+    xi, xi_rate = (
+        xi_continued(problem, scratch, s, state.now[T], state.x, 0),
+        xi_and_rate_at(problem, s, state.now[T], state.x)[1],
     )
-    copy(slid[WAYS], known, S)
+    copy(slid[NODE_XI], known, S)
     for i in range(S):
-        known[S + i] = h * slid[SPEEDS, i]
-    known[2 * S] = way
-    known[2 * S + 1] = h * speed
+        known[S + i] = h * slid[NODE_XI_RATE, i]
+    known[2 * S] = xi
+    known[2 * S + 1] = h * xi_rate
     combine(tables.local_interpolation[node_set, place], known, 2 * S + 2, None, out)
     for i in range(S):
         out[S + i] /= h
@@ -254,27 +276,27 @@ def _slide_around(problem, tables, state, scratch, node_set, h, s, place):
 def slider_margins_around(problem, tables, state, scratch, s, node_set, h, place):
     """Margins at points around a node of the step, into ``scratch.margin``."""
     motion_around(problem, tables, state, scratch, node_set, h, s, place)
-    _slide_around(problem, tables, state, scratch, node_set, h, s, place)
+    _tangential_motion_around(problem, tables, state, scratch, node_set, h, s, place)
     begin, end = tables.local_interval[node_set, place, 0], tables.local_interval[node_set, place, 1]
-    deltas, rates, ways = scratch.local_motion[DELTAS], scratch.local_motion[RATES], scratch.local_motion[FORCES]
-    twice, kappa, drags = scratch.slid[s, SPARE], tables.time_exponent[node_set], scratch.trial
-    combine(LOCAL_SLOPES, rates, S, None, twice)
+    deltas, rates, tangential = scratch.local_motion[DELTAS], scratch.local_motion[RATES], scratch.local_motion[FORCES]
+    accelerations, kappa, forces = scratch.slid[s, SPARE], tables.time_exponent[node_set], scratch.trial
+    combine(LOCAL_SLOPES, rates, S, None, accelerations)
     for i in range(S):
         deltas[i] = max(deltas[i], problem.knots[s, 0])
-        rates[i] = _on_its_side(problem, scratch, s, rates[i])
+        rates[i] = _rate_on_side(problem, scratch, s, rates[i])
         sigma = begin + 0.5 * (LOCAL_SLOPES[S, i] + 1.0) * (end - begin)
         pace = h * kappa * sigma ** (kappa - 1.0) * 0.5 * (end - begin)
-        twice[i] = twice[i] / pace if pace > 0.0 else scratch.point[0, ACCELERATION]
+        accelerations[i] = accelerations[i] / pace if pace > 0.0 else scratch.point[0, ACCELERATION]
     normal_forces(problem, s, S, deltas, rates, state.entry_rate[s], scratch.numbers)
     for i in range(S):
-        drags[i] = friction_force(radius_of(problem, s), slider_of(problem, s), ways[i], scratch.numbers[i])
-    _margins_at(problem, tables, state, scratch, s, deltas, rates, ways[S:], drags, twice)
+        forces[i] = friction_force(radius_of(problem, s), slider_of(problem, s), tangential[i], scratch.numbers[i])
+    _margins_at(problem, tables, state, scratch, s, deltas, rates, tangential[S:], forces, accelerations)
 
 
 @part(RUB_PEAK, types.void, types.int64, types.float64, types.int64, types.float64)
 def peak_of_friction(problem, tables, state, scratch, node_set, h, s, limit):
-    """Raise the largest |F_t| of stop s by a converged step of length h, up to σ = limit."""
-    own, slid, highest = slider_of(problem, s), scratch.slid[s], -1
+    """Raise the largest |F_t| of stop s by the converged step of length h, up to σ = ``limit``."""
+    slider, slid, highest = slider_of(problem, s), scratch.slid[s], -1
     for i in range(S):
         if tables.nodes[node_set, i] <= limit and (
             highest < 0 or abs(slid[TANGENTIAL, i]) > abs(slid[TANGENTIAL, highest])
@@ -282,9 +304,11 @@ def peak_of_friction(problem, tables, state, scratch, node_set, h, s, limit):
             highest = i
     if highest < 0:
         return
-    known, largest = own[PEAK], abs(slid[TANGENTIAL, highest])
-    own[PEAK] = max(known, largest)
-    if largest < 0.95 * own[PEAK] or (limit >= 1.0 and _beside(tables, scratch, node_set, s, highest, known)):
+    known, largest = slider[PEAK], abs(slid[TANGENTIAL, highest])
+    slider[PEAK] = max(known, largest)
+    if largest < 0.95 * slider[PEAK] or (
+        limit >= 1.0 and _maximum_outside(tables, scratch, node_set, s, highest, known)
+    ):
         return
     begin, end = tables.local_interval[node_set, highest, 0], tables.local_interval[node_set, highest, 1]
     within = min(2.0 * (limit - begin) / (end - begin) - 1.0, 1.0)
@@ -292,26 +316,26 @@ def peak_of_friction(problem, tables, state, scratch, node_set, h, s, limit):
         return
     motion_around(problem, tables, state, scratch, node_set, h, s, highest)
     values = slid[SPARE]
-    if own[CODE] == 0.0:
-        shift = slid[WAYS, highest] - slid[TANGENTIAL, highest] / own[STIFFNESS]
-        _slide_around(problem, tables, state, scratch, node_set, h, s, highest)
+    if slider[CODE] == 0.0:
+        shift = slid[NODE_XI, highest] - slid[TANGENTIAL, highest] / slider[STIFFNESS]
+        _tangential_motion_around(problem, tables, state, scratch, node_set, h, s, highest)
         for i in range(S):
-            values[i] = own[STIFFNESS] * abs(scratch.local_motion[FORCES, i] - shift)
+            values[i] = slider[STIFFNESS] * abs(scratch.local_motion[FORCES, i] - shift)
     else:
         deltas, rates = scratch.local_motion[DELTAS], scratch.local_motion[RATES]
         above(deltas, problem.knots[s, 0], deltas)
         normal_forces(problem, s, S, deltas, rates, state.entry_rate[s], values)
         for i in range(S):
-            values[i] = own[MU] * max(values[i], 0.0)
-    own[PEAK] = max(own[PEAK], local_maximum(values, within, scratch.clipped))
+            values[i] = slider[MU] * max(values[i], 0.0)
+    slider[PEAK] = max(slider[PEAK], local_maximum(values, within, scratch.clipped))
 
 
 @merged
-def _beside(tables, scratch, node_set, s, highest, known):
-    """Whether the step has no maximum of |F_t| around its highest node: it lies beside the step, as F_t tells."""
-    drags, slopes = scratch.slid[s, TANGENTIAL], scratch.trial
-    combine(tables.summary[node_set], drags, S, None, slopes)
-    sign = 1.0 if drags[highest] > 0.0 else -1.0
+def _maximum_outside(tables, scratch, node_set, s, highest, known):
+    """Whether |F_t| rises out of the step at its highest node, an end node, so that no maximum is inside."""
+    forces, slopes = scratch.slid[s, TANGENTIAL], scratch.trial
+    combine(tables.summary[node_set], forces, S, None, slopes)
+    sign = 1.0 if forces[highest] > 0.0 else -1.0
     if highest == S - 1:
         return sign * slopes[7] >= 0.0  # still rising at the end, where the next step begins
     return node_set == 0 and highest == 0 and sign * slopes[6] <= 0.0 and known >= sign * slopes[4]

@@ -72,22 +72,22 @@ from solvers.exponential.contact.outputs import end_run, finish_step, record_for
 from solvers.exponential.contact.segment_ends import first_end, go_beyond, land_first, land_in_time
 from solvers.exponential.energy.contact_balance import account_contact
 
-_GOAL = 0.3  # error aimed at, in units of the tolerance
+_ERROR_GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
-_ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # an error with steps √2 times shorter, over that before
+_ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # ratio of the errors of two steps whose lengths differ by √2, one level
 
 
 @part(PRESSED, types.boolean)
 def _switch_pressed(problem, state):
-    """Switch every stop at rest on its surface that other stops' forces press into it; returns whether any did."""
+    """Switch every stop at rest on its surface that other stops' forces press into it; whether there was any."""
     switched = False
     for s in range(problem.law.size):
         if state.segment[s] > 0 or abs(indentation(problem, s, state.x)) > surface_tolerance(problem, s, state.x):
             continue
         if abs(indentation_rate(problem, s, state.x)) > rate_tolerance(problem, s, state.x):
             continue
-        batch = state.active[s, :3]  # of a contact not begun yet
-        rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, batch)
+        unused = state.active[s, :3]  # of a contact not begun yet
+        rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, unused)
         if acceleration_of(problem, s, state.x, state.rate) > 0.0:
             switch(problem, state, s, np.int64(1))
             switched = True
@@ -96,30 +96,30 @@ def _switch_pressed(problem, state):
 
 @merged
 def _nearest_surface(problem, state, scratch):
-    """(time, stop, direction) of the border of a segment that is met first at the present rates.
+    """(time, stop, direction) of the border of a segment that is reached first if all δ̇ stay, or (inf, -1, 0).
 
-    Raises the reference speeds to these rates, which may exceed those at entry.
+    δ and δ̇ go to ``scratch.start_motion``. Reference speeds are raised to |δ̇|, which may exceed that at entry.
     """
-    near, stop, direction = np.inf, -1, 0
+    first, stop, direction = np.inf, -1, 0
     for s in range(problem.law.size):
         delta, rate = indentation_and_rate(problem, s, state.x)
         scratch.start_motion[s, 0], scratch.start_motion[s, 1] = delta, rate
         scratch.reference_speed[s] = max(scratch.reference_speed[s], abs(rate))
         segment = state.segment[s]
         if rate < 0.0 and segment > 0:
-            time, way = (delta - problem.knots[s, segment - 1]) / -rate, -1
+            time, side = (delta - problem.knots[s, segment - 1]) / -rate, -1
         elif rate > 0.0:
-            time, way = (problem.knots[s, segment] - delta) / rate, 1
+            time, side = (problem.knots[s, segment] - delta) / rate, 1
         else:
             continue
-        if time < near:
-            near, stop, direction = time, s, way
-    return near, stop, direction
+        if time < first:
+            first, stop, direction = time, s, side
+    return first, stop, direction
 
 
 @merged
 def _predict(problem, tables, state, scratch, level):
-    """First guess of the forces: the polynomial of the last step, or the law for the free response."""
+    """First guess of the forces: the extrapolated polynomial of the last step, or the law for the free response."""
     control = scratch.control
     shift = level - control[LEVEL] + 2
     for s in range(problem.law.size):
@@ -147,62 +147,63 @@ def _predict(problem, tables, state, scratch, level):
 
 @merged
 def _attempt(problem, tables, state, scratch, node_set, level):
-    """Attempt one contact step; (error in units of the tolerance, time of a bend it crosses, stop of that bend).
+    """Attempt one contact step; (error in units of the tolerance, time, stop).
 
-    With inf comes the time of a bend or border that is in its way and the stop, else inf and -1; of a border
-    ``scratch.border`` holds which it is, else -1.
+    If the step crosses a bend or border, these are the time of this after the start and its stop, ``scratch.border``
+    holds the number of the border, -1 of a bend, and the error is inf. Otherwise they are (inf, -1). A step on the
+    shortest level counts as within the tolerance if its forces are found.
     """
-    bottom, first, bent = level == tables.contact_step.size - 1, np.inf, -1
+    shortest, first, crossing = level == tables.contact_step.size - 1, np.inf, -1
     scratch.border[0] = -1
     free_response(problem, tables, state, scratch, node_set, level)
     _predict(problem, tables, state, scratch, level)
     if not solve_forces(problem, tables, state, scratch, node_set, level):
-        return np.inf, first, bent
+        return np.inf, first, crossing
     end_state(problem, tables, state, scratch, node_set, level)
     if leaves_segment(problem, tables, state, scratch, node_set, level):
-        return 1.0 if bottom else np.inf, first, bent
+        return 1.0 if shortest else np.inf, first, crossing
     if problem.parts[FIRST_END]:
-        first, bent = first_end(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0)
-    if bent == UNRESOLVED:
+        first, crossing = first_end(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0)
+    if crossing == UNRESOLVED:
         return np.inf, np.inf, -1
-    if bent >= 0:
-        return 1.0 if bottom else np.inf, first, bent
+    if crossing >= 0:
+        return 1.0 if shortest else np.inf, first, crossing
     error = step_error(problem, tables, state, scratch, node_set, level)
-    return min(error, 1.0) if bottom else error, first, bent
+    return min(error, 1.0) if shortest else error, first, crossing
 
 
 @merged
-def _try_border(problem, tables, state, scratch, near):
-    """Land on a border of friction that is passed just before a contact opens; whether it was done."""
+def _try_friction_border(problem, tables, state, scratch, time_to_border):
+    """Land on a border of friction that a landing on the surface would have crossed; returns whether it was done."""
     stop, level = scratch.landed[0], scratch.control[NEXT_LEVEL]
     if stop < 0 or not rubs(problem, stop):
         return False
     scratch.border[0] = scratch.landed[1]
-    stop, landed = land_in_time(problem, tables, state, scratch, stop, near)
+    stop, landed = land_in_time(problem, tables, state, scratch, stop, time_to_border)
     if landed:
-        _go_on(problem, tables, state, scratch, stop, level, False)
+        _continue_after(problem, tables, state, scratch, stop, level, False)
     return landed
 
 
 @merged
-def _go_on(problem, tables, state, scratch, stop, level, alone):
-    """Begin what follows a landing in time."""
+def _continue_after(problem, tables, state, scratch, stop, level, alone):
+    """Go on after a landing on a bend or border: what it ends is renewed, the next step is the first of a segment."""
     control = scratch.control
     state.count[STEPS] += 1
     if state.now[T] < state.now[T_END]:
         go_beyond(problem, state, scratch, stop, alone)
     control[NEW], control[NODE_SET], control[NEXT_LEVEL] = SEGMENT, 0, level
-    if rubs(problem, stop):  # it may have stuck where its contact began
+    if rubs(problem, stop):  # the contact may have just begun, its force still singular
         control[NODE_SET] = entry_nodes(problem, tables, state, stop, control[NEXT_LEVEL])
 
 
 @merged
-def _try_landing(problem, tables, state, scratch, stop, direction, near):
-    """Land on the border met first and switch its stop, if it is near enough; whether it was done."""
-    stop, direction = land_first(problem, tables, state, scratch, stop, direction, near)
+def _try_landing(problem, tables, state, scratch, stop, direction, time_to_border):
+    """Land on the border reached first, and switch its stop; returns whether it was done."""
+    stop, direction = land_first(problem, tables, state, scratch, stop, direction, time_to_border)
     if stop < 0:
         if is_planar(problem):
-            return _try_border(problem, tables, state, scratch, near)
+            return _try_friction_border(problem, tables, state, scratch, time_to_border)
         return False
     state.count[STEPS] += 1
     if state.now[T] < state.now[T_END]:
@@ -213,14 +214,14 @@ def _try_landing(problem, tables, state, scratch, stop, direction, near):
 
 
 @part(ACCEPT, types.void, *[types.int64] * 3, REAL, types.int64)
-def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent):
-    """Complete the step found: samples, the end of the run if it is within, energy, event record, next step."""
+def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, crossing):
+    """Complete the accepted step: samples, energy, event record, next level; or the end of the run inside it."""
     h = tables.contact_step[level]
     end = state.now[T] + h
-    over = end >= state.now[T_END]
-    if over or state.due[state.count[SAMPLED]] <= end:
+    run_ends = end >= state.now[T_END]
+    if run_ends or state.due[state.count[SAMPLED]] <= end:
         sample_step(problem, tables, energy_tables, state, scratch, node_set, level)
-    if over:
+    if run_ends:
         end_run(problem, tables, state, scratch, node_set, level)
         return
     for r in range(problem.gap.size):
@@ -232,18 +233,18 @@ def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wan
         record_forces(problem, state, scratch, STEP, end, node_set, level)
     finish_step(problem, tables, state, scratch, node_set, level)
     _adapt(tables, scratch, level, node_set, wanted, error)
-    if bent >= 0:  # crossed within the shortest step
-        go_beyond(problem, state, scratch, bent, True)
+    if crossing >= 0:  # crossed within the shortest step
+        go_beyond(problem, state, scratch, crossing, True)
         scratch.control[NEW] = SEGMENT if scratch.border[0] >= 0 else 0
     state.count[STEPS] += 1
 
 
 @part(CONTACT, types.int64)
 def advance_contact(problem, tables, energy_tables, state, scratch):
-    """One accepted step in contact: land if a border is near, else collocate; returns a status code."""
-    control, bottom = scratch.control, tables.contact_step.size - 1
-    near, stop, direction = _nearest_surface(problem, state, scratch)
-    if near <= 0.0 and switch_on_surface(problem, state, True):
+    """One accepted step in contact, a landing if a border is near, else by collocation; returns a status code."""
+    control, shortest = scratch.control, tables.contact_step.size - 1
+    time_to_border, stop, direction = _nearest_surface(problem, state, scratch)
+    if time_to_border <= 0.0 and switch_on_surface(problem, state, True):
         if in_contact(state):
             begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
@@ -252,45 +253,45 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
         return RUNNING
     if (
         stop >= 0
-        and may_land(problem, tables, state, scratch, stop, direction, near)
-        and _try_landing(problem, tables, state, scratch, stop, direction, near)
+        and may_land(problem, tables, state, scratch, stop, direction, time_to_border)
+        and _try_landing(problem, tables, state, scratch, stop, direction, time_to_border)
     ):
         return RUNNING
     node_set = control[NODE_SET] if control[NEW] else 0
-    longest = 0.8 * near
+    longest = 0.8 * time_to_border
     if problem.table_dt.size:
         longest = min(longest, state.now[T_END] - state.now[T] + problem.table_dt[0])
     wanted = control[NEXT_LEVEL]
     level = level_of(tables, longest) if longest < tables.contact_step[wanted] else wanted
     copy(scratch.side, scratch.side_at_begin, scratch.side.size)
     while True:
-        error, first, bent = _attempt(problem, tables, state, scratch, node_set, level)
-        if error <= 1.0 and (bent < 0 or not rubs(problem, bent)):
+        error, first, crossing = _attempt(problem, tables, state, scratch, node_set, level)
+        if error <= 1.0 and (crossing < 0 or not rubs(problem, crossing)):
             break
-        landed, met = first == 0.0 and scratch.border[0] >= 0, bent  # it begins on the border and goes across
-        if bent >= 0 and not landed:
-            met, landed = land_in_time(problem, tables, state, scratch, bent, first)
+        landed, landed_on = first == 0.0 and scratch.border[0] >= 0, crossing  # the step begins on the border
+        if crossing >= 0 and not landed:
+            landed_on, landed = land_in_time(problem, tables, state, scratch, crossing, first)
         if landed:
-            _go_on(problem, tables, state, scratch, met, max(level, wanted), first == 0.0)
+            _continue_after(problem, tables, state, scratch, landed_on, max(level, wanted), first == 0.0)
             return RUNNING
-        if error <= 1.0:  # within the shortest step it cannot be landed on
+        if error <= 1.0:  # the step is the shortest, and no landing is possible within it
             break
-        if level == bottom:
-            return LAW_NOT_FINITE if _law_fails(problem, state, scratch) else STEP_TOO_SMALL
+        if level == shortest:
+            return LAW_NOT_FINITE if _force_not_finite(problem, state, scratch) else STEP_TOO_SMALL
         copy(scratch.side_at_begin, scratch.side, scratch.side.size)
         state.count[REJECTED] += 1
-        if bent >= 0:  # a step that ends near the bend, so that the next one can land on it
+        if crossing >= 0:  # end a step shortly before, so that the next one can land
             level = max(level + 1, level_of(tables, 0.9 * first))
             continue
-        level = min(bottom, level + (1 + int(2.0 / _ORDER * math.log2(error / _GOAL)) if error < np.inf else 2))
+        level = min(shortest, level + (1 + int(2.0 / _ORDER * math.log2(error / _ERROR_GOAL)) if error < np.inf else 2))
         wanted = level
-    _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, bent)
+    _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, crossing)
     return RUNNING
 
 
 @merged
-def _law_fails(problem, state, scratch):
-    """Whether a force is not finite."""
+def _force_not_finite(problem, state, scratch):
+    """Whether a force of a stop in contact is not finite at a node."""
     for r in range(problem.gap.size):
         for i in range(S):
             if acts(problem, state, r) and not abs(scratch.force[r, i]) < np.inf:
@@ -299,24 +300,24 @@ def _law_fails(problem, state, scratch):
 
 
 @inlined
-def _longer(error):
-    """Levels, whole and at most 2, by which a step with such an error may be longer: 2/15 log₂(goal/error)."""
-    if error > _GOAL:
+def _levels_longer(error):
+    """Levels, -1 to 2, by which the next step may be longer: ⌊2/15 log₂(goal/error)⌋."""
+    if error > _ERROR_GOAL:
         return -1
-    if error > _GOAL * _ONE_LEVEL:
+    if error > _ERROR_GOAL * _ONE_LEVEL:
         return 0
-    return 1 if error > _GOAL * _ONE_LEVEL * _ONE_LEVEL else 2
+    return 1 if error > _ERROR_GOAL * _ONE_LEVEL * _ONE_LEVEL else 2
 
 
 @merged
 def _adapt(tables, scratch, level, node_set, wanted, error):
-    """Size of the next step from the error of this one, which is at most 1."""
+    """Set the level of the next step from the error of this one, which is at most 1."""
     control = scratch.control
-    if control[NEW] == ENTRY:  # the next contact of this stop begins with the step that was right here
-        s, longer = control[STOP], 2.0 / _ORDER * math.log2(_GOAL / max(error, 1e-30))
+    if control[NEW] == ENTRY:  # the next contact of this stop begins with the step that proved right in this one
+        s, levels = control[STOP], 2.0 / _ORDER * math.log2(_ERROR_GOAL / max(error, 1e-30))
         if level != control[NEXT_LEVEL]:
             scratch.first_step_share[s] = tables.contact_step[level] / scratch.duration[0]
-        scratch.first_step_share[s] *= 2.0 ** (0.5 * min(max(longer, -1.0), 0.5))
-    suggested = min(max(level - _longer(error), 0), tables.contact_step.size - 1)
+        scratch.first_step_share[s] *= 2.0 ** (0.5 * min(max(levels, -1.0), 0.5))
+    suggested = min(max(level - _levels_longer(error), 0), tables.contact_step.size - 1)
     control[NEXT_LEVEL] = suggested if level == wanted else min(suggested, wanted)
     control[LEVEL], control[NODE_SET], control[NEW] = level, node_set, 0

@@ -1,4 +1,4 @@
-"""Whether the energy of a finished run balances: by its samples, or by a bound that costs nothing if there are none.
+"""Whether the energy of a finished run balances: by its samples, or if it has none by a bound that costs nothing.
 
 The energy handled is the initial energy, the input, the energy dissipated and stored, and for every contact the peak
 force times the peak indentation. A run with an energy balance is refused if the residual exceeds (`MULTIPLE` rtol +
@@ -10,9 +10,9 @@ at the start plus the work of the contacts,
     E <= E₀ + Σ_s (2 max|δ̇_s of the steady response| |∫F_s dt| - ∫F_s δ̇_s dt) =: E_c,
 
 and sampled loads v_l s_l(t) raise √(2E) by at most Σ_l |v_l|_{M⁻¹} ∫|s_l| dt. A run is refused if E is more than
-`FACTOR` times this bound plus the tolerated energy. A run that only loses too much energy passes. Under tones E_c is
-no bound where a force pulls, as ∫|F_s| dt then exceeds |∫F_s dt|: a run beyond it is made again with a balance, and one
-of many passes.
+`FACTOR` times this bound plus the tolerated energy. A run that only loses too much energy passes. Under tones E_c is no
+bound where a force pulls, as ∫|F_s| dt then exceeds |∫F_s dt|: such a run that exceeds it is repeated with a balance,
+but passes if it is one of many.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from solvers.problem import Array, Energy, Record, System, dense
 from solvers.problem.friction import ARM, MU, SPIN, may_pull
 from solvers.problem.system import stored_energy
 
-MULTIPLE, ROUNDING = 20.0, 1e-9
-FACTOR = 4.0
-_SAMPLES = 64  # of the balance that are checked, the last one among them
-FIRST, LAST, ALLOWED = range(3)  # places in Scratch.energy
+MULTIPLE, ROUNDING = 20.0, 1e-9  # see the module; relative to the energy handled
+FACTOR = 4.0  # margin of the check without a balance
+_SAMPLES = 64  # samples whose balance is checked, the last one among them
+FIRST, LAST, ALLOWED = range(3)  # places in Scratch.energy: own energy at start and end, and E_c, J
 
 
 @inner
@@ -47,7 +47,7 @@ def own_energy(problem, tables, x):
 
 @merged
 def note_energy(problem, tables, state, scratch):
-    """At the end of a run: its energy, and the bound E_c, into ``scratch.energy``."""
+    """At the end of a run write its energy and the bound E_c into ``scratch.energy``."""
     n = problem.k.size
     allowed = scratch.energy[FIRST]
     for s in range(problem.law.size):
@@ -61,9 +61,9 @@ def note_energy(problem, tables, state, scratch):
                 )
         work, impulse = state.x[2 * n + 2 + 2 * s], abs(state.x[2 * n + 3 + 2 * s])
         if rubs(problem, s):  # |F_t| <= μN; the work of a prescribed spin is given
-            own, account = slider_of(problem, s), problem.friction[s, 1]
-            impulse *= 1.0 + own[MU]
-            work += state.x[account] - own[ARM] * own[SPIN] * state.x[account + 1]
+            slider, account = slider_of(problem, s), problem.friction[s, 1]
+            impulse *= 1.0 + slider[MU]
+            work += state.x[account] - slider[ARM] * slider[SPIN] * state.x[account + 1]
         if problem.knots[s, 0] < 0.0:  # a force of both signs
             impulse = state.active[s, PEAK_FORCE] * state.now[T]
         allowed += 2.0 * steady * impulse - work
@@ -71,7 +71,7 @@ def note_energy(problem, tables, state, scratch):
 
 
 def tolerated_energy(handled: float, exchanged: Array, rtol: float) -> float:
-    """Energy, J, that may be missing in the balance of a run.
+    """Residual, J, that the balance of a run may have.
 
     ``exchanged`` (k,) : peak force times peak indentation of every contact.
     """
@@ -93,9 +93,9 @@ def _pulls(contact: Any) -> bool:
 def has_gained(
     system: System, energy: Any, sampled: Any, duration: float, exchanged: Callable[[], Any], rtol: float
 ) -> bool:
-    """Whether a run without balance ends with more energy than it can have been given; ``sampled`` are its loads.
+    """Whether a run without balance ends with more energy than it can have been given.
 
-    ``exchanged`` as in `tolerated_energy`, asked for only where it matters.
+    ``sampled`` has its sampled loads; ``exchanged`` is as in `tolerated_energy`, computed only if it decides.
     """
     first, last, allowed = energy.tolist()
     if not last > FACTOR * allowed or system.blocks.loss.size:
@@ -119,7 +119,7 @@ def _checked_places(count: int) -> Any:
 
 
 def unbalanced(record: Record, rtol: float) -> bool:
-    """Whether the energy of a run, given at its samples, is off by more than is tolerated."""
+    """Whether the energy balance at the samples of a run has a residual above the tolerated one."""
     rows, system, rubbed = _checked_places(len(record.motion)), record.system, record.works_of_friction
     motion = np.concatenate(((record.back @ record.begin)[None], record.motion[rows]))
     stored = stored_energy(system.M, system.K, motion[:, : system.size], motion[:, system.size :])

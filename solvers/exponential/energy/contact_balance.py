@@ -1,7 +1,7 @@
 """The energy balance of contact steps: whole steps by tables, the rest by `quadrature`.
 
-A step of a system with one or two stops is one form that `contact_sums` has summed over the blocks; with more stops the
-blocks are summed here, each by its forms of `contact_tables`.
+With one or two stops a step is one form that `contact_sums` has summed over the blocks; with more stops the forms of
+the blocks, see `contact_tables`, are evaluated and summed here.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from solvers.exponential.energy.quadrature import state_within
 
 @part(ACCOUNT_CONTACT, types.void, types.int64, types.int64, REAL)
 def account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h):
-    """Add to the state's balance what loads and damping do over the contact step of length h just found."""
+    """Add work of the loads and damping over the contact step of length h just solved to the state's balance."""
     if level >= energy_tables.first and h <= energy_tables.longest[energy_tables.kind[node_set]]:
         place = level - int(energy_tables.first)
         if energy_tables.sums.shape[0]:
@@ -38,7 +38,7 @@ def account_contact(problem, tables, energy_tables, state, scratch, node_set, le
 
 @reordered
 def _free_loss(plain, x, n):
-    """Energy dissipated by the free motion of the structure's blocks."""
+    """Energy, J, dissipated by the free motion of the structure's blocks."""
     loss, blocks = 0.0, plain.shape[1]
     for b in range(blocks):
         p, v = x[b], x[n + b]
@@ -48,7 +48,7 @@ def _free_loss(plain, x, n):
 
 @merged
 def _account_sums(problem, tables, energy_tables, state, scratch, node_set, place):
-    """The same by the forms that are summed over the blocks, for a whole step."""
+    """The same for a whole step by the forms that are summed over the blocks."""
     size, rows, heads = 2 * problem.k.size, problem.gap.size, energy_tables.head
     y, sums, tones = scratch.energy_sums[0], scratch.energy_sums[1], problem.k.size - int(tables.own_blocks)
     copy(state.x, y, size)
@@ -73,7 +73,10 @@ def _account_sums(problem, tables, energy_tables, state, scratch, node_set, plac
 
 @merged
 def _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, weights):
-    """Work of the signals on the steady motion; signals at the nodes go to ``energy_sums``, tones to ``terms``."""
+    """Work, J, of the loads on the steady motion over the step.
+
+    Signals at the nodes are left in ``scratch.energy_sums``, motion of the tones there in ``scratch.terms``.
+    """
     n, size, gain = int(tables.own_blocks), problem.k.size, 0.0
     for k in range(size - n):
         alpha, beta = (
@@ -85,16 +88,16 @@ def _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h
         store8(scratch.terms, 2 * S * k + S, alpha * v - beta * splat8(problem.k[n + k]) * p)
     for load in range(tables.power_rows.shape[0]):
         signal, power = load8(scratch.force[problem.gap.size + load], 0), splat8(0.0)
-        signal += _of_tones(tables.signal_rows[load], scratch, n, size)
-        power += _of_tones(tables.power_rows[load], scratch, n, size)
+        signal += _sum_of_tones(tables.signal_rows[load], scratch, n, size)
+        power += _sum_of_tones(tables.power_rows[load], scratch, n, size)
         store8(scratch.energy_sums[2 + load], 0, signal)
         gain += h * sum8(load8(weights, 0) * signal * power)
     return gain
 
 
 @inlined
-def _of_tones(row, scratch, n, size):
-    """A row's sum over the tones at the nodes."""
+def _sum_of_tones(row, scratch, n, size):
+    """A row's sum over the motion of the tones at the nodes."""
     values = splat8(0.0)
     for k in range(size - n):
         values += splat8(row[n + k]) * load8(scratch.terms, 2 * S * k)
@@ -104,7 +107,7 @@ def _of_tones(row, scratch, n, size):
 
 @merged
 def _block_forces(problem, tables, state, scratch, node_set, b, y):
-    """Forces on a block at the nodes and its state, for plain forces and for that of the stop that enters; signals."""
+    """Write a block's plain forces, that of the stop that enters, and its state into ``y``; its signal at the nodes."""
     size, signal, plain, entering = problem.k.size, splat8(0.0), splat8(0.0), splat8(0.0)
     for u in range(problem.gap.size):
         if acts(problem, state, u):
@@ -125,7 +128,7 @@ def _block_forces(problem, tables, state, scratch, node_set, b, y):
 
 @merged
 def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h):
-    """The same by the tables, for a whole step."""
+    """The same for a whole step by the forms of each block."""
     n, size, kind, weights = (
         int(tables.own_blocks),
         problem.k.size,
@@ -152,7 +155,7 @@ def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, pla
         losses += splat8(c) * squares
         loss += c * (table[BEGAN, 0] * p * p + table[BEGAN, 1] * p * v + table[BEGAN, 2] * v * v)
         if n < size:
-            steady = _of_tones(tables.loss_rows[b], scratch, n, size)
+            steady = _sum_of_tones(tables.loss_rows[b], scratch, n, size)
             losses += splat8(2.0 * tables.loss_rows[b, size + b]) * steady * moments
             losses += splat8(h) * weights * steady * steady
     state.x[2 * size] += gain + sum8(gains)

@@ -39,11 +39,11 @@ class Steps:
     tones: Any
 
     def moments(self, u: int) -> Any:
-        """(j, n, S, S) ∫ L_i v dt per node value of a head."""
+        """(j, n, S, S) ∫ L_i v dt per node value of head u."""
         return self.table[:, :, ENTERING:SQUARES, :S] if u in self.entering else self.table[:, :, :S, :S]
 
     def squares(self, u: int, w: int) -> Any:
-        """(j, n, S, S) ∫ v_w v_u dt per node values of two heads."""
+        """(j, n, S, S) ∫ v_w v_u dt per node value of each of two heads."""
         if u in self.entering and w in self.entering:
             return self.table[:, :, SQUARES : SQUARES + S, :S]
         if w in self.entering:
@@ -51,7 +51,7 @@ class Steps:
         return self.squares(w, u).swapaxes(2, 3) if u in self.entering else self.table[:, :, :S, S:]
 
     def free(self, u: int) -> Any:
-        """(j, n, 2, S) twice the same of p₀, v₀ and a head."""
+        """(j, n, 2, S) twice ∫ v v_u dt, per p₀ and v₀, and per node value of head u."""
         return self.table[:, :, SQUARES + S :, :S] if u in self.entering else self.table[:, :, _FREE, S:]
 
 
@@ -66,7 +66,7 @@ def tones_at_nodes(steady: Any, k: Any) -> Any:
 
 
 class Sums:
-    """The forms of one system; `of` makes those of a node set."""
+    """The forms of one system; `of` computes those of a node set."""
 
     def __init__(self, problem: Problem, tables: Tables) -> None:
         forces, n, blocks = len(problem.gap), int(tables.own_blocks), len(problem.k)
@@ -86,7 +86,7 @@ class Sums:
         return slice(self.first + S * head, self.first + S * (head + 1))
 
     def of(self, steps: Steps) -> Any:
-        """(j, y, S per head, damping, S per load, work, then those of the tones) forms of all steps."""
+        """(j, y, columns) forms of all steps: S per head damping, S per load work, then those of the tones."""
         out = np.zeros((len(steps.weights), *self.shape))
         work = [self._work(steps, load) for load in range(len(self.power))]
         for i, u in enumerate(self.heads.tolist()):
@@ -101,7 +101,7 @@ class Sums:
         return out
 
     def _work(self, steps: Steps, load: int) -> Any:
-        """(j, y, S) ∫ L_i P dt with the velocity P of a load."""
+        """(j, y, S) ∫ L_i P dt, with P the velocity on the power row of a load."""
         out = np.zeros((len(steps.weights), self.shape[0], S))
         for part, rows in enumerate((self.p, self.v)):
             out[:, rows] = self.power[load, self.v, None] * steps.table[:, :, S + part, :S]
@@ -111,7 +111,7 @@ class Sums:
         return out
 
     def _damping(self, steps: Steps, u: int) -> Any:
-        """(j, y, S) what damping takes by the velocities of y and those of a head."""
+        """(j, y, S) damping by the velocities due to y and those due to head u."""
         out, by_head = np.zeros((len(steps.weights), self.shape[0], S)), self.c * self.push[u]
         for part, rows in enumerate((self.p, self.v)):
             out[:, rows] = by_head[:, None] * steps.free(u)[:, :, part]
@@ -121,7 +121,7 @@ class Sums:
         return out
 
     def _damping_of_tones(self, steps: Steps) -> Any:
-        """(j, y, 2K) the same of the steady motion by the tones."""
+        """(j, y, 2K) damping by the velocities due to y and those of the steady motion."""
         out, steady = np.zeros((len(steps.weights), self.shape[0], len(self.tone))), self._steady(steps)
         for part, rows in enumerate((self.p, self.v)):
             free = steps.table[:, :, S + part, :S]
@@ -136,7 +136,7 @@ class Sums:
         return np.einsum("bc,jzci->jbzi", self.loss, steps.tones)
 
     def _crossed(self, steps: Steps, u: int) -> Any:
-        """(j, S, 2K) damping by a head and the tones."""
+        """(j, S, 2K) damping by head u and the tones."""
         by_head = np.sqrt(self.c) * self.push[u]
         return np.einsum("b,jbei,jbzi->jez", by_head, steps.moments(u), self._steady(steps), optimize=True)
 

@@ -20,19 +20,20 @@ from solvers.exponential.contact.nodes import S, gauss, lagrange, so_far
 from solvers.exponential.responses import propagate
 
 _PANEL, _POINTS = 1.5, 16  # radians of a panel and its points: exact to rounding
-_BEGIN, _ROWS = 2 * S, 2 * S + 2  # rows of y: plain forces, those of the stop that enters, from here on p₀ and v₀
+_BEGIN, _ROWS = 2 * S, 2 * S + 2  # rows of y: plain forces, those of the stop that enters, then p₀ and v₀
 _WIDE = S + _ROWS  # ∫ L_i v dt for all nodes, then ∫ v v_row dt for all rows
-BEGAN, ENTERING, SQUARES = S + 2, S + 3, 2 * S + 3  # rows of a table behind those of plain forces, p₀ and v₀
+BEGAN, ENTERING, SQUARES = S + 2, S + 3, 2 * S + 3  # rows of a table behind those of F and x, see `contact_table`
 
 
 @lru_cache(maxsize=16)
 def contact_table(
     stiffness: bytes, damping: bytes, steps: bytes, time_exponent: float, weight_exponent: float, places: bytes
 ) -> Any:
-    """(j, n, 3S + 5, 2S) of one kind of steps, t = h σ^power, for blocks (k, c) and steps given as arrays' bytes.
+    """(j, n, 3S + 5, 2S) of one kind of steps, t = h σ^κ, for blocks (k, c), steps and nodes given as arrays' bytes.
 
-    With F plain forces, G those of the stop that enters, x = (p₀, v₀), each form once: rows of F and x hold ∫ L_i v dt
-    and the part of ∫ v² dt to be multiplied by F, then x by itself, then G as F, then G and x to be multiplied by G.
+    With F plain forces, G those of the stop that enters, x = (p₀, v₀). Every form is kept once: rows of F and x hold ∫
+    L_i v dt and the part of ∫ v² dt to be multiplied by F; then a row of x with x; then rows of G as those of F; then
+    rows of G and x to be multiplied by G.
     """
     k, c, h, nodes = (np.frombuffer(part) for part in (stiffness, damping, steps, places))
     apart = 1.0 / (nodes[:, None] - nodes + np.eye(len(nodes))).prod(axis=1)
@@ -51,9 +52,9 @@ def contact_table(
 def _fill(
     k, c, h, time_exponent, weight_exponent, nodes, weights, points, so_far, velocity, basis, pushed, state, sums, out
 ):
-    """All tables of a kind; the arguments between ``so_far`` and the result are scratch."""
+    """Fill all tables of a kind; the arguments between ``so_far`` and ``out`` are scratch."""
     for level in range(h.size):
-        known = 0  # panels of which ``basis`` is that of the only one
+        known = 0  # panels for which ``basis`` has been computed; it can be reused if there is one panel
         for b in range(k.size):
             panels = 1 + int(time_exponent * (math.sqrt(k[b]) + c[b]) * h[level] / _PANEL)
             state[:], sums[:] = 0.0, 0.0
@@ -63,7 +64,7 @@ def _fill(
                 if panels > 1 or known != 1:
                     _fill_basis(nodes, weights, weight_exponent, points, begin, width, basis)
                     known = panels
-                _push(k[b], c[b], h[level], time_exponent, points, begin, width, basis, pushed)
+                _unit_impulses(k[b], c[b], h[level], time_exponent, points, begin, width, basis, pushed)
                 _move(k[b], c[b], h[level], time_exponent, points, so_far, begin, width, pushed, state, velocity)
                 for q in range(points.shape[1]):
                     sigma = begin + width * points[0, q]
@@ -74,7 +75,7 @@ def _fill(
 
 @inner
 def _write(sums, out):
-    """The table from ∫ L_i v dt and ∫ v_e v_f dt, each form once."""
+    """Write a block's table from ∫ L_i v dt and ∫ v_e v_f dt, every form once."""
     x = _BEGIN
     for i in range(S):
         for j in range(S):
@@ -100,15 +101,17 @@ def _fill_basis(nodes, weights, weight_exponent, points, begin, width, basis):
 
 
 @inner
-def _moved(k, c, x, p, v):
-    """State of a block after the time x, or before if x < 0: det exp(A x) = e^{-cx} gives the inverse of α I + β A."""
-    alpha, beta = _turned(k, c, x)
+def _propagated(k, c, x, p, v):
+    """State of a block a time x later, or earlier if x < 0, by the inverse of α I + β A with the determinant
+    e^{-cx}.
+    """
+    alpha, beta = _propagator_of(k, c, x)
     return alpha * p + beta * v, alpha * v - beta * (k * p + c * v)
 
 
 @inner
-def _turned(k, c, x):
-    """α, β of that."""
+def _propagator_of(k, c, x):
+    """α, β of a time x of any sign."""
     alpha, beta = propagate(k, c, abs(x))
     if x < 0.0:
         grown = math.exp(-c * x)
@@ -117,12 +120,12 @@ def _turned(k, c, x):
 
 
 @inner
-def _push(k, c, h, time_exponent, points, begin, width, basis, pushed):
-    """Unit forces at the points of a panel, per σ, as (p, v) moved back to the panel's start."""
+def _unit_impulses(k, c, h, time_exponent, points, begin, width, basis, pushed):
+    """Changes of (p, v) by unit forces at the points of a panel, per σ, moved back to the panel's start."""
     start = h * begin**time_exponent
     for q in range(points.shape[1]):
         sigma = begin + width * points[0, q]
-        p, v = _moved(
+        p, v = _propagated(
             k, c, start - h * sigma**time_exponent, 0.0, width * h * time_exponent * sigma ** (time_exponent - 1.0)
         )
         for kind in range(2):
@@ -133,11 +136,11 @@ def _push(k, c, h, time_exponent, points, begin, width, basis, pushed):
 
 @inner
 def _move(k, c, h, time_exponent, points, so_far, begin, width, pushed, state, velocity):
-    """Velocities at the points of a panel by the variation of constants; ``state`` is moved to its end."""
+    """Velocities at the points of a panel by variation of constants; ``state`` is moved to its end."""
     count, start = points.shape[1], h * begin**time_exponent
     for q in range(count + 1):
         end = begin + width * points[0, q] if q < count else begin + width
-        alpha, beta = _turned(k, c, h * end**time_exponent - start)
+        alpha, beta = _propagator_of(k, c, h * end**time_exponent - start)
         for first in range(0, _BEGIN, S):
             p, v = load8(state[0], first), load8(state[1], first)
             for r in range(count):
@@ -160,7 +163,7 @@ def _move(k, c, h, time_exponent, points, so_far, begin, width, pushed, state, v
 
 @inner
 def _add_products(measure, basis, velocity, out):
-    """One point's part of all integrals, ∫ v_e v_f dt for f up to the last row like e: the others are the same."""
+    """Add the share of one point to all integrals; ∫ v_e v_f dt only for f up to the last row of e's group of eight."""
     for e in range(_ROWS):
         value = splat8(measure * velocity[e])
         store8(out[e], 0, load8(out[e], 0) + value * load8(basis, 0))

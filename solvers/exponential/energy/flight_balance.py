@@ -1,11 +1,11 @@
 """The energy balance of flight: tabulated steps and cells by the forms of `flight_tables`, the rest by series.
 
 A flight is accounted for from a *mark* on: the start of the flight, the last output or, with sampled signals, the start
-of the present cell. Between marks, one form covers the time, whatever steps the flight has taken.
+of the present cell. From mark to mark one form is enough, whatever steps the flight has taken.
 
-A series reaches `SERIES_REACH` radians of the fastest block. The powers of the motion it gives are integrated by
-Gauss's rule with seven points, exact up to the power 13 of the time: within a cell signals are of the fifth, and what
-they do to p of the seventh, however rough they are.
+A series reaches `SERIES_REACH` radians of the fastest block. The powers of its motion are integrated by Gauss's rule
+with seven points, exact up to the power 13 of time: within a cell signals are of degree five, and their share of p of
+degree seven, however rough they are.
 """
 
 from __future__ import annotations
@@ -33,23 +33,26 @@ from solvers.exponential.flight import (
     split,
 )
 
-_MARK, _MOVING, _WITHIN = 3, 4, 5  # of Scratch.split_state: the state at the mark, two that are moved from there on
-_MARKED, _JOINED, _SPLIT = 9, 10, 11  # rows of Scratch.stages: time of the mark; a state within a series, twice
-_EXACT = 1e-17  # share of the last term of a series
+_MARK, _MOVING, _WITHIN = 3, 4, 5  # indices in Scratch.split_state: state at the mark, two that are moved on
+_MARKED, _JOINED, _SPLIT = 9, 10, 11  # rows of Scratch.stages: time of the mark; a state in a series, joined and split
+_EXACT = 1e-17  # relative size of the last term of a series
 _EXCHANGED = types.UniTuple(REAL, 2)
-"""Work and damping: returned, and states told by their place, since a part that is passed an array waits for it."""
+"""Work and damping, J. They are returned, and states are named by their index, since parts are slow with arrays."""
 
 
 @inner
 def start_account(problem, state, scratch):
-    """Set the mark, from which `account_until` accounts for a flight; the balance of the state is complete."""
+    """Set the mark to the state; its balance must be complete."""
     split(problem, state.x, scratch.split_state[_MARK])
     scratch.stages[_MARKED, 0] = state.now[T]
 
 
 @inner
 def fly_within(problem, tables, scratch, place, t, span, accounted, energy_tables, row):
-    """Move p and v at a place of ``split_state`` by ``span`` within a cell; ``row``'s balance too, if ``accounted``."""
+    """Move p and v at index ``place`` of ``split_state`` by ``span`` within a cell.
+
+    If ``accounted``, the balance of ``row`` is integrated along.
+    """
     x = scratch.split_state[place]
     while tables.fastest * span > SERIES_REACH:
         level = level_within(tables, span)
@@ -72,11 +75,11 @@ def add_to_balance(problem, row, exchanged):
 
 @part(ACCOUNT_FLIGHT, types.void, REAL, VECTOR)
 def account_until(problem, tables, energy_tables, scratch, t, row):
-    """Add work and damping of a flight from the mark to t, within one cell, to the balance of ``row``."""
+    """Add work and damping of the flight from the mark to t, within one cell, to the balance of ``row``."""
     begin = scratch.stages[_MARKED, 0]
     copy_split(scratch.split_state[_MARK], scratch.split_state[_MOVING])
     span = t - begin
-    if energy_tables.closed > 0.0 and abs(span - energy_tables.spacing) <= _rounding(problem, energy_tables, t):
+    if energy_tables.closed > 0.0 and abs(span - energy_tables.spacing) <= _time_rounding(problem, energy_tables, t):
         whole = tables.flight_step.size
         add_to_balance(problem, row, account_step(problem, tables, energy_tables, scratch, whole, begin, _MOVING))
     elif span > 0.0:
@@ -110,14 +113,14 @@ def copy_split(source, target):
 
 
 @merged
-def _rounding(problem, energy_tables, t):
-    """Difference allowed between the step of the tables and the time between two outputs, or of a cell."""
+def _time_rounding(problem, energy_tables, t):
+    """Difference, s, allowed between the step of the tables and the time between two outputs, or a cell."""
     return 1e-7 * energy_tables.spacing if problem.table_dt.size else 4e-16 * t
 
 
 @part(ACCOUNT_STEP, _EXCHANGED, types.int64, REAL, types.int64)
 def account_step(problem, tables, energy_tables, scratch, level, t, place):
-    """Work and damping of a tabulated step, or of a whole cell, from t on and what is at a place of ``split_state``.
+    """Work and damping, J, of a tabulated step or whole cell from t on, of state ``place`` of ``split_state``.
 
     The derivatives of the signals at the start of a tabulated step are in ``scratch.signal_terms``.
     """
@@ -127,7 +130,7 @@ def account_step(problem, tables, energy_tables, scratch, level, t, place):
         span = energy_tables.spacing if whole else tables.flight_step[level]
         copy_split(x, scratch.split_state[_WITHIN])
         exchanged = _account_panels(problem, tables, energy_tables, scratch, scratch.split_state[_WITHIN], t, span)
-        derive_signals(problem, t, scratch.signal_terms)  # of which the panels have made those of the last one
+        derive_signals(problem, t, scratch.signal_terms)  # which the panels have overwritten
         return exchanged
     if whole:
         _nodes_of_cell(problem, scratch, t)
@@ -135,18 +138,18 @@ def account_step(problem, tables, energy_tables, scratch, level, t, place):
     for j in range(problem.table_dt.size):
         copy(scratch.signal_terms[j], given[count:], 6)
         count += 6
-    gain, loss = _of_signals(energy_tables.pairs[level], given, count)
+    gain, loss = _exchange_of_signals(energy_tables.pairs[level], given, count)
     for d in range(energy_tables.driver.size):
         i = energy_tables.driver[d]
         given[count] = x[0, i] if i < n else x[1, i - n]
         count += 1
-    more, lost = _of_state(energy_tables.rows[level], energy_tables.plain[level], given, count, x)
+    more, lost = _exchange_of_state(energy_tables.rows[level], energy_tables.plain[level], given, count, x)
     return gain + more, loss + lost
 
 
 @merged
 def _nodes_of_cell(problem, scratch, t):
-    """s, s', s'' of every signal at the start of the cell of t, then at its end, into ``scratch.signal_terms``."""
+    """Write s, s', s'' of every signal at the start, then at the end of the cell of t into ``scratch.signal_terms``."""
     for j in range(problem.table_dt.size):
         node = problem.table_start[j] + cell_of(problem, t)[0]
         copy(problem.table[node], scratch.signal_terms[j], 3)
@@ -154,8 +157,8 @@ def _nodes_of_cell(problem, scratch, t):
 
 
 @merged
-def _of_signals(pairs, given, count):
-    """Work and damping of the motion by the signals alone."""
+def _exchange_of_signals(pairs, given, count):
+    """Work and damping of the motion due to the signals alone."""
     half = pairs.shape[1] // 2
     gains, losses = splat8(0.0), splat8(0.0)
     for i in range(count, half):
@@ -171,8 +174,8 @@ def _of_signals(pairs, given, count):
 
 
 @merged
-def _of_state(rows, plain, given, count, x):
-    """Work and damping of the state x with what drives it, and damping of the structure's blocks by themselves."""
+def _exchange_of_state(rows, plain, given, count, x):
+    """Work and damping of the state x with drivers and signals, and damping of the blocks by themselves."""
     width, gains, losses = x.shape[1], splat8(0.0), splat8(0.0)
     for i in range(0, width, WIDTH):
         p, v = load8(x[0], i), load8(x[1], i)
@@ -191,7 +194,7 @@ def _of_state(rows, plain, given, count, x):
 
 @merged
 def _account_panels(problem, tables, energy_tables, scratch, x, t, span):
-    """The same by series for a step without forms; x is moved."""
+    """Work and damping of a step without forms, by series; x is moved."""
     gain, loss = 0.0, 0.0
     panels = max(1, math.ceil(tables.fastest * span / SERIES_REACH - 1e-9))
     for i in range(panels):
@@ -204,7 +207,7 @@ def _account_panels(problem, tables, energy_tables, scratch, x, t, span):
 
 @part(ACCOUNT_SERIES, _EXCHANGED, REAL, REAL)
 def account_series(problem, tables, energy_tables, scratch, t, span):
-    """Work and damping of the motion by `fly_series` that began at t."""
+    """Work and damping, J, of the motion that the last `fly_series` has moved from t by ``span``."""
     n, plain = problem.k.size, int(tables.own_blocks) == problem.k.size
     count, size, power = S + 1, 1.0, 1.0
     for i in range(S):
@@ -216,13 +219,13 @@ def account_series(problem, tables, energy_tables, scratch, t, span):
         scratch.values[i] = power
         power *= span
     if plain and tables.loss_rows.shape[0] <= n:
-        return _of_rates(problem, tables, energy_tables, scratch, count, span)
-    return _of_states(problem, tables, energy_tables, scratch, t, count, span)
+        return _exchange_of_rates(problem, tables, energy_tables, scratch, count, span)
+    return _exchange_at_points(problem, tables, energy_tables, scratch, t, count, span)
 
 
 @merged
-def _of_rates(problem, tables, energy_tables, scratch, count, span):
-    """The same without tones and coupling; powers of the time are in ``scratch.values``, all points in one pass."""
+def _exchange_of_rates(problem, tables, energy_tables, scratch, count, span):
+    """The same without tones and coupling, for all points at once; powers of time are in ``scratch.values``."""
     points, series, width = energy_tables.gauss.shape[1], energy_tables.series, tables.block_k_c.shape[1]
     weights, signals, gains, losses = scratch.energy_sums[0], scratch.energy_sums[1], splat8(0.0), splat8(0.0)
     for q in range(points):
@@ -254,7 +257,7 @@ def _of_rates(problem, tables, energy_tables, scratch, count, span):
 
 @inlined
 def _sum_of_seven(weights, first, a, b, c, d, e, f, g):
-    """Weighted sum of a block's numbers at Gauss's points."""
+    """Weighted sum of a block's values at Gauss's seven points."""
     outer = splat8(weights[first]) * a + splat8(weights[first + 6]) * g
     between = splat8(weights[first + 1]) * b + splat8(weights[first + 5]) * f
     inner_ones = splat8(weights[first + 2]) * c + splat8(weights[first + 4]) * e
@@ -262,7 +265,7 @@ def _sum_of_seven(weights, first, a, b, c, d, e, f, g):
 
 
 @merged
-def _of_states(problem, tables, energy_tables, scratch, t, count, span):
+def _exchange_at_points(problem, tables, energy_tables, scratch, t, count, span):
     """The same in general, point by point."""
     n, width, z, gain, loss = problem.k.size, tables.block_k_c.shape[1], scratch.stages[_JOINED], 0.0, 0.0
     for q in range(energy_tables.gauss.shape[1]):

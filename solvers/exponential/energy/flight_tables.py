@@ -32,21 +32,21 @@ from solvers.exponential.phi_functions import derivatives_of_ends, signal_respon
 from solvers.exponential.responses import fill_propagators
 from solvers.exponential.tables import Tables
 
-_OCTAVE = 4  # flight steps of which each is twice as long as the last
+_OCTAVE = 4  # flight steps per factor of two
 _BRIEF = 0.04  # |λ| h up to which twelve terms of a Taylor series are exact
-_MOST_NUMBERS = 10_000_000  # in the rows: with more drivers the work is computed by series
-_MOST_PER_BLOCK = 1000  # numbers of a form summed over the blocks: with more, of many tones, blocks take less time
+_MOST_NUMBERS = 10_000_000  # in ``rows``: above, with many drivers, flight is integrated by series
+_MOST_PER_BLOCK = 1000  # numbers of a summed form per block: above, with many tones, forms of each block are cheaper
 _POINTS = 7  # of Gauss's rule on a series, see `flight_balance`
-_REACH = 200.0  # radians of the fastest block up to which a contact step has tables
+_REACH = 200.0  # radians of the fastest block up to which contact steps have tables
 
 
 class EnergyTables(NamedTuple):
-    """Numbers of the energy balance, read by kernels only; l counts flight steps and one more, j contact steps."""
+    """Numbers of the energy balance, read by kernels only; l counts flight steps and the cell, j contact steps."""
 
     active: Annotated[float, "number"]  # whether there is a balance
-    closed: Annotated[float, "number"]  # whether there are rows for flight
-    spacing: Annotated[float, "number"]  # s, of the last step in the tables
-    driver: Annotated[Any, "int d"]  # columns of the state that drive
+    closed: Annotated[float, "number"]  # whether there are forms for flight
+    spacing: Annotated[float, "number"]  # s, of the last step in the tables: a cell, or the time between outputs
+    driver: Annotated[Any, "int d"]  # columns of the state that are drivers, see the module
     power: Annotated[Any, "L, N8"]  # input power = signal × power row, from v
     plain: Annotated[Any, "l, 3, N8"]  # damping = Σ rows × (p², p v, v²)
     rows: Annotated[Any, "l, 6*J+d, 4*N8"]  # work, then damping, from p, then v, per unit of a signal or driver
@@ -57,7 +57,7 @@ class EnergyTables(NamedTuple):
     first: Annotated[float, "number"]  # contact step at which the tables begin
     longest: Annotated[Any, "kinds"]  # s: contact step up to which they may be used
     steady: Annotated[Any, "kinds, j, K, 2, S"]  # α, β of every tone at the nodes
-    contact: Annotated[Any, "kinds, j, N, 3*S+5, 2*S"]  # or none where the next three are
+    contact: Annotated[Any, "kinds, j, N, 3*S+5, 2*S"]  # forms of each block, or none if there are the next three
     head: Annotated[Any, "int H"]  # rows of `Scratch.force` that are heads, see `contact_sums`
     sums: Annotated[Any, "f, j, heads, sums"]  # forms of 2N + S H rows summed over the blocks
     free_loss: Annotated[Any, "kinds, j, 3, N"]  # damping of free motion = Σ rows × (p², p v, v²)
@@ -67,7 +67,7 @@ ENERGY_TABLES = packed_type(EnergyTables)
 
 
 def _empty(kept: float, node_sets: int) -> EnergyTables:
-    """A balance without tables."""
+    """Tables without forms; ``kept`` is 1 if there is a balance."""
     none, nothing, contact = np.zeros(0, dtype=np.int64), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0, 0))
     flight = kept, 0.0, 0.0, none, np.zeros((0, 0)), nothing, nothing, nothing
     kind, longest, sums = np.zeros(node_sets, dtype=np.int64), np.zeros(1), np.zeros((0, 0, 0, 0))
@@ -84,14 +84,14 @@ NO_ENERGY_TABLES = Packed.of(_empty(0.0, 1), ENERGY_TABLES)
 
 
 def energy_tables_for(problem: Problem, tables: Tables, spacing: float) -> Packed:
-    """Everything a run with ledger needs beyond the tables of the motion; ``spacing`` is that of its outputs, s."""
+    """All tables of a run with an energy balance, beyond those of the motion; ``spacing`` of its outputs, s."""
     energy_tables, own = _empty(1.0, len(tables.time_exponent)), int(tables.own_blocks)
     if not (_coupled(tables) or any(part[:, :own].any() for part in (problem.push, problem.load, problem.read_rate))):
         energy_tables = _contact_part(energy_tables, problem, tables)
     driver = np.flatnonzero(_drives(problem, tables))
     power = np.zeros((len(problem.load), padded(len(problem.k))))
     power[:, : len(problem.k)] = tables.power_rows[:, len(problem.k) :]
-    step = problem.table_dt[0] if len(problem.table_dt) else spacing  # a cell, which is passed whole without forms too
+    step = problem.table_dt[0] if len(problem.table_dt) else spacing  # cells are crossed whole even without forms
     energy_tables = energy_tables._replace(power=power, spacing=step)
     size, signals = 2 * len(problem.k), len(problem.table_dt)
     if (len(tables.flight_step) + 1) * (len(driver) + 6 * signals) * 2 * padded(size) <= _MOST_NUMBERS:
@@ -114,21 +114,21 @@ def _drives(problem: Problem, tables: Tables) -> Any:
 
 
 def _flight_part(energy_tables: EnergyTables, problem: Problem, tables: Tables, driver: Any) -> EnergyTables:
-    """The forms of all flight steps, and of the cell or, without sampled signals, of the time between two outputs.
+    """Add the forms of all flight steps, then of the cell or, without sampled signals, of the time between two outputs.
 
-    Of a cell they are those of the signals' values and derivatives at its two ends, else at the start of the step.
+    Signals are given by their derivatives at the start of a step, but for a cell by s, s', s'' at both ends.
     """
     powers, size, n = _power_forms(problem, tables), 2 * len(problem.k), len(problem.k)
     levels = -(-len(tables.flight_step) // _OCTAVE) * _OCTAVE
     h = tables.flight_step[0] * 2.0 ** (-np.arange(levels) / _OCTAVE)
     signal = tables.signal[..., :n].reshape(*tables.signal.shape[:3], size)
     spacing = energy_tables.spacing
-    last, Y = _last(_doubled(problem, powers, *_halved(problem, spacing))), powers.shape[-1]
+    last, Y = _last(_doubled_forms(problem, powers, *_halved_steps(problem, spacing))), powers.shape[-1]
     kept = np.append(np.arange(size, Y), driver)
     b = np.arange(0 if _coupled(tables) else int(tables.own_blocks))
 
     def read(forms: Forms) -> tuple[Any, Any, Any]:
-        """What is kept of the forms of some steps: rows, those of the blocks' own damping, pairs of signals."""
+        """What is kept of the forms of some steps: rows, damping of blocks by themselves, pairs of signals."""
         rows = rows_of(forms, Y, kept)
         pairs, rows = rows[:, :, : Y - size, size:].copy(), 2.0 * rows[..., :size]
         rows[:, :, Y - size :][..., driver] *= 0.5
@@ -136,18 +136,20 @@ def _flight_part(energy_tables: EnergyTables, problem: Problem, tables: Tables, 
         plain[..., b] = entries_of(forms, Y, n, b) * np.array([1.0, 2.0, 1.0])[:, None]
         return rows, plain, pairs
 
-    groups = [read(forms) for forms in _doubled(problem, powers, h, _OCTAVE, tables.flight_propagator, signal)][::-1]
+    groups = [read(forms) for forms in _doubled_forms(problem, powers, h, _OCTAVE, tables.flight_propagator, signal)][
+        ::-1
+    ]
     steps = [np.concatenate(parts)[: len(tables.flight_step)] for parts in zip(*groups, strict=True)]
     cell = read(carried(last, _ends(size, Y, spacing)))
     rows, plain, pairs = (np.concatenate(both) for both in zip(steps, cell, strict=True))
     return energy_tables._replace(
         **{"closed": 1.0, "driver": driver.astype(np.int64), "plain": plain},
-        **{"rows": _beside(rows.reshape(*rows.shape[:-1], 2, n)), "pairs": _beside(pairs[:, :, :, None])},
+        **{"rows": _side_by_side(rows.reshape(*rows.shape[:-1], 2, n)), "pairs": _side_by_side(pairs[:, :, :, None])},
     )
 
 
-def _beside(forms: Any) -> Any:
-    """(l, d, all parts padded): the parts (l, 2, d, parts, columns) of work, then of damping, beside each other."""
+def _side_by_side(forms: Any) -> Any:
+    """(l, d, numbers) parts (l, 2, d, parts, columns) of work, then of damping, padded and side by side."""
     steps, _, rows, parts, columns = forms.shape
     out = np.zeros((steps, rows, 2, parts, padded(columns)))
     out[..., :columns] = forms.transpose(0, 2, 1, 3, 4)
@@ -167,7 +169,7 @@ def _power_forms(problem: Problem, tables: Tables) -> Any:
 
 
 def _ends(size: int, Y: int, h: float) -> Forms:
-    """The flow from the signals' values and derivatives at both ends of a cell to those at its start."""
+    """The flow from values and derivatives of the signals at both ends of a cell to those at its start."""
     matrix = np.eye(Y)
     for first in range(size, Y, 6):
         matrix[first : first + 6, first : first + 6] = derivatives_of_ends(h)
@@ -199,8 +201,8 @@ def _brief_forms(problem: Problem, powers: Any, h: Any) -> Forms:
     return total
 
 
-def _doubled(problem: Problem, powers: Any, h: Any, octave: int, propagator: Any, signal: Any) -> Iterator[Forms]:
-    """(octave, 2, Y, Y) forms of falling steps, each twice as long as that ``octave`` places behind; the last first."""
+def _doubled_forms(problem: Problem, powers: Any, h: Any, octave: int, propagator: Any, signal: Any) -> Iterator[Forms]:
+    """(octave, 2, Y, Y) forms of falling steps, each twice as long as that ``octave`` places later; shortest first."""
     shorter = 0
     fastest = float((np.sqrt(problem.k) + problem.c).max())
     brief = h[-octave:]
@@ -228,21 +230,21 @@ def _moves(problem: Problem, h: Any) -> tuple[Any, Any]:
     return moves, signal_responses(problem, steps)
 
 
-def _halved(problem: Problem, h: float) -> tuple[Any, int, Any, Any]:
-    """Steps from h down to a brief one, each half of the one before, with their moves."""
+def _halved_steps(problem: Problem, h: float) -> tuple[Any, int, Any, Any]:
+    """Steps from h down to a brief one, each half of the one before, with octave 1 and their `_moves`."""
     fastest = float((np.sqrt(problem.k) + problem.c).max())
     steps = h * 2.0 ** -np.arange(1 + max(0, math.ceil(math.log2(max(h * fastest, 1e-300) / _BRIEF))))
     return steps, 1, *_moves(problem, steps)
 
 
 def _last(forms: Iterator[Forms]) -> Forms:
-    """The forms of the longest step."""
+    """The last forms, of the longest step."""
     *_, last = forms
     return last
 
 
 def _flow(problem: Problem, h: Any, propagator: Any, signal: Any) -> Forms:
-    """Φ(h)."""
+    """Φ(h) of some steps."""
     n, b, state = len(problem.k), np.arange(len(problem.k)), np.arange(2 * len(problem.k))
     alpha, beta = propagator[:, 0, :n], propagator[:, 1, :n]
     parts: list[Any] = [
@@ -267,7 +269,7 @@ def _flow(problem: Problem, h: Any, propagator: Any, signal: Any) -> Forms:
 
 
 def _contact_part(energy_tables: EnergyTables, problem: Problem, tables: Tables) -> EnergyTables:
-    """The tables of contact steps, one for all stops with the same exponents κ and λ."""
+    """Add the tables of contact steps, one for all stops with the same exponents κ and λ."""
     own = int(tables.own_blocks)
     fastest = float((np.sqrt(problem.k) + problem.c)[:own].max())
     h = tables.contact_step[int(np.searchsorted(-tables.contact_step * fastest, -_REACH)) :]
@@ -299,7 +301,7 @@ def _contact_part(energy_tables: EnergyTables, problem: Problem, tables: Tables)
 
 
 def _longest(omega: float, kinds: Any, h: Any) -> Any:
-    """(kinds,) step up to which polynomials through the nodes resolve a tone to 1e-11: cos is a series in σ^{2κ}."""
+    """(kinds,) s: step up to which polynomials through the nodes resolve a tone to 1e-11; cos is a series in σ^{2κ}."""
     terms = [S // int(power) for power, _ in kinds]
     phases = np.array([(1e-11 * 2.0 ** (2 * S - 1) * math.factorial(count)) ** (1.0 / count) for count in terms])
     return np.minimum(phases / omega, h[0]) if omega > 0.0 else np.full(len(kinds), h[0])

@@ -1,8 +1,8 @@
 """Quadratic forms yᵀ M y of work and damping, and their transport ΦᵀMΦ over a step y -> Φ y.
 
-Φ has 2 × 2 blocks, one a coordinate, and columns of the sampled signals; so have the forms, unless damping couples the
-coordinates. Above `MOST_DENSE` rows the zeros of both are left out, the forms of all steps in one sparse matrix, blocks
-on its diagonal. l steps, two forms each, Y rows.
+Φ has 2 × 2 blocks, one for each coordinate, and columns of the sampled signals; so have the forms, unless damping
+couples the coordinates. Above `MOST_DENSE` rows both are sparse, with the forms of all steps as blocks on the diagonal
+of one matrix. There are l steps, two forms each, Y rows.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ MOST_DENSE = 100
 
 
 def forms_of(both: Any, count: int) -> Forms:
-    """The two forms (2, Y, Y) of each of ``count`` steps."""
+    """The two forms (2, Y, Y), repeated for each of ``count`` steps."""
     if both.shape[-1] <= MOST_DENSE:
         return np.broadcast_to(both, (count, *both.shape))
     return csr_array(block_diag([csr_array(one) for one in both] * count, format="csr"))
 
 
 def flow_of(rows: Any, columns: Any, values: Any, size: int) -> Forms:
-    """Φ of l steps, (l, Y, Y) or sparse as the forms are, from its entries: their places, and values (l, entries)."""
+    """Φ of l steps, dense (l, Y, Y) or sparse as the forms, from places and values (l, entries) of its entries."""
     if size <= MOST_DENSE:
         out = np.zeros((len(values), size, size))
         out[:, rows, columns] = values
@@ -48,7 +48,7 @@ def carried(forms: Forms, flow: Forms) -> Forms:
 
 
 def rows_of(forms: Forms, size: int, chosen: Any) -> Any:
-    """(l, 2, rows, Y) some rows of all forms."""
+    """(l, 2, rows, Y) chosen rows of all forms."""
     if isinstance(forms, np.ndarray):
         return forms[:, :, chosen]
     blocks = forms.shape[0] // size
@@ -69,7 +69,7 @@ def entries_of(forms: Forms, size: int, n: int, b: Any) -> Any:
 
 
 def taylor(begin: Forms, generator: Forms, terms: int) -> Forms:
-    """A exp(B h) by its series, of A and B h as flows."""
+    """``begin`` × exp(``generator``) by ``terms`` terms of its series."""
     flow = term = begin
     for i in range(1, terms):
         term = (term @ generator) / i

@@ -1,9 +1,9 @@
-"""Powers of loads and damping; the state and the energy ledger inside a contact step, from the forces at its nodes.
+"""Powers of loads and damping; state and energy balance inside a contact step, from the forces at its nodes.
 
 With x = E(t) y a block's equation is y' = E(-t) Σ push F. Gauss's collocation solves it, in panels of at most
-`_RADIANS` of the fastest block: y at a panel's points is y₀ + Σ_r a_qr y'_r. Work, damping and impulses are sums over
-the same points. Such a method conserves quadratic forms: what contacts and loads do and damping takes adds up to the
-energy, however little the velocity of a stop is like a polynomial through its values at the nodes.
+`_PANEL_RADIANS` of the fastest block: y at a panel's points is y₀ + Σ_r a_qr y'_r. Work, damping and impulses are sums
+over the same points. Such a method conserves quadratic forms: work of contacts and loads less damping adds up to the
+energy, even where the velocity of a stop is far from a polynomial through its values at the nodes.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ from solvers.exponential.contact.many_stops import enters
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.responses import propagate
 
-_RADIANS = 3.0  # energies of a damped block are 5e-11 ζ of its own off, the motion less
-_SHARES = 2  # first row of `Tables.gauss` with a_qr, one per r
-_PACE = S  # row of `Scratch.between` with dt of the panel's points; polynomials of the nodes before, forces behind
+_PANEL_RADIANS = 3.0  # up to which the energy of a damped block is off by 5e-11 ζ of its own, and its motion by less
+_INTEGRALS = 2  # first row of `Tables.gauss` with a_qr, one per r
+_DT = S  # row of `Scratch.between` with dt of the panel's points, behind polynomials, before forces
 
 
 @inner
 def powers(problem, tables, t, x):
-    """Power of the loads and of the damping at time t, W."""
+    """(power of the loads, power of the damping) at time t, W."""
     size, gain, loss, own = 2 * problem.k.size, 0.0, 0.0, int(tables.own_blocks)
     for load in range(tables.power_rows.shape[0] if own < problem.k.size else 0):
         gain += dot(tables.signal_rows[load], x, size) * dot(tables.power_rows[load], x, size)
@@ -57,7 +57,7 @@ def powers(problem, tables, t, x):
 
 @reordered
 def _plain_loss(n, own, c, steady_rate, x):
-    """Power of damping, W, of blocks with c whose rate is that of x and of the steady motion under tones."""
+    """Power of damping, W, of uncoupled blocks whose rate is that of x and of the steady motion under tones."""
     loss, whole, tones = 0.0, own - own % WIDTH, n - own
     losses = splat8(0.0)
     for first in range(0, whole, WIDTH):
@@ -75,14 +75,14 @@ def _plain_loss(n, own, c, steady_rate, x):
 
 
 @merged
-def _places(tables, scratch, node_set, h, begin, width):
-    """Points of a panel of σ: σ, times after its start, dt per unit of the panel, and the nodes' polynomials there."""
+def _panel_points(tables, scratch, node_set, h, begin, width):
+    """Points of a panel: σ into ``trial``, times after its start into ``clipped``, polynomials, dt into ``between``."""
     time_exponent, between, nodes = tables.time_exponent[node_set], scratch.between, tables.nodes[node_set]
     start = h * raised(begin, time_exponent)
     for q in range(S):
         sigma = begin + width * tables.gauss[0, q]
         pace = h * raised(sigma, time_exponent - 1.0)
-        scratch.trial[q], scratch.clipped[q], between[_PACE, q] = (
+        scratch.trial[q], scratch.clipped[q], between[_DT, q] = (
             sigma,
             pace * sigma - start,
             width * time_exponent * pace,
@@ -98,23 +98,23 @@ def _places(tables, scratch, node_set, h, begin, width):
 
 @merged
 def _forces(problem, tables, state, scratch, node_set):
-    """Forces and signals at these points, times dt."""
+    """Forces and signals at the points of the panel times dt, into ``scratch.between``."""
     between = scratch.between
     for u in range(scratch.force.shape[0]):
         if u < problem.gap.size and not acts(problem, state, u):
             continue
-        weighted, row = enters(problem, node_set, u) and tables.weight_exponent[node_set] > 0.0, between[_PACE + 1 + u]
+        weighted, row = enters(problem, node_set, u) and tables.weight_exponent[node_set] > 0.0, between[_DT + 1 + u]
         scales, value = tables.lagrange[node_set, 1 if weighted else 0], splat8(0.0)
         for j in range(S):
             value += splat8(scales[j] * scratch.force[u, j]) * load8(between[j], 0)
-        store8(row, 0, value * load8(between[_PACE], 0))
+        store8(row, 0, value * load8(between[_DT], 0))
         for q in range(S if weighted else 0):
             row[q] *= scratch.trial[q] ** tables.weight_exponent[node_set]
 
 
 @merged
-def _moves(problem, scratch, length):
-    """α, β of every block from the start of a panel to its points and, by det E = e^{-ct}, back, then to its end."""
+def _panel_propagators(problem, scratch, length):
+    """α, β of every block from the start of a panel to its points, back by det E = e^{-ct}, and to its end."""
     for b in range(problem.k.size):
         k, c, out = problem.k[b], problem.c[b], scratch.moves[b]
         for q in range(S):
@@ -126,13 +126,13 @@ def _moves(problem, scratch, length):
 
 
 @merged
-def _pushed(problem, state, scratch, b, moves):
-    """Into ``scratch.trial`` and ``.clipped`` what moves a block at the points, p and v as of the panel's start."""
+def _pull_back(problem, state, scratch, b, moves):
+    """Rates of a block at the points, moved back to the panel's start, into ``scratch.trial`` and ``clipped``."""
     n, p, v = problem.k.size, splat8(0.0), splat8(0.0)
     for u in range(scratch.force.shape[0]):
         if u >= problem.gap.size or acts(problem, state, u):
             push = push_of(problem, u)
-            force = load8(scratch.between[_PACE + 1 + u], 0)
+            force = load8(scratch.between[_DT + 1 + u], 0)
             p += splat8(push[b]) * force
             v += splat8(push[n + b]) * force
     alpha, beta = load8(moves[2], 0), load8(moves[3], 0)
@@ -141,17 +141,17 @@ def _pushed(problem, state, scratch, b, moves):
 
 
 @merged
-def _move(problem, tables, state, scratch, row):
-    """Blocks at the points of the panel into ``scratch.along``; ``row`` goes on to its end."""
+def _move_blocks(problem, tables, state, scratch, row):
+    """Write the blocks at the points of the panel into ``scratch.along``, and move ``row`` to its end."""
     n, gauss, weights = problem.k.size, tables.gauss, load8(tables.gauss[1], 0)
     for b in range(n):
         k, c, moves = problem.k[b], problem.c[b], scratch.moves[b]
         p, v = row[b], row[n + b]
         p_points, v_points = splat8(p), splat8(v)
         if b < tables.own_blocks:
-            _pushed(problem, state, scratch, b, moves)
+            _pull_back(problem, state, scratch, b, moves)
             for r in range(S):
-                share = load8(gauss[_SHARES + r], 0)
+                share = load8(gauss[_INTEGRALS + r], 0)
                 p_points += splat8(scratch.trial[r]) * share
                 v_points += splat8(scratch.clipped[r]) * share
             p += sum8(weights * load8(scratch.trial, 0))
@@ -164,39 +164,41 @@ def _move(problem, tables, state, scratch, row):
 
 @merged
 def _add_works(problem, tables, state, scratch, row):
-    """Works and impulses of the contacts on the panel."""
+    """Add works and impulses of the contacts over the panel to ``row``."""
     size = 2 * problem.k.size
     for s in range(problem.law.size):
         if state.segment[s] > 0:
             r = row_of(problem, s)
             if rubs(problem, s):
                 account = problem.friction[s, 1]
-                work, impulse, rubbed, drag, way = work_within_rubbing(problem, tables, scratch, s, _PACE + 1)
-                row[account], row[account + 1] = row[account] + rubbed, row[account + 1] + drag
-                row[account + 2] += way
+                work, impulse, friction_work, friction_impulse, slip_distance = work_within_rubbing(
+                    problem, tables, scratch, s, _DT + 1
+                )
+                row[account], row[account + 1] = row[account] + friction_work, row[account + 1] + friction_impulse
+                row[account + 2] += slip_distance
                 row[size + 2 + 2 * s] += work
                 row[size + 3 + 2 * s] += impulse
                 continue
             if is_circle(problem, s):
-                work, impulse = work_within_circle(problem, tables, scratch, s, _PACE + 1)
+                work, impulse = work_within_circle(problem, tables, scratch, s, _DT + 1)
                 row[size + 2 + 2 * s] += work
                 row[size + 3 + 2 * s] += impulse
                 continue
             combine(scratch.along, problem.read_rate[r], size, None, scratch.trial)
-            impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_PACE + 1 + r], 0)
+            impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_DT + 1 + r], 0)
             row[size + 2 + 2 * s] += sum8(impulses * load8(scratch.trial, 0))
             row[size + 3 + 2 * s] += sum8(impulses)
 
 
 @merged
 def _add_powers(problem, tables, scratch, row):
-    """What loads and damping do on the panel."""
+    """Add work of the loads and damping over the panel to ``row``."""
     n, own, rows = problem.k.size, int(tables.own_blocks), tables.loss_rows
-    weights, pace = load8(tables.gauss[1], 0), load8(scratch.between[_PACE], 0)
+    weights, pace = load8(tables.gauss[1], 0), load8(scratch.between[_DT], 0)
     for load in range(tables.power_rows.shape[0]):
         combine(scratch.along, tables.power_rows[load], 2 * n, None, scratch.trial)
         combine(scratch.along, tables.signal_rows[load], 2 * n, None, scratch.clipped)
-        signal = load8(scratch.between[_PACE + 1 + problem.gap.size + load], 0) + pace * load8(scratch.clipped, 0)
+        signal = load8(scratch.between[_DT + 1 + problem.gap.size + load], 0) + pace * load8(scratch.clipped, 0)
         row[2 * n] += sum8(weights * signal * load8(scratch.trial, 0))
     for r in range(rows.shape[0]):
         if rows.shape[0] > own:  # damping that couples the blocks
@@ -213,20 +215,22 @@ def _add_powers(problem, tables, scratch, row):
 
 @part(WITHIN_STEP, types.void, types.int64, *[REAL] * 3, VECTOR, types.boolean)
 def state_within(problem, tables, state, scratch, node_set, h, begin, end, row, ledger):
-    """Take ``row`` from ``begin`` to ``end``, s after the start of a contact step of length h whose forces are known.
+    """Move ``row`` from ``begin`` to ``end``, s after the start of a contact step of length h whose forces are known.
 
-    Works of the contacts go with it, those of loads and damping with ``ledger`` only.
+    Works and impulses of the contacts are integrated along; those of loads and damping only with ``ledger``.
     """
     time_exponent = tables.time_exponent[node_set]
     sigma, last = (begin / h) ** (1.0 / time_exponent), (end / h) ** (1.0 / time_exponent)
-    panels = 1 + int(time_exponent * tables.fastest * (end - begin) / _RADIANS)
+    panels = 1 + int(time_exponent * tables.fastest * (end - begin) / _PANEL_RADIANS)
     width = (last - sigma) / panels
     for i in range(panels):
-        _places(tables, scratch, node_set, h, sigma, width)
+        _panel_points(tables, scratch, node_set, h, sigma, width)
         if i == 0 or time_exponent > 1.0:
-            _moves(problem, scratch, h * (raised(sigma + width, time_exponent) - raised(sigma, time_exponent)))
+            _panel_propagators(
+                problem, scratch, h * (raised(sigma + width, time_exponent) - raised(sigma, time_exponent))
+            )
         _forces(problem, tables, state, scratch, node_set)
-        _move(problem, tables, state, scratch, row)
+        _move_blocks(problem, tables, state, scratch, row)
         _add_works(problem, tables, state, scratch, row)
         if ledger:
             _add_powers(problem, tables, scratch, row)
