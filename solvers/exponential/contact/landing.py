@@ -112,8 +112,9 @@ def _rate_error(problem, scratch, share):
     for r in range(problem.gap.size):
         error = share * abs_dot(problem.read_rate[r], scratch.stages[DIFFERENCE], 2 * problem.k.size)
         error /= scratch.accuracy[RTOL] * scratch.reference_speed[element_of(problem, r)]
-        if not error <= worst:
-            worst = error
+        if error != error:
+            return error
+        worst = max(worst, error)
     return worst
 
 
@@ -168,11 +169,15 @@ def _error_in_time(problem, state, scratch, span):
     for r in range(problem.gap.size):
         error = _combined_estimate(_rate_difference(problem, r, fifth, span), _rate_difference(problem, r, third, span))
         error /= scratch.accuracy[RTOL] * scratch.reference_speed[element_of(problem, r)]
-        if not error <= worst:
-            worst = error
+        if error != error:
+            return error
+        worst = max(worst, error)
     for s in range(problem.law.size):
         if problem.border_count[s] > 0 and problem.knots[s, 0] < 0.0:
-            worst = max(worst, _memory_force_error(problem, state, scratch, s, span))
+            error = _memory_force_error(problem, state, scratch, s, span)
+            if error != error:
+                return error
+            worst = max(worst, error)
     return worst
 
 
