@@ -177,6 +177,8 @@ class Histories:
     def extremes(self, quantity: str = "displacement", z: ArrayLike | None = None, body: int = 0) -> Extremes:
         """Least and greatest values over the samples, place by place, with their times.
 
+        Section forces and stress jump at point loads and moments and where sections change: those of both sides count.
+
         Parameters
         ----------
         quantity : "displacement", "slope", "moment", "shear" or "stress"; of a frame also those of `section_forces`.
@@ -189,10 +191,14 @@ class Histories:
             given: Any = z
             if given is None:
                 given = list(shapes.usual.values()) if quantity == "displacement" else self._sections(body)
-            at = [given] if isinstance(given, tuple) else list(given)
-            return extremes(self.t, self._q_of(body), *rows_of(self, quantity, at, body))
-        places = shapes.nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
-        return extremes(self.t, self._q_of(body), *rows_of(self, quantity, places, body))
+            at: Any = [given] if isinstance(given, tuple) else list(given)
+        else:
+            at = shapes.nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
+        q = self._q_of(body)
+        found = extremes(self.t, q, *rows_of(self, quantity, at, body))
+        if quantity in ("displacement", "slope"):
+            return found
+        return found.with_others(extremes(self.t, q, *rows_of(self, quantity, at, body, behind=True)))
 
     def _q_of(self, body: int) -> Vector:
         """Coordinates at the samples, with the support dofs that move."""
