@@ -230,7 +230,7 @@ def characteristics(model: Model, duration: float, dt: float, **options: Any) ->
     Returns
     -------
     Those of `Response.numbers`, and "δ psd" and so on: densities per rad/s; "omega": their frequencies. What a contact
-    has on average is there when the model has stops, and NaN without a contact.
+    has on average is there when the model has stops, and None without a contact.
 
     Examples
     --------
@@ -242,7 +242,8 @@ def characteristics(model: Model, duration: float, dt: float, **options: Any) ->
     ['tip u psd', 'mid-beam u psd']
     """
     response = stationary(model, duration, dt, **options)
-    values: dict[str, Any] = {name: estimate.value for name, estimate in response.numbers().items()}
+    found = {name: estimate.value for name, estimate in response.numbers().items()}
+    values: dict[str, Any] = {name: None if np.isnan(value) else value for name, value in found.items()}
     for name, signal in response.signals.items():
         values[f"{name} psd"] = signal.psd.density
         values["omega"] = signal.psd.omega
