@@ -148,9 +148,11 @@ class Histories:
     def moment(self, z: ArrayLike, body: int = 0) -> Vector:
         """Bending moment EI u_zz, N m: positive where it stretches the lower fibre. Of a frame M of `section_forces`.
 
-        Of the kept coordinates: exact for slow point loads with ``residual=True``. What n modes miss of weight and base
-        motion is about 0.13/n² of the moment and 0.4/n of the shear at a clamp, of a point force without residual 1/n
-        of the moment and, next to it, all of the shear. (`reactions` miss nothing of slow loads.)
+        At a point moment, a mass with inertia or a hinge spring that of the side ahead, as of `stress` where sections
+        change; `extremes` looks at both. Of the kept coordinates: exact for slow point loads with ``residual=True``.
+        What n modes miss of weight and base motion is about 0.13/n² of the moment and 0.4/n of the shear at a clamp, of
+        a point force without residual 1/n of the moment and, next to it, all of the shear. (`reactions` miss nothing of
+        slow loads.)
         """
         return self._field("moment", z, body)
 
