@@ -153,7 +153,8 @@ def stationary(
     duration : s the statistics use, transient and lead-ins not counted; the most when `until` is given.
     dt : output sampling in s; ten samples to the shortest period that matters.
     watch : name -> function of a `Run` that returns samples (k,), or (samples, rates): then crossings between two
-        samples are counted too. None: δ of every stop (the tip when there is none) and mid-beam.
+        samples are counted too, those of the cubics through them. None: δ of every stop (the tip when there is
+        none) and mid-beam.
     until : stop when the relative standard error falls below it, in (0, 1).
     of : function of the `Response` giving the `Estimate`, or several, that `until` is about; None: every variance.
     discard : s to leave out at the start; None: until the transient has died out, at least ten correlation times.
