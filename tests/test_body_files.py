@@ -124,6 +124,8 @@ z = 0
     ('to = [1, "A"]', 'to = [1, "AA"]', "'A' is the nearest there is, got 'AA' in joints.0."),
     ('to = [1, "A"]', 'too = [1, "A"]', r":\d+: ..joints.. number 1: unknown key 'too'; did you mean 'to'"),
     ("modes = 4, ", "", r"number 2 .frame. reduced: the key 'modes' is missing"),
+    ('nodes = ["C", "D"], modes', 'nodes = "C", modes', r"reduced: nodes must be a list of names, got 'C'"),
+    ('at = "B"\nmass', "mass", r"the key 'at' is missing .the name of a point or node.; it needs at, mass$"),
     ("body = 0", "body = 2", "number 1 like: body must be 0, the file's own, to 0, got 2"),
     ('at = "B"\nmass', 'att = "B"\nmass', r"..bodies.. number 1 ..masses.. number 1: unknown key 'att'"),
     ("like = {", "nothing = {", r"unknown key 'nothing' .valid: beam, structure, frame, like"),

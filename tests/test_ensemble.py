@@ -306,9 +306,27 @@ def test_until_stops_at_the_same_place_everywhere():
 
 
 def test_characteristics_are_a_quantity():
-    found = ensemble(small_model(), 2, partial(characteristics, duration=10.0, dt=2e-3))
-    assert found["δ psd"].value.shape == found.values["omega"].shape[1:]
+    scene = small_model().scene
+    scene = replace(scene, stops=[*scene.stops, fb.Stop(0.5, Hertz(1e8), gap=1.0, side="above", name="far")])
+    found = ensemble(scene.reduce(modes=1), 2, partial(characteristics, duration=10.0, dt=2e-3))
+    assert found["δ 0 psd"].value.shape == found.values["omega"].shape[1:]
     assert found["stop 0 rate"].value > 1.0
+    assert (found["far rate"].value, len(found.failures)) == (0.0, 0)
+    assert np.isnan(found["far peak_force"].value)  # of no contact
+    assert found.plain()["numbers"]["stop 0 peak_force"]["mean"] > 0.0
+
+
+def at_times(model):
+    """A number that one realisation in two has."""
+    seed = model.scene.base.seed.spawn_key[0]
+    return {"sometimes": float(seed) if seed % 2 else None, "never": None, "always": 2.0}
+
+
+def test_numbers_that_some_realisations_lack():
+    found = ensemble(small_model(), 32, at_times, until=0.3)
+    assert (len(found), found.enough) == (16, True)  # 1, 3, … 15: 8 ± 1.73; of 1, 3, 5, 7 it is 4 ± 1.29
+    assert (found["sometimes"].value, found["sometimes"].batches) == (8.0, 8)
+    assert np.isnan(found["never"].value)
 
 
 @pytest.mark.parametrize(

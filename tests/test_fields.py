@@ -151,6 +151,29 @@ def test_extremes_say_where_and_when():
     assert run.extremes("slope", [0.1, L]).highest.shape == (2,)
 
 
+def at_rest_under(scene, load):
+    """A run that stays in the static deflection under a load that does not change."""
+    model = scene.reduce(1, residual=True)
+    q = model.system.loads[0][0] * load / model.omega**2
+    return model.simulate(1e-4, 1e-4, start=np.concatenate([q, 0 * q]))
+
+
+def test_extremes_are_those_of_both_sides_of_a_jump():
+    """±m/2 on both sides of a moment m in the middle; the stress of the thinner span, which lies behind the border."""
+    moment = fb.Harmonic(6.0, 0.0)
+    frame = fb.Frame({"A": (0, 0), "B": (L, 0)}, [fb.Member("A", "B", SQUARE)])
+    beam = fb.Scene(fb.Beam(L, SQUARE), [fb.Pinned(0.0), fb.Pinned(L)], forces=[fb.PointMoment(L / 2, moment)])
+    turned = [fb.PointMoment(("A-B", L / 2), moment, direction="rz")]
+    for scene in beam, fb.Scene(frame, [fb.Pinned("A"), fb.Pinned("B")], forces=turned):
+        found = at_rest_under(scene, 6.0).extremes("moment")
+        assert (found.lowest.min(), found.highest.max()) == pytest.approx((-3.0, 3.0), rel=1e-6)
+    thick = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.02)
+    stepped = fb.Beam.of_spans([(L / 2, SQUARE), (L / 2, thick)])
+    run = at_rest_under(fb.Scene(stepped, [fb.Clamped(L)], forces=[fb.PointForce(0.0, fb.Harmonic(5.0, 0.0))]), 5.0)
+    value, z, _ = run.extremes("stress").largest
+    assert (value, z) == (pytest.approx(5.0 * L / 2 / (0.01**3 / 6), rel=1e-6), L / 2)
+
+
 # --- files --------------------------------------------------------------------------------------------------------
 
 

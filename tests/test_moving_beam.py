@@ -120,6 +120,17 @@ def test_settlement():
     assert np.allclose(run.slope(0.0), theta, rtol=1e-12)
 
 
+def test_settlement_of_an_interface():
+    """Craig–Bampton's static shapes hold those that follow supports, beside any number of modes: u = y (3z² - z³)/2."""
+    z = np.linspace(0.0, 1.0, 5)
+    supports = [fb.Clamped(0.0), fb.Pinned(1.0, motion={"y": fb.Harmonic(1.0, 1.0)})]
+    scene = fb.Scene(fb.Beam(1.0, SPAN), supports, stops=[fb.Stop(0.3, Hertz(1.0)), fb.Stop(0.6, Hertz(1.0))])
+    for modes in (0, 1):
+        model = scene.reduce(modes, interface=True)
+        followed = model.shapes.rows_with_supports(z) @ np.append(model.following[0], 1.0)
+        assert np.allclose(followed, (3 * z**2 - z**3) / 2, rtol=0, atol=1e-10)
+
+
 def test_a_stop_sees_the_gap():
     """Everything moves by the same hump: the stop, which stays at rest, is met when the beam has come as far."""
     hump = fb.Pulse(peak=4e-3, length=4.0)

@@ -192,6 +192,16 @@ def test_linear_response_lies_in_the_band_of_a_linear_run(run):
     assert not plot.spectrum(run).axes[0].collections  # 1.9 s hold no four independent parts
 
 
+def test_a_slow_sweep_has_the_spectrum_of_its_samples(run):
+    """Its own grid has three nodes in 0.3 s: too few for a spectrum."""
+    sweep = fb.SineSweep(1e-4, 10.0, 100.0, duration=2.0)
+    swept = dataclasses.replace(run.model.scene, base=sweep).reduce(1).simulate(0.3, 1e-3)
+    line = plot.spectra_of(swept)["base y"]
+    expected = statistics.psd(sweep(swept.t), 1e-3, plot.segment_for(len(swept.t), 1e-3))
+    np.testing.assert_array_equal(line.density, expected.density)
+    assert plot.spectrum(swept).axes
+
+
 @pytest.mark.parametrize("changes", [{"supports": []}, {"damping": fb.ModalDamping(0.0)}], ids=["free", "undamped"])
 @pytest.mark.filterwarnings("ignore:2 rigid-body modes")
 def test_spectra_of_free_and_of_undamped_beams_are_drawn(run, changes):

@@ -8,7 +8,20 @@ import reduction
 from contacts import Hertz
 from fembeam.beams import Beam, ModalDamping, Rayleigh, Section
 from fembeam.excitation import Harmonic
-from fembeam.scene import Clamped, Dashpot, Guided, Pinned, PointForce, PointMoment, Scene, Spring, Stop
+from fembeam.scene import (
+    AnnularStop,
+    Clamped,
+    Dashpot,
+    Friction,
+    Guided,
+    Pinned,
+    PointForce,
+    PointMoment,
+    Scene,
+    Spring,
+    Stop,
+)
+from fembeam.structures import Frame
 
 UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)
 FLAT = Section.rectangle(2.1e11, 7850.0, 0.02, 0.005)
@@ -100,3 +113,13 @@ def test_static_shapes_of_moments_and_moving_feet():
     assert len(model.omega) == 5
     B = np.vstack((full.interpolation(1.0, 1).toarray(), full.interpolation([0.5, 1.0]).toarray())).T
     np.testing.assert_allclose(reduction.static_share(model.basis, full.M, full.K, B, full.root), 1.0, rtol=1e-10)
+
+
+@pytest.mark.parametrize("way", ["residual", "interface"])
+def test_the_twist_of_a_shaft_under_friction(way):
+    """A torque at the radius of an annular stop turns its place by z/GJ; φ is the third row of the contact."""
+    section = Section.circle(2.1e11, 7850.0, 0.02)
+    hole = AnnularStop(0.8, Hertz(1e9), 2e-4, friction=Friction(0.5, 1e6), radius=0.01)
+    model = Scene(Frame.straight(1.0, section), [Clamped("A")], stops=[hole]).reduce(4, **{way: True})
+    twist = np.sum((model.directions[2] / model.omega) ** 2)
+    np.testing.assert_allclose(twist, 0.8 / section.torsion_stiffness, rtol=1e-9)

@@ -74,6 +74,8 @@ def test_parts_of_a_run_make_the_whole():
         : len(parts[1].contacts)])  # fmt: skip
     rates = [QUANTITIES["impact_rate"]()(part) * part.t[-1] for part in parts]
     assert sum(rates) == pytest.approx(len(run.contacts))
+    coarse = SCENE.reduce(2).simulate(1.0, dt=0.3)  # the last sample is at 0.9 s, the log goes on to 1 s
+    assert QUANTITIES["impact_rate"]()(coarse) == len(coarse.contacts)
 
 
 def test_every_quantity_has_a_value_and_a_name():

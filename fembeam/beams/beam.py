@@ -135,10 +135,13 @@ class Beam:
         require(name in places, f"name must be one of the beam's places ({known})", name, "Beam.place", "use one")
         return places[name]
 
-    def profile(self, z: ArrayLike) -> Profile:
-        """Section properties (E, rho, A, I, fibre), each (k,), at z (k,); at a border those of the span ahead."""
+    def profile(self, z: ArrayLike, behind: bool = False) -> Profile:
+        """Section properties (E, rho, A, I, fibre), each (k,), at z (k,).
+
+        At a border those of the span ahead, or ``behind``.
+        """
         z = np.asarray(z, dtype=float)
-        span, start = self._span(z), np.array(self.borders)
+        span, start = self._span(z, behind), np.array(self.borders)
         columns = np.full((5, *z.shape), np.nan)
         for index, (length, section) in enumerate(self.spans):
             mine = span == index
@@ -160,9 +163,9 @@ class Beam:
         """Whether any span is."""
         return any(isinstance(section, Taper) for _, section in self.spans)
 
-    def _span(self, z: ArrayLike) -> NDArray[np.int64]:
-        """Index of the span that holds z."""
-        return np.searchsorted(self.borders[1:-1], z, side="right")
+    def _span(self, z: ArrayLike, behind: bool) -> NDArray[np.int64]:
+        """Index of the span that holds z; at a border of that ahead, or behind."""
+        return np.searchsorted(self.borders[1:-1], z, side="left" if behind else "right")
 
 
 def bending_matrices(beam: Beam, nodes: Vector) -> tuple[sparse.csr_matrix, sparse.csr_matrix]:

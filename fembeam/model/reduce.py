@@ -76,10 +76,8 @@ def _of_beam(
 ) -> reduction.Basis:
     """The basis of one beam by itself, static shapes where it is loaded included."""
     if interface:
-        basis = reduction.craig_bampton(beam.M, beam.K, _rows(beam, places).T, len(chosen), beam.root)
-        if beam.coupling is None:
-            return basis
-        return reduction.with_residual(basis, beam.M, beam.K, beam.coupling[::3].T, beam.root)
+        rows = [_rows(beam, places), *([] if beam.coupling is None else [beam.coupling[::3]])]
+        return reduction.craig_bampton(beam.M, beam.K, sparse.vstack(rows).T, len(chosen), beam.root)
     basis = _modes(beam, chosen)
     rows = [_rows(beam, places)] if residual and places else []
     if beam.coupling is not None:  # the static shapes of supports that move

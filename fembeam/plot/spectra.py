@@ -91,9 +91,9 @@ def spectra_of(run: Run, discard: float = 0.0) -> Mapping[str, Spectrum]:
     samples, dt = int(np.count_nonzero(run.t >= discard)), sampling_of(run)
     found = {name: signal.psd for name, signal in estimated(run, discard, segment_for(samples, dt)).items()}
     for direction, base in motions.items():
-        if hasattr(base, "nodes"):  # a sum of many lines: by FFT on its own grid
-            step, values = base.nodes(float(run.t[-1]), 1e-3)
-            found[f"base {direction}"] = psd(values[:, 0], step, segment_for(len(values), step))
+        step, rows = base.nodes(float(run.t[-1]), 1e-3) if hasattr(base, "nodes") else (np.inf, None)
+        if rows is not None and step < dt:  # a sum of many lines: by FFT on its own grid
+            found[f"base {direction}"] = psd(rows[:, 0], step, segment_for(len(rows), step))
         else:
             found[f"base {direction}"] = psd(np.asarray(base(run.t)), dt, segment_for(len(run.t), dt))
     if run.model is None and run.readout.base is not None:  # of a run read from a file: its samples

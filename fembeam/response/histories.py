@@ -148,9 +148,11 @@ class Histories:
     def moment(self, z: ArrayLike, body: int = 0) -> Vector:
         """Bending moment EI u_zz, N m: positive where it stretches the lower fibre. Of a frame M of `section_forces`.
 
-        Of the kept coordinates: exact for slow point loads with ``residual=True``. What n modes miss of weight and base
-        motion is about 0.13/n² of the moment and 0.4/n of the shear at a clamp, of a point force without residual 1/n
-        of the moment and, next to it, all of the shear. (`reactions` miss nothing of slow loads.)
+        At a point moment, a mass with inertia or a hinge spring that of the side ahead, as of `stress` where sections
+        change; `extremes` looks at both. Of the kept coordinates: exact for slow point loads with ``residual=True``.
+        What n modes miss of weight and base motion is about 0.13/n² of the moment and 0.4/n of the shear at a clamp, of
+        a point force without residual 1/n of the moment and, next to it, all of the shear. (`reactions` miss nothing of
+        slow loads.)
         """
         return self._field("moment", z, body)
 
@@ -177,6 +179,8 @@ class Histories:
     def extremes(self, quantity: str = "displacement", z: ArrayLike | None = None, body: int = 0) -> Extremes:
         """Least and greatest values over the samples, place by place, with their times.
 
+        Section forces and stress jump at point loads and moments and where sections change: those of both sides count.
+
         Parameters
         ----------
         quantity : "displacement", "slope", "moment", "shear" or "stress"; of a frame also those of `section_forces`.
@@ -189,10 +193,14 @@ class Histories:
             given: Any = z
             if given is None:
                 given = list(shapes.usual.values()) if quantity == "displacement" else self._sections(body)
-            at = [given] if isinstance(given, tuple) else list(given)
-            return extremes(self.t, self._q_of(body), *rows_of(self, quantity, at, body))
-        places = shapes.nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
-        return extremes(self.t, self._q_of(body), *rows_of(self, quantity, places, body))
+            at: Any = [given] if isinstance(given, tuple) else list(given)
+        else:
+            at = shapes.nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
+        q = self._q_of(body)
+        found = extremes(self.t, q, *rows_of(self, quantity, at, body))
+        if quantity in ("displacement", "slope"):
+            return found
+        return found.with_others(extremes(self.t, q, *rows_of(self, quantity, at, body, behind=True)))
 
     def _q_of(self, body: int) -> Vector:
         """Coordinates at the samples, with the support dofs that move."""

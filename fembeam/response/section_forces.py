@@ -58,28 +58,30 @@ class SectionForces:
     def __repr__(self) -> str:
         return f"<section forces of {self.moments.shape[2]} coordinates in {len(self.nodes) - 1} elements>"
 
-    def moment(self, z: ArrayLike) -> Vector:
-        """(k, n) at z (k,)."""
-        element, x, h = self._places(z)
+    def moment(self, z: ArrayLike, behind: bool = False) -> Vector:
+        """(k, n) at z (k,); at a point moment that of the element ahead, or ``behind``."""
+        element, x, h = self._places(z, behind)
         (a, b), (da, db) = np.moveaxis(self.moments[element], 1, 0), np.moveaxis(self.shears[element], 1, 0)
         ends = (1 - x) ** 2 * (1 + 2 * x) * a + x**2 * (3 - 2 * x) * b
         return ends + h * x * (1 - x) * ((1 - x) * da - x * db)
 
-    def shear(self, z: ArrayLike) -> Vector:
-        """(k, n) at z (k,); at a point load that of the element ahead."""
-        element, x, h = self._places(z)
+    def shear(self, z: ArrayLike, behind: bool = False) -> Vector:
+        """(k, n) at z (k,); at a point load that of the element ahead, or ``behind``."""
+        element, x, h = self._places(z, behind)
         (a, b), (da, db) = np.moveaxis(self.moments[element], 1, 0), np.moveaxis(self.shears[element], 1, 0)
         return 6 * x * (1 - x) * (b - a) / h + (1 - x) * (1 - 3 * x) * da + x * (3 * x - 2) * db
 
-    def stress(self, z: ArrayLike) -> Vector:
+    def stress(self, z: ArrayLike, behind: bool = False) -> Vector:
         """Bending stress (k, n) at the lower outer fibre, M c/I; NaN where the section has no `fibre`."""
-        profile = self.beam.profile(np.atleast_1d(z))
-        return self.moment(z) * (profile.fibre / profile.I)[:, None]
+        profile = self.beam.profile(np.atleast_1d(z), behind)
+        return self.moment(z, behind) * (profile.fibre / profile.I)[:, None]
 
-    def _places(self, z: ArrayLike) -> tuple[NDArray[np.int64], Vector, Vector]:
+    def _places(self, z: ArrayLike, behind: bool) -> tuple[NDArray[np.int64], Vector, Vector]:
         """Elements, local coordinates in [0, 1] and lengths, as columns."""
         z = on_beam(np.atleast_1d(np.asarray(z, dtype=float)), self.beam, "fields")
-        element = np.clip(np.searchsorted(self.nodes, z, side="right") - 1, 0, len(self.nodes) - 2)
+        element = np.clip(
+            np.searchsorted(self.nodes, z, side="left" if behind else "right") - 1, 0, len(self.nodes) - 2
+        )
         h = self.nodes[element + 1] - self.nodes[element]
         return element, ((z - self.nodes[element]) / h)[:, None], h[:, None]
 
@@ -172,6 +174,17 @@ class Extremes:
             return float(self.lowest[low]), _place(self.z[low]), float(self.t_lowest[low])
         return float(self.highest[high]), _place(self.z[high]), float(self.t_highest[high])
 
+    def with_others(self, other: Extremes) -> Extremes:
+        """Those of two sets of values at the same places: the lesser and the greater ones."""
+        less, more = other.lowest < self.lowest, other.highest > self.highest
+        return Extremes(
+            self.z,
+            lowest=np.where(less, other.lowest, self.lowest),
+            highest=np.where(more, other.highest, self.highest),
+            t_lowest=np.where(less, other.t_lowest, self.t_lowest),
+            t_highest=np.where(more, other.t_highest, self.t_highest),
+        )
+
 
 def _place(z: Any) -> Any:
     """A place as a number, or as it was named."""
@@ -191,34 +204,42 @@ def extremes(t: Vector, q: Vector, shapes: Vector, z: Any, offset: Vector) -> Ex
     return Extremes(z, *found)
 
 
-def rows_of(run: Histories, quantity: str, z: Any, body: int) -> tuple[Vector, Any, Vector]:
-    """What turns q into a field: shapes (j, n), the places themselves, a constant part (j,)."""
+def rows_of(run: Histories, quantity: str, z: Any, body: int, behind: bool = False) -> tuple[Vector, Any, Vector]:
+    """What turns q into a field: shapes (j, n), the places themselves, a constant part (j,).
+
+    ``behind``: of section forces those behind places where they jump, else those ahead.
+    """
     if isinstance(z, list):  # of a body with places by name
         if quantity != "displacement":
-            return _rows_of_frame(run, quantity, z, body)
+            return _rows_of_frame(run, quantity, z, body, behind)
         return (run.shapes, *run.others)[body].rows_with_supports(z), z, np.zeros(len(z))
     known = ("displacement", "slope", "moment", "shear", "stress")
     require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
     if quantity in known[:2]:
         return (run.shapes, *run.others)[body].rows_with_supports(z, known.index(quantity)), z, np.zeros(len(z))
     forces = run.readout.section_forces[body]
-    rows = getattr(forces, quantity)(z)
+    rows = getattr(forces, quantity)(z, behind)
     if quantity != "stress":
         return rows, z, np.zeros(len(z))
     bare = ~np.isfinite(rows).all(axis=1)
     require(not bare.any(), "every section must know its outer fibre", z[bare][:1].tolist(), "Run.stress",
             "give Section(..., fibre=)")  # fmt: skip
-    return rows, z, forces.beam.axial_force / forces.beam.profile(z).A
+    return rows, z, forces.beam.axial_force / forces.beam.profile(z, behind).A
 
 
-def _rows_of_frame(run: Histories, quantity: str, places: list[Any], body: int) -> tuple[Vector, Any, Vector]:
+def _rows_of_frame(
+    run: Histories, quantity: str, places: list[Any], body: int, behind: bool
+) -> tuple[Vector, Any, Vector]:
     """The same of section forces and stress along the members of a frame."""
     forces = frame_forces_of(run, body, quantity)
     known = (*forces.names, "stress")
     quantity = {"moment": "M", "shear": "Q"}.get(quantity, quantity)
     require(quantity in known, f"quantity must be displacement or one of {', '.join(known)}", quantity, "Run",
             "choose one")  # fmt: skip
-    rows = [forces.stress(z) if quantity == "stress" else forces.rows(z, (quantity,))[0] for z in places]
+    rows = [
+        forces.stress(z, behind=behind) if quantity == "stress" else forces.rows(z, (quantity,), behind)[0]
+        for z in places
+    ]
     return np.array(rows), places, np.array([forces.preload(z, quantity) for z in places])
 
 

@@ -249,6 +249,9 @@ def loaded(scene: Scene, body: int) -> list[LocalCoordinate]:
     """Where a force or moment acts on a beam, or a pair of them: of stops, elements, loads, dashpots, impactors."""
     part = (scene, *scene.bodies)[body]
     places = [own for one in part.acting for place in one.coordinates for own in place.on_body(body, body)]
+    round_ones = [one for one in part.stops if isinstance(one, AnnularStop)]
+    turning = [turning_row(one, components_at(part.beam, one.z)) for one in round_ones]
+    places += [place for place in turning if place is not None]
     places += [force.coordinate for force in part.forces]
     feet = (spring for spring in part.springs if spring.foot is not None)
     places += [LocalCoordinate(spring.z, direction=spring.along) for spring in feet]

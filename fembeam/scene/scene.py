@@ -199,7 +199,8 @@ class Scene:
         omega_max : instead of `modes`: all of them up to this frequency, rad/s.
         mass_share : instead of `modes`: as many as carry this share of the mass that a base motion moves, in (0, 1).
         residual : add the residual static shape of every stop, element, force, moment, moving foot and dashpot (its
-            rotation, too), between two places that of opposite loads; the model is then exact for slow loads there.
+            rotation, too), of friction at a radius the twist, between two places that of opposite loads; the model is
+            then exact for slow loads there.
         interface : Craig–Bampton: static shapes of the same places and `modes` modes with them held; with
             modes=0 Guyan's condensation.
 

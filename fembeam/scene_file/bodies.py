@@ -56,6 +56,8 @@ def _changed(reader: TableReader, body: Any, table: Mapping[str, Any], where: st
         missing = [key for key in REDUCED[:2] if key not in options]
         if missing:
             reader.fail(f"{where} reduced", f"the key {missing[0]!r} is missing; it needs nodes and modes")
+        if not isinstance(options["nodes"], list):
+            reader.fail(f"{where} reduced", f"nodes must be a list of names, got {options['nodes']!r}")
         body = reader.made(body.reduced, dict(options), f"{where} reduced")
     if "turned" in table:
         body = reader.made(body.turned, {"rotation": table["turned"]}, f"{where} turned")

@@ -190,7 +190,7 @@ class TableReader:
             raise
         except OSError as error:
             self.fail(where, f"{error.filename}: {error.strerror}", error)
-        except (ValueError, TypeError, ArithmeticError, MemoryError) as error:
+        except (ValueError, TypeError, ArithmeticError, MemoryError, RuntimeError) as error:  # the last of modes
             self.fail(where, str(error) or type(error).__name__, error)
 
     def arguments(
@@ -227,13 +227,14 @@ class TableReader:
                 where,
                 f"{wrong[0]} must be the name of a point or node, or [member, distance], got {shown(table[wrong[0]])}",
             )
-        if "at" not in found and keys["z"].default is inspect.Parameter.empty:
-            self.fail(where, f"the key 'at' is missing (the name of a point or node); it needs {listed(known)}")
+        needed = ["at" if key == "z" else key for key in required(keys)]
+        if "at" not in found and "at" in needed:
+            self.fail(where, f"the key 'at' is missing (the name of a point or node); it needs {listed(needed)}")
         rest = {key: value for key, value in table.items() if key not in PLACES}
         plain = [key for key in keys if key not in ("z", "on", "to")]
         for key in plain:
             if key not in rest and keys[key].default is inspect.Parameter.empty:
-                self.fail(where, f"the key {key!r} is missing; it needs {listed(required(keys))}")
+                self.fail(where, f"the key {key!r} is missing; it needs {listed(needed)}")
         values = {keys[key].name: self.value(rest[key], key, keys[key], where) for key in plain if key in rest}
         return {**values, **{"z" if key == "at" else key: one for key, one in found.items()}}
 

@@ -26,7 +26,7 @@ class Impacts:
 
     Attributes
     ----------
-    largest : the largest duration (s), peak_force (N), entry_speed (m/s), energy_loss (J) met.
+    largest : the largest duration (s), peak_force (N), entry_speed (m/s), energy_loss (J) met; NaN without a contact.
 
     Notes
     -----
@@ -50,7 +50,7 @@ class Impacts:
         row[ENTRIES], row[CONTACTS] = np.count_nonzero(entered), np.count_nonzero(whole)
         for i, (name, values) in enumerate(self._columns(log, whole).items()):
             row[SUMS + 2 * i : SUMS + 2 * i + 2] = values.sum(), (values**2).sum()
-            self.largest[name] = float(np.fmax(self.largest[name], values.max(initial=-math.inf)))
+            self.largest[name] = float(np.fmax.reduce([self.largest[name], *values]))
         self.batches.add(row)
 
     @staticmethod

@@ -63,7 +63,7 @@ class Signal:
         self.welch.cut()
 
     def add(self, x: Vector, rate: Vector | None = None) -> None:
-        """One batch of samples (k,), with their rates if known: then no crossing between samples is missed."""
+        """One batch of samples (k,), with their rates if known: then crossings of the cubics between them count too."""
         if not np.isfinite(x).all():
             raise ValueError(f"samples must be finite, got {x[~np.isfinite(x)][0]} in a batch of {x.size}")
         row = np.zeros(self.batches.rows.shape[1])

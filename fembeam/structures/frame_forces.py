@@ -64,10 +64,10 @@ class FrameForces:
         """All mesh nodes as (member, distance), member by member."""
         return self.mesh.sections()
 
-    def rows(self, place: Any, names: tuple[str, ...] | None = None) -> Vector:
-        """(len(names), n) at a place on a member; at a point load that of the element ahead. None: all of `names`."""
+    def rows(self, place: Any, names: tuple[str, ...] | None = None, behind: bool = False) -> Vector:
+        """(len(names), n) at a place on a member; at a point load ahead of it, or ``behind``. None: all of `names`."""
         member, s = self._on_member(place)
-        element, x, _ = self.mesh.located(member, np.array([s]))
+        element, x, _ = self.mesh.located(member, np.array([s]), behind)
         h = self.mesh.h[element]
         value, slope = hermite_shapes(x, 0)[[0, 2]], hermite_shapes(x, 0)[[1, 3]] * h
         chosen = self.names if names is None else names
@@ -79,7 +79,7 @@ class FrameForces:
         ]
         return np.array(found)
 
-    def stress(self, place: Any, x: float = 0.0, y: float | None = None) -> Vector:
+    def stress(self, place: Any, x: float = 0.0, y: float | None = None, behind: bool = False) -> Vector:
         """Normal stress (n,) per unit of each coordinate at the point (x across, y up) of the section, m; tension +.
 
         σ = N/A - y M_y - x M_x with the moments turned to principal ones where I12 ≠ 0. None: y of the lower fibre.
@@ -92,7 +92,7 @@ class FrameForces:
             y = -float(own.fibre or 0.0)
         for name, number in (("x", x), ("y", y)):
             require(is_finite(number), f"{name} must be finite", number, "stress", "give m from the centroid")
-        N, M, M2 = (self.rows(place, (name,))[0] if name in self.ends else 0.0 for name in ("N", "M", "M2"))
+        N, M, M2 = (self.rows(place, (name,), behind)[0] if name in self.ends else 0.0 for name in ("N", "M", "M2"))
         if "M2" not in self.ends or own.I2 is None:
             return np.asarray(N / own.A - y * M / own.I)
         curved = np.linalg.solve([[own.I, own.I12], [own.I12, own.I2]], np.array([M, M2]))

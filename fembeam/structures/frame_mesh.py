@@ -131,10 +131,15 @@ class FrameMesh:
         rows = sparse.vstack([at_nodes, inside], format="csr")
         return rows[(order[:, None] * len(columns) + np.arange(len(columns))).ravel()]
 
-    def located(self, member: int, s: Vector) -> tuple[NDArray[np.int64], Vector, NDArray[np.int64]]:
-        """Elements (k,), x in [0, 1] there, and the mesh node (its number less the member's), -1 between two."""
+    def located(
+        self, member: int, s: Vector, behind: bool = False
+    ) -> tuple[NDArray[np.int64], Vector, NDArray[np.int64]]:
+        """Elements (k,), x in [0, 1] there, and the mesh node (its number less the member's), -1 between two.
+
+        At a mesh node the element ahead, or ``behind``.
+        """
         borders = self.borders[member]
-        local = np.clip(np.searchsorted(borders, s, side="right") - 1, 0, len(borders) - 2)
+        local = np.clip(np.searchsorted(borders, s, side="left" if behind else "right") - 1, 0, len(borders) - 2)
         closest = np.argmin(np.abs(borders[:, None] - s), axis=0)
         meets = np.abs(borders[closest] - s) <= SAME_PLACE * borders[-1]
         x = (s - borders[local]) / (borders[local + 1] - borders[local])

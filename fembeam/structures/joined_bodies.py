@@ -321,15 +321,15 @@ class JoinedForces:
         forces, own = self._of(place)
         return forces.names_at(own)
 
-    def rows(self, place: Any, names: tuple[str, ...] | None = None) -> Vector:
+    def rows(self, place: Any, names: tuple[str, ...] | None = None, behind: bool = False) -> Vector:
         """(len(names), n) at a place on a member."""
         forces, own = self._of(place)
-        return forces.rows(own, names)
+        return forces.rows(own, names, behind)
 
-    def stress(self, place: Any, x: float = 0.0, y: float | None = None) -> Vector:
+    def stress(self, place: Any, x: float = 0.0, y: float | None = None, behind: bool = False) -> Vector:
         """Normal stress (n,) at a point of the section."""
         forces, own = self._of(place)
-        return forces.stress(own, x, y)
+        return forces.stress(own, x, y, behind)
 
     def preload(self, place: Any, quantity: str) -> float:
         """What the given axial force of the member adds."""

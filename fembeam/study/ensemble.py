@@ -5,11 +5,12 @@ The result depends on the seeds alone: not on the executor, the order of arrival
 
 from __future__ import annotations
 
+import math
 import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -47,7 +48,8 @@ class Ensemble(Result):
     Attributes
     ----------
     seeds : of the realisations that succeeded, in the order asked for.
-    values : name -> array (n, ...); a quantity that is one number or array has the name "".
+    values : name -> array (n, ...), NaN where a realisation has no such number; a quantity that is one number or array
+        has the name "".
     failures : realisations that failed, with seed and reason.
     enough : whether the standard error asked for by `until` was reached; None when none was.
     """
@@ -63,10 +65,12 @@ class Ensemble(Result):
         return len(self.seeds)
 
     def __getitem__(self, name: str) -> Estimate:
-        """Mean of one named value over the realisations, with its standard error."""
+        """Mean of one named value over the realisations that have it, with its standard error."""
         if name not in self.values:
             raise KeyError(f"the quantity has no {name!r}; it has {', '.join(map(repr, self.values))}")
-        return Estimate.of_mean(self.values[name])
+        values = self.values[name]
+        known = ~np.isnan(values) if values.ndim == 1 else np.full(len(values), True)
+        return Estimate.of_mean(values[known] if known.any() else values)
 
     def __repr__(self) -> str:
         failed = f", {len(self.failures)} failed" if self.failures else ""
@@ -134,15 +138,16 @@ def ensemble(
     model : with at least one `BandNoise` among base motion, forces and feet; noises of one seed stay one realisation.
     seeds : how many, or the seeds themselves, none twice. A number spawns them from the noise's own seed
         (`numpy.random.SeedSequence`), so that a longer ensemble contains a shorter one.
-    quantity : of the model under one realisation: a number, an array, or a mapping of names to these, such as
+    quantity : of the model under one realisation: a number, an array, or a mapping of names to these, None for a number
+        that a realisation does not have, such as the mean over contacts where there was none. For example
         ``partial(fb.study.characteristics, duration=100.0, dt=1e-3)`` or
         ``lambda model: model.simulate(50.0).contacts.peak_force.max()``.
     executor : any `concurrent.futures.Executor`; processes need a quantity that can be pickled (no lambda).
     checkpoint : file written whole after each realisation; when it exists, what it holds is not computed again. It is
         refused when scene, modes, fembeam's version, or the code of the quantity, of a law or of anything they read
         (functions, closures, globals, arguments) has changed. Files and the environment that these read are not seen.
-    until : stop when the relative standard error of every mean is below it; asked after 8, 16, 32, … realisations
-        in the order of the seeds, whatever the executor.
+    until : stop when the relative standard error of every mean that there is lies below it; asked after 8, 16, 32, …
+        realisations in the order of the seeds, whatever the executor.
     progress : show a bar (on terminals and in notebooks only).
 
     Returns
@@ -225,7 +230,9 @@ def _value(model: Model, quantity: Callable[[Model], Any], seed: Seed) -> Values
 
 
 def _array(name: str, value: Any) -> NDArray[Any]:
-    """A value as finite floats (complex numbers stay complex)."""
+    """A value as finite floats (complex numbers stay complex), NaN of one that there is not."""
+    if value is None:
+        return np.array(math.nan)
     raw = np.asarray(value.value if isinstance(value, Estimate) else value)
     label = f" {name!r}" if name else ""
     if raw.dtype.kind not in "biufc":
@@ -252,8 +259,11 @@ def _collected(seeds: Sequence[Seed], kept: Checkpoint, failed: dict[str, Failur
         raise RuntimeError(f"every realisation failed; seed {seed_key(failures[0].seed)}: {failures[0].reason}")
     rows = [kept.values[seed_key(seed)] for seed in good]
     values = {name: np.stack([row[name] for row in rows]) for name in rows[0]}
-    enough = None if until is None else all(Estimate.of_mean(v).relative <= until for v in values.values())
-    return Ensemble(tuple(good), values, failures, enough)
+    found = Ensemble(tuple(good), values, failures)
+    if until is None:
+        return found
+    asked = [name for name, value in values.items() if value.ndim != 1 or not np.isnan(value).all()]
+    return replace(found, enough=all(found[name].relative <= until for name in asked))
 
 
 def _rounds(count: int, until: float | None) -> list[int]:

@@ -133,7 +133,7 @@ class ImpactRate(OfContacts):
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
-        return float(np.sum(self.mine(run))) / float(run.t[-1])
+        return float(np.sum(self.mine(run))) / run.reached
 
 
 @dataclass(frozen=True)

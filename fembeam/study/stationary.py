@@ -153,7 +153,8 @@ def stationary(
     duration : s the statistics use, transient and lead-ins not counted; the most when `until` is given.
     dt : output sampling in s; ten samples to the shortest period that matters.
     watch : name -> function of a `Run` that returns samples (k,), or (samples, rates): then crossings between two
-        samples are counted too. None: δ of every stop (the tip when there is none) and mid-beam.
+        samples are counted too, those of the cubics through them. None: δ of every stop (the tip when there is
+        none) and mid-beam.
     until : stop when the relative standard error falls below it, in (0, 1).
     of : function of the `Response` giving the `Estimate`, or several, that `until` is about; None: every variance.
     discard : s to leave out at the start; None: until the transient has died out, at least ten correlation times.
@@ -230,7 +231,7 @@ def characteristics(model: Model, duration: float, dt: float, **options: Any) ->
     Returns
     -------
     Those of `Response.numbers`, and "δ psd" and so on: densities per rad/s; "omega": their frequencies. What a contact
-    has on average is there when the model has stops, and NaN without a contact.
+    has on average is there when the model has stops, and None without a contact.
 
     Examples
     --------
@@ -242,7 +243,8 @@ def characteristics(model: Model, duration: float, dt: float, **options: Any) ->
     ['tip u psd', 'mid-beam u psd']
     """
     response = stationary(model, duration, dt, **options)
-    values: dict[str, Any] = {name: estimate.value for name, estimate in response.numbers().items()}
+    found = {name: estimate.value for name, estimate in response.numbers().items()}
+    values: dict[str, Any] = {name: None if np.isnan(value) else value for name, value in found.items()}
     for name, signal in response.signals.items():
         values[f"{name} psd"] = signal.psd.density
         values["omega"] = signal.psd.omega
