@@ -13,7 +13,7 @@ import pytest
 from problems import TIP, paper_scene
 
 import fembeam as fb
-from contacts import PiecewiseLinear
+from contacts import KelvinVoigt, PiecewiseLinear
 from fembeam.cli import main
 from fembeam.study import NoReferenceError, Point, SpeedAccuracy, Verdict, speed_accuracy, stability_map
 from fembeam.study.measure import cut
@@ -98,6 +98,19 @@ def test_the_orbit_a_method_settles_to():
 def late_spectrum(run):
     """Where rounding errors have grown to the size of the motion, after 1 to 2 s here."""
     return Psd(parts=2)(cut(run, 2.5, 5.5))
+
+
+def test_starts_are_taken_with_the_stop_open():
+    """From within a contact its law would not know how fast it was entered. The stop is closed half of the time."""
+    scene = replace(paper_scene(), stops=[fb.Stop(TIP, KelvinVoigt(300.0, 0.1))])
+    begun = []
+    speed_accuracy(
+        *(scene.reduce(modes=1), [RK4(1e-4)]),
+        **{"starts": 8, "duration": 0.05, "dt": 0.01, "rounds": 1, "agreement": np.inf},
+        quantity=lambda run: begun.append(run.indentation()[0]) or 1.0,
+    )
+    assert len(begun) >= 3 * 8  # two references and one method
+    assert max(begun) <= 0.0
 
 
 @pytest.mark.chaotic

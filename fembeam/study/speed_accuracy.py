@@ -19,6 +19,7 @@ from fembeam.study.result import Result
 from fembeam.support import Part, counting, require, require_positive
 
 Vector = NDArray[np.float64]
+_INSTANTS = 8  # between two starts, of which the first with all stops open is taken
 PATIENCE, MORE_PATIENCE = 20.0, 0.2  # s one setting may take per model for its first round, and for further ones
 
 
@@ -173,8 +174,8 @@ def speed_accuracy(
     ----------
     model : one, or several of the same scene, nested: each with the first modes of the next larger one.
     methods : with their settings, such as ``[solvers.Exponential(1e-6), solvers.RK4(1e-5)]``.
-    starts : number of starts, taken along a run of the smallest model from rest; or (s, 2n) states of it. A larger
-        model starts with its further modes at rest.
+    starts : number of starts, taken along a run of the smallest model from rest, with stops open where they open
+        within some periods; or (s, 2n) states of it. A larger model starts with its further modes at rest.
     duration : s; None is about five periods of the lowest mode. Trajectories part after some ten impacts; beyond,
         ask for statistics.
     dt : output sampling, if the quantity needs it.
@@ -302,12 +303,20 @@ def _check(models: list[Model], methods: list[Any], rounds: int) -> None:
 
 
 def _starts(model: Model, starts: Any, duration: float) -> Vector:
-    """States (s, 2n) of the smallest model."""
+    """States (s, 2n) of the smallest model.
+
+    Those of a run are taken with all stops open: from a state alone a contact's law does not know its entry rate.
+    """
     if isinstance(starts, (int, np.integer)):
         require(bool(starts >= 1), "starts must be at least 1", starts, "speed_accuracy", "e.g. 12")
         spacing = duration * 0.618  # no multiple of a drive period
-        run = model.simulate((starts + 3) * spacing, spacing, solver=solvers.Exponential(1e-8, ledger=False))
-        return np.hstack((run.q, run.q_dot))[3 : 3 + starts]
+        dt, method = spacing / _INSTANTS, solvers.Exponential(1e-8, ledger=False)
+        run = model.simulate((starts + 3) * spacing, dt, solver=method)
+        closed = np.zeros(len(run.t), dtype=bool)
+        for contact in model.system.contacts:
+            closed |= (contact.indentation(run.q) > 0.0) & (not contact.always)
+        chosen = [i + int(np.argmin(closed[i : i + _INSTANTS])) for i in _INSTANTS * np.arange(3, 3 + starts)]
+        return np.hstack((run.q, run.q_dot))[chosen]
     states = np.atleast_2d(np.asarray(starts, dtype=float))
     require(states.shape[1] == 2 * len(model.omega), f"starts must have {2 * len(model.omega)} columns, [q, q_dot]",
             states.shape, "speed_accuracy", "give states of the smallest model")  # fmt: skip
