@@ -14,7 +14,7 @@ from contacts import Jenkins, KelvinVoigt
 from fembeam.scene import value_of
 from fembeam.study.gradients import NoGradientError, gradient
 from fembeam.study.measure import Plan
-from fembeam.study.quantities import Amplitude, Rms
+from fembeam.study.quantities import Amplitude, Density, MeanEnergy, Rms
 from fembeam.study.trial import Trial
 
 NAMES = ("stops[0].gap", "damping.zeta[0]", "forces[0].signal.omega", "masses[0].mass", "stops[0].law.stiffness")
@@ -90,6 +90,20 @@ def test_of_a_settled_oscillator_in_closed_form():
     rms = 3.0 * phi**2 / math.sqrt(2.0 * square)
     by_omega = -rms / (2.0 * square) * (-600.0 * (omega**2 - 150.0**2) + 2.0 * 150.0 * (0.2 * omega) ** 2)
     np.testing.assert_allclose(gradient(trial, x), [[by_omega, rms / 3.0]], rtol=1e-5)
+    np.testing.assert_allclose(trial(x), rms, rtol=1e-9)
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.7, 1.5])
+def test_of_a_period_each_sample_counts_once(phase):
+    """Linear response in closed form: rms, mean energy Σ|Q|² (ω² + ω₀²)/4, and quantiles that are as far up as down."""
+    scene = rod(forces=[fb.PointForce(0.5, fb.Harmonic(1.0, 190.0, phase=phase))], damping=fb.ModalDamping([0.03]))
+    model = scene.reduce(modes=1, elements=4)
+    phi, omega = model.phi(0.5)[0], model.omega[0]
+    Q, run = phi / abs(omega**2 - 190.0**2 + 0.06j * omega * 190.0), model.orbit(1).run
+    assert Rms(z=0.5)(run) == pytest.approx(phi * Q / math.sqrt(2.0), rel=1e-9)
+    assert MeanEnergy()(run) == pytest.approx(Q**2 * (190.0**2 + omega**2) / 4.0, rel=1e-9)
+    quantiles = Density(z=0.5)(run)
+    np.testing.assert_allclose(quantiles, -quantiles[::-1], atol=1e-9 * phi * Q)
 
 
 def test_derivatives_of_an_indentation():

@@ -35,6 +35,12 @@ def test_a_number_is_along_minus_y():
     assert fb.Scene(portal(), gravity=(0, 0, 0)).pulls == fb.Scene(portal()).pulls == {}
 
 
+def test_in_the_plane_two_numbers_will_do():
+    """As for nodes."""
+    assert fb.Scene(portal(), gravity=(1, -9.81)).gravity == fb.Scene(portal(), gravity=(1, -9.81, 0)).gravity
+    assert fb.Scene(portal(), gravity=(0, 0)).pulls == {}
+
+
 def test_free_fall():
     """A free frame falls along the vector, after signals and a base motion are listed."""
     frame = fb.Frame.polyline({"A": (0, 0), "B": (1.0, 0)}, fb.Section.rectangle(2.1e11, 7850.0, 0.02, 0.01))
@@ -70,8 +76,9 @@ section = { shape = "circle", E = 2.1e11, rho = 7850.0, diameter = 0.02 }
 
 @pytest.mark.parametrize(("make", "says"), [
     (lambda: fb.Scene(portal(), gravity=(0, 0, 1)), r"must pull along x, y, got .'z'. in Scene"),
-    (lambda: fb.Scene(portal(), gravity=(0, 1)), "must be a number, or three"),
-    (lambda: fb.Scene(portal(), gravity=(0, np.nan, 0)), "must be a number, or three"),
+    (lambda: fb.Scene(space_l(), gravity=(0, 1)), r"must be a number, or three, got \(0, 1\) in Scene; write \(0, 0,"),
+    (lambda: fb.Scene(portal(), gravity=(0, np.nan, 0)), r"or two along x and y, got .* write \(0, -9.81\)"),
+    (lambda: fb.Scene(portal(), gravity=(1,)), "or two along x and y"),
     (lambda: fb.Scene(fb.Beam(1.0, fb.Section.circle(2e11, 7800.0, 0.01)), gravity=(0, 1, 0)), "of a Beam must be one"),
 ])  # fmt: skip
 def test_refused(make, says):

@@ -137,6 +137,7 @@ def test_the_command_line_runs_and_checks_it(folder, capsys):
         ('direction = "y"\n', 'direction = "x"\n', "must move along x; it has y, rx"),
         ("[base.y]", "[base.x]", "base must move along y, got 'x'"),
         ("[base.y]", "[base]", "base must name its directions"),
+        ('[base.y]\nkind = "harmonic"\namplitude = 1e-3\nomega = 180.0', "[base]", r"\[base\]: must have a table for"),
         ('stiffness = "K.mtx"\n', "", r"\[structure\]: the key 'stiffness' is missing"),
         ('mass = "M.npz"', 'mass = "gone.npz"', "gone.npz: No such file"),
         ('mass = "M.npz"', 'mass = "dofs.csv"', "dofs.csv, its suffix: expected one of"),

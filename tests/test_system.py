@@ -78,6 +78,13 @@ def test_blocks_move_as_the_matrices_do(seed, n, coupled, floating, strength):
         np.testing.assert_array_equal(matrix, before)
 
 
+def test_modes_that_rayleigh_damping_overdamps_are_named():
+    """C = βK, β = 1 s, and a dashpot: slow roots -1/β (1 + 1/(β²k)), k of 1e6 and more, lie within 1e-6."""
+    k, row = 1e6 * np.arange(1.0, 13.0) ** 2, np.cos(np.arange(12.0))
+    with pytest.raises(ValueError, match=r"Rayleigh's beta, overdamps high modes.* lower beta, or keep fewer modes"):
+        decouple(np.eye(12), np.diag(k) + np.outer(row, row), np.diag(k))
+
+
 @pytest.mark.parametrize("zeta", [0.0, 0.01, 0.999999, 1.0, 1.000001, 3.0])
 def test_a_mode_of_any_damping_is_one_block(zeta):
     blocks = check_decoupled(np.eye(1), np.array([[2 * zeta * 3.0]]), np.array([[9.0]]))

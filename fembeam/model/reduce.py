@@ -13,7 +13,7 @@ from scipy import sparse
 import reduction
 from fembeam.model.model import Model
 from fembeam.response import PlacedShapes, Shapes, placed_shapes
-from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, carried_on, loaded, watched
+from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, carried_on, check_counts, loaded, watched
 from fembeam.structures import COMPONENTS
 from fembeam.support import is_whole, require
 from solvers.problem import counted
@@ -43,10 +43,7 @@ def reduced(
     interface: bool,
 ) -> Model:
     """The model of a scene; `Scene.reduce` explains the arguments."""
-    choices = {"modes": modes, "omega_max": omega_max, "mass_share": mass_share}
-    given = [name for name, choice in choices.items() if choice is not None]
-    require(len(given) < 2, "choose modes in one way", given, "Scene.reduce", "keep one of them")
-    _check_static(scene, residual, interface)
+    check_reduction(scene, modes, elements, omega_max, mass_share, residual, interface)
     if omega_max is not None or mass_share is not None:
         modes = _enough(scene, elements, omega_max, mass_share)
     matrices, chosen = _chosen(scene, DEFAULT_MODES if modes is None else modes, elements, interface)
@@ -69,6 +66,32 @@ def reduced(
     shapes, *others = _shapes_of_each(scene, matrices, basis)
     modes_of_all = sum(numbers, ()) + (0,) * len(matrices.impactors)
     return Model(scene, matrices, basis, modes_of_all, shapes, counts, tuple(others), options)
+
+
+def check_reduction(
+    scene: Scene,
+    modes: int | Sequence[int] | str | None = None,
+    elements: int | None = None,
+    omega_max: float | None = None,
+    mass_share: float | None = None,
+    residual: bool = False,
+    interface: bool = False,
+) -> None:
+    """Raise ValueError for arguments of `Scene.reduce` that no matrices are needed to refuse."""
+    choices = {"modes": modes, "omega_max": omega_max, "mass_share": mass_share}
+    given = [name for name, choice in choices.items() if choice is not None]
+    require(len(given) < 2, "choose modes in one way", given, "Scene.reduce", "keep one of them")
+    if isinstance(modes, str):
+        require(modes == "all", "modes must be a count, a list, or 'all' with elements given", modes, "Scene.reduce",
+                "ask for modes=2")  # fmt: skip
+    elif modes is not None:
+        _numbers(modes, interface)
+    if omega_max is not None:
+        reduction.below(omega_max)
+    if mass_share is not None:
+        require(0.0 < mass_share <= 1.0, "mass_share must lie in (0, 1]", mass_share, "Scene.reduce", "try 0.95")
+    check_counts(elements, None)
+    _check_static(scene, residual, interface)
 
 
 def _of_beam(

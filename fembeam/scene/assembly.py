@@ -202,7 +202,7 @@ class Matrices:
 
 def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequence[float]) -> Matrices:
     """Matrices of the scene; `Scene.matrices` explains the arguments."""
-    _check_counts(elements, modes)
+    check_counts(elements, modes)
     meshed = any(getattr(part.beam, "meshed", True) for part in (scene, *scene.bodies))
     require(elements is None or meshed, "elements must be left out: a structure has its own matrices", elements,
             "Scene.matrices", "ask for modes, or modes='all'")  # fmt: skip
@@ -292,7 +292,7 @@ def _base_loads(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) ->
     return found
 
 
-def _check_counts(elements: int | None, modes: int | None) -> None:
+def check_counts(elements: int | None, modes: int | None) -> None:
     """Raise ValueError unless both are counts, and the elements few enough to be right."""
     for name, number in (("elements", elements), ("modes", modes)):
         whole = is_whole(number)

@@ -81,7 +81,7 @@ class Scene:
         the scene has no `bodies` then but those without joints, and a place of a joined one is (1, "lever"), or
         "lever" where no other has that name.
     gravity : g in m/s², pulls everything down, along -y; for all bodies. Of frames and structures also a vector, the
-        acceleration of free fall, (0, 0, -9.81).
+        acceleration of free fall, (0, 0, -9.81), in the plane (0, -9.81).
     elements : of Element, local elements that always act, numbered on after the stops.
 
     Every part takes a keyword ``name``, unique among all parts, those of bodies included: logs, tables, figures and
@@ -142,7 +142,7 @@ class Scene:
         if not callable(getattr(self.damping, "modal_coefficients", None)):
             raise TypeError(f"damping must be ModalDamping or Rayleigh, got {self.damping!r} in Scene; "
                             "write ModalDamping(0.01)")  # fmt: skip
-        object.__setattr__(self, "gravity", _fall(self.gravity, self.named))
+        object.__setattr__(self, "gravity", _fall(self.gravity, self._ways_to_fall))
         self._check_base()
         self._check_gravity()
         self._check_names()
@@ -391,12 +391,16 @@ class Scene:
 
     def _check_gravity(self) -> None:
         """Raise ValueError for gravity along what the bodies have not."""
-        if self.named:
-            bodies = [part.beam for part in (self, *self.bodies) if part.named]
-            known = {c for one in bodies for c in getattr(one, "base_directions", one.components)}
+        if known := self._ways_to_fall:
             astray = [name for name in self.pulls if name not in known]
-            require(not astray, f"gravity must pull along {', '.join(c for c in COMPONENTS[:3] if c in known)}", astray,
-                    "Scene", "leave the others 0")  # fmt: skip
+            require(not astray, f"gravity must pull along {', '.join(known)}", astray, "Scene", "leave the others 0")
+
+    @property
+    def _ways_to_fall(self) -> list[str]:
+        """Which of x, y and z frames and structures move along; none where there is but a `Beam`."""
+        bodies = [part.beam for part in (self, *self.bodies) if part.named] if self.named else []
+        known = {c for one in bodies for c in getattr(one, "base_directions", one.components)}
+        return [c for c in COMPONENTS[:3] if c in known]
 
     def _check_conflicts(self) -> None:
         """Raise ValueError if two supports share one place, or two stops one place, side and carrier."""
@@ -475,15 +479,17 @@ def _holding(beam: Scene, z: float, derivative: int) -> list[Support]:
     return [support for support in beam.supports if abs(support.z - z) <= near and support.fixed[derivative]]
 
 
-def _fall(gravity: Any, named: bool) -> Any:
-    """Checked gravity: a number, or a tuple of three; of none the number 0."""
+def _fall(gravity: Any, ways: list[str]) -> Any:
+    """Checked gravity: a number, or a tuple of three, of which two will do in the plane; of none the number 0."""
     if not isinstance(gravity, (list, tuple)):
         require_finite("gravity", gravity, "Scene", "give m/s², 9.81 on the ground")
         return gravity
-    right = len(gravity) == 3 and all(is_finite(one) for one in gravity)
-    require(right, "gravity must be a number, or three", gravity, "Scene", "write (0, 0, -9.81)")
-    require(named, "gravity of a Beam must be one number, along -y", gravity, "Scene", "write 9.81")
-    return tuple(float(one) for one in gravity) if any(gravity) else 0.0
+    require(bool(ways), "gravity of a Beam must be one number, along -y", gravity, "Scene", "write 9.81")
+    plane = "z" not in ways
+    right = (len(gravity) == 3 or (plane and len(gravity) == 2)) and all(is_finite(one) for one in gravity)
+    wanted, example = ("two along x and y", "(0, -9.81)") if plane else ("three", "(0, 0, -9.81)")
+    require(right, f"gravity must be a number, or {wanted}", gravity, "Scene", f"write {example}")
+    return (*map(float, gravity), 0.0)[:3] if any(gravity) else 0.0
 
 
 def _listed(name: str, value: Any, kinds: tuple[type, ...]) -> tuple[Any, ...]:

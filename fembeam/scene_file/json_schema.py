@@ -35,7 +35,10 @@ DIRECTION: Schema = {
         {**NUMBERS, "minItems": 2, "maxItems": 3},
     ],
 }
-GRAVITY: Schema = {"description": "m/s², 9.81 on the ground, or [0, 0, -9.81]", "anyOf": [{"type": "number"}, THREE]}
+GRAVITY: Schema = {
+    "description": "m/s², 9.81 on the ground, or [0, 0, -9.81], in the plane [0, -9.81]",
+    "anyOf": [{"type": "number"}, {**THREE, "minItems": 2}],
+}
 REDUCED: Schema = {
     "type": "object",
     "description": "a superelement: nodes of joints, supports, stops; modes with these held",

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from fembeam.beams import Beam, ModalDamping, Rayleigh, Section, Taper
+from fembeam.model import check_reduction
 from fembeam.scene import FEATURES, Scene, Source
 from fembeam.scene_file import bodies as further
 from fembeam.scene_file.keys import (
@@ -88,6 +89,7 @@ class TableReader:
         except (ValueError, TypeError, ArithmeticError) as error:
             self.fail("the scene", str(error), error)
         reduce = self.arguments(Scene.reduce, tables.get("reduce", {}), "[reduce]")
+        self.made(check_reduction, {"scene": scene, **reduce}, "[reduce]")
         studies = {
             name: self.build(study, tables[name], f"[{name}]") for name, study in known.items() if name in tables
         }
@@ -126,6 +128,8 @@ class TableReader:
                 return self.build(Rayleigh, value, "[damping]")
             return self.build(ModalDamping, value, "[damping]", "alpha", "beta")
         if name == "base":
+            if self.named and not value:
+                self.fail("[base]", "must have a table for each direction, such as [base.y]")
             if self.named and all(isinstance(one, dict) for one in value.values()):
                 return {direction: self.chosen(SIGNAL, one, f"[base.{direction}]") for direction, one in value.items()}
             return self.chosen(SIGNAL, value, "[base]")

@@ -20,7 +20,7 @@ from fembeam.model import Model, Orbit, Run
 from fembeam.model.sensitivity import Sensitivity, by_each, of_orbit_by_each
 from fembeam.scene import Place, Scene
 from fembeam.study.measure import cut, runs, values_of
-from fembeam.study.quantities import place_of
+from fembeam.study.quantities import mean_in_time, place_of
 from fembeam.study.trial import Trial
 from fembeam.support import require
 from reduction import AccuracyError
@@ -51,13 +51,13 @@ class Change:
     stretch: float = 0.0
 
     def mean(self, values: Vector, changes: Vector) -> float:
-        """Derivative of the mean of values (k,) over the samples, from those at fixed times.
+        """Derivative of the mean in time of values (k,) at the samples, from those at fixed times.
 
         Of an orbit, whose period T may change, from those at fixed phases t/T: ∂f/∂p + ḟ t/T dT/dp.
         """
         if self.stretch:
             changes = changes + self.stretch * self.run.t * _periodic_rate(values, float(self.run.t[1]))
-        return float(np.mean(changes))
+        return mean_in_time(self.run, changes)
 
     @property
     def q(self) -> Vector:
@@ -91,9 +91,10 @@ class Change:
 
 
 def _periodic_rate(values: Vector, h: float) -> Vector:
-    """Derivative of even samples of a period, by central differences of fourth order."""
-    a, b, c, d = (np.roll(values, k) for k in (2, 1, -1, -2))
-    return (8.0 * (c - b) - (d - a)) / (12.0 * h)
+    """Derivative of even samples of a period, both ends included, by central differences of fourth order."""
+    a, b, c, d = (np.roll(values[:-1], k) for k in (2, 1, -1, -2))
+    rate = (8.0 * (c - b) - (d - a)) / (12.0 * h)
+    return np.append(rate, rate[0])
 
 
 def has_gradients(trial: Trial, insist: bool = False) -> bool:
@@ -147,7 +148,7 @@ def _of_settled(trial: Trial, model: Model) -> Vector:
     parts = runs(model, trial.plan, trial.asked, trial.method)
     values, last = values_of(trial.asked, parts, "gradient").mean(axis=0), parts[-1]
     orbit: Orbit = model.orbit(1, np.concatenate((last.q[-1], last.q_dot[-1])))
-    end = 0.5 * float(orbit.run.t[-2] + orbit.run.t[-1])  # the last sample is the first once more
+    end = float(orbit.run.t[-1])
     part, mine = cut(orbit.run, 0.0, end), orbit.contacts.t_in < end
     if not np.allclose(trial.asked(part), values, rtol=SAME, atol=0.0):
         raise NoGradientError("the response does not repeat with the load")

@@ -7,6 +7,7 @@ looked at is δ of a stop, or u at `z`, or u of the tip in a scene without stops
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from itertools import pairwise
@@ -74,17 +75,18 @@ class Amplitude(OfSignal):
 
 
 class Rms(OfSignal):
-    """Root mean square of δ (or u at `z`) about its mean, m; over the samples, so that their times matter."""
+    """Root mean square of δ (or u at `z`) about its mean, m; by trapezia over the samples, so their times matter."""
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
-        return float(np.std(self.signal(run)[0]))
+        u = self.signal(run)[0]
+        return math.sqrt(mean_in_time(run, (u - mean_in_time(run, u)) ** 2))
 
     def derivative(self, change: Change) -> float:
         """By a parameter, at samples whose times do not change."""
         u = self.signal(change.run)[0]
-        u = u - u.mean()
-        return change.mean(u**2, 2.0 * u * self.change(change)[0]) / (2.0 * float(np.std(u)))
+        u = u - mean_in_time(change.run, u)
+        return change.mean(u**2, 2.0 * u * self.change(change)[0]) / (2.0 * self(change.run))
 
 
 class PeakForce(OfContacts):
@@ -171,23 +173,26 @@ class Psd:
 
 
 class Density(OfSignal):
-    """The density of δ (or u at `z`) as its quantiles at 5, 10, … 95 %, m: (19,); needs no bins."""
+    """The density of δ (or u at `z`) as its quantiles at 5, 10, … 95 %, m: (19,); needs no bins.
+
+    Each sample but the last stands for the time to the next: of a period, the last is the first once more.
+    """
 
     def __call__(self, run: Run) -> Vector:
         """Value of a run."""
-        return np.asarray(np.quantile(self.signal(run)[0], PROBABILITIES))
+        return np.asarray(np.quantile(self.signal(run)[0][:-1], PROBABILITIES))
 
 
 @dataclass(frozen=True)
 class MeanEnergy:
-    """Mean energy stored in the beam, ½ Σ (q̇² + ω² q²), J."""
+    """Mean energy stored in the beam, ½ Σ (q̇² + ω² q²), J; trapezoidal over the samples."""
 
     sampled: ClassVar[bool] = True
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
         assert run.model is not None
-        return float(np.mean(np.sum(run.q_dot**2 + (run.q * run.model.omega) ** 2, axis=1)) / 2)
+        return mean_in_time(run, np.sum(run.q_dot**2 + (run.q * run.model.omega) ** 2, axis=1) / 2)
 
     def derivative(self, change: Change) -> float:
         """By a parameter."""
@@ -297,6 +302,12 @@ def place_of(run: Run, z: Place | None) -> Any:
     """The place itself, or the tip."""
     last = getattr(run.shapes, "nodes", None)
     return z if z is not None else next(iter(places(run.shapes).values())) if last is None else float(last[-1])
+
+
+def mean_in_time(run: Run, values: Vector) -> float:
+    """Mean over the time of the samples by trapezia: of a period, whose last sample is its first, each counts once."""
+    require(len(run.t) > 1, "the run must have samples", len(run.t), "quantity", "give dt")
+    return float(np.trapezoid(values, run.t) / (run.t[-1] - run.t[0]))
 
 
 def _mean(values: Vector) -> float:

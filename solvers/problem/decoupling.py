@@ -150,13 +150,17 @@ def _state_blocks(phi: Array, k: Array, damping: Array, size: Array, turning: Ar
     return Blocks(np.array(none + [p[0] for p in pairs]), c, T, np.linalg.inv(T), loss)
 
 
+_OVERDAMPED = (
+    "; where damping by stiffness, Rayleigh's beta, overdamps high modes, slow roots all come near -1/beta: lower "
+    "beta, or keep fewer modes"
+)
 _INSEPARABLE = (
     "the damped modes cannot be separated (two coincide, as for a dashpot on a body that can float, or a critically "
-    "damped mode); change a dashpot by one part in 10^6"
+    "damped mode); change a dashpot by one part in 10^6" + _OVERDAMPED
 )
 _INSEPARABLE_TURNING = (
     "the modes of C + G cannot be separated: a body with gyroscopic terms can float, or two damped modes coincide; "
-    "hold it by a spring, however soft, or change a dashpot by one part in 10^6"
+    "hold it by a spring, however soft, or change a dashpot by one part in 10^6" + _OVERDAMPED
 )
 
 
