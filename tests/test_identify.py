@@ -249,3 +249,16 @@ def test_options_and_records_that_are_none_are_refused(change, said):
     data = {"delta": np.sin(t), "delta_dot": np.cos(t), "force": np.sin(t) ** 1.5}
     with pytest.raises(ValueError, match=said):
         identify(**(data | change))
+
+
+def test_a_sample_at_the_surface_does_not_change_the_interval():
+    """The interval takes the entry rate's derivative by the surface; that a sample enters there is no part of it."""
+    data = collisions(np.random.default_rng(10), samples=80, noise_force=0.01, noise_delta=0.01, timed=True)
+    found, depth = identify(**data), data["delta"][2].max()
+    usual = found.damping_factor.high - found.damping_factor.low
+    last = int(np.flatnonzero(data["delta"][2] > found.indentation_offset.value)[-1])
+    for _ in range(2):  # the surface moves with the sample, less the second time
+        data["delta"][2][last] = found.indentation_offset.value + 3e-5 * depth
+        found = identify(**data)
+    assert 1e-5 < (data["delta"][2][last] - found.indentation_offset.value) / depth < 5e-5
+    assert found.damping_factor.high - found.damping_factor.low == pytest.approx(usual, rel=0.1)

@@ -188,7 +188,7 @@ class _Fit:
             rates = []
             for theta in (self.theta - step, self.theta + step):
                 _, a, _, d0, p = self.split(theta)
-                rates.append(motion_of(self.measured[i], d0 * self.depth, p, a, fully=False).entry_rate)
+                rates.append(self.motions[i].entry_rate_at(d0 * self.depth, p, a))
             changes[j] = (rates[1] - rates[0]) / 2e-4
         return np.outer(J.T @ by_motion[2], changes)
 
