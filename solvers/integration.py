@@ -162,7 +162,7 @@ def prepared_once(system: System, method: Any, duration: float) -> tuple[Forcing
         check_laws(system)
         forcing = _kept_forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
         known = method.prepared(system, forcing, duration)
-        if known[0] is system.kept.find("forcing"):
+        if forcing is system.kept.find("forcing"):  # of what cannot change, also if resonant tones are sampled
             system.kept.store(key, known)
     return known
 

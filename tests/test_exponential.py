@@ -13,6 +13,7 @@ import fembeam as fb
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic, law
 from solvers import Contact, DormandPrince, Exponential, Status, System, integrate
 from solvers.exponential.preparation import prepare_system
+from solvers.integration import prepared_once
 from solvers.problem import forcing_of
 
 RK = DormandPrince(rtol=1e-13, atol=1e-16)
@@ -373,6 +374,14 @@ def test_several_resonant_tones_of_one_load():
     ours, theirs = (integrate(system, [0.0], [0.0], 0.4, 0.1, m) for m in (Exponential(1e-10), RK))
     assert len(ours.contacts) == len(theirs.contacts) > 0
     np.testing.assert_allclose(ours.q, theirs.q, atol=1e-9 * np.abs(theirs.q).max())
+
+
+def test_a_resonant_tone_is_sampled_once_for_all_starts():
+    system = free_mass(Hertz(1e5), gap=0.01, loads=[([-1.0], fb.Harmonic(1.0, 1e-3))])
+    forcing, _ = prepared_once(system, Exponential(), 0.4)
+    assert len(forcing.table) > 0
+    assert prepared_once(system, Exponential(), 0.4)[0] is forcing
+    assert forcing.nbytes >= forcing.table.nbytes
 
 
 @pytest.mark.parametrize("stiffness", [1e-2, 1e2, 1e4, 1e6, 1e8])

@@ -42,6 +42,11 @@ class Forcing:
     table_start: Any
     table_load: Any
 
+    @property
+    def nbytes(self) -> int:
+        """Memory of the arrays."""
+        return sum(int(array.nbytes) for array in vars(self).values())
+
 
 def forcing_of(signals: list[Signal], duration: float, rtol: float) -> Forcing:
     """Arrays of all signals on [0, duration]."""
