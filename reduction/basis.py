@@ -15,6 +15,17 @@ TIE = 1e-6  # relative: values this close to the largest count as equal, so that
 NODE = 1e-9  # relative: a mode this small in the given direction has a node there
 
 
+def reals(values: ArrayLike, name: str, where: str) -> Vector:
+    """Real numbers of any shape as a new array of floats, or a clear error."""
+    try:
+        given = np.asarray(values)
+    except ValueError:  # rows of unequal length
+        given = np.asarray(None)
+    if given.dtype.kind not in "iuf":
+        raise ValueError(f"{name} must be real numbers, got {values!r} in {where}; give an array of numbers")
+    return given.astype(float)
+
+
 class AccuracyError(RuntimeError):
     """A computed basis failed its own check; the message carries the number."""
 
@@ -48,7 +59,7 @@ class Basis:
         return f"<basis of {len(self.omega)} vectors over {len(self.vectors)} dofs>"
 
     def __post_init__(self) -> None:
-        vectors, omega = np.array(self.vectors, dtype=float), np.array(self.omega, dtype=float)
+        vectors, omega = reals(self.vectors, "vectors", "Basis"), reals(self.omega, "omega", "Basis")
         if vectors.ndim != 2 or omega.shape != vectors.shape[1:]:
             raise ValueError(
                 f"vectors (N, n) and omega (n,) must match, got {vectors.shape} and {omega.shape} in Basis; "
@@ -90,6 +101,13 @@ class Basis:
         return self.participation(load) ** 2
 
 
+def checked_basis(basis: Basis, where: str) -> Basis:
+    """The basis; TypeError for what is none."""
+    if not isinstance(basis, Basis):
+        raise TypeError(f"basis must be a Basis, got {basis!r} in {where}; make one with modal_basis(M, K)")
+    return basis
+
+
 def oriented(basis: Basis, direction: ArrayLike | sparse.spmatrix | None = None) -> Basis:
     """The same basis with the sign of every vector fixed: direction · φ > 0.
 
@@ -111,10 +129,16 @@ def oriented(basis: Basis, direction: ArrayLike | sparse.spmatrix | None = None)
     array([[1., 0.],
            [0., 1.]])
     """
-    default = _deciding(basis.vectors)
+    default = _deciding(checked_basis(basis, "oriented").vectors)
     signs = np.sign(default)
     if direction is not None:
-        rows: Any = direction if sparse.issparse(direction) else np.atleast_2d(np.asarray(direction, dtype=float))
+        rows: Any = (
+            direction if sparse.issparse(direction) else np.atleast_2d(reals(direction, "direction", "oriented"))
+        )
+        if rows.shape[1:] != basis.vectors.shape[:1]:
+            raise ValueError(
+                f"direction must be rows of {len(basis.vectors)} numbers, got {rows.shape} in oriented; give (k, N)"
+            )
         chosen = _deciding(np.asarray(rows @ basis.vectors))
         signs = np.where(np.abs(chosen) > NODE * np.abs(default), np.sign(chosen), signs)
     return replace(basis, vectors=basis.vectors * signs)

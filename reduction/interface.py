@@ -17,7 +17,7 @@ import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
-from reduction.basis import AccuracyError, Basis, Vector, oriented
+from reduction.basis import AccuracyError, Basis, Vector, checked_basis, oriented, reals
 from reduction.modal import ORTHONORMALITY_TOLERANCE, Matrix, checked_pair, modal_basis, ritz
 
 STATIC_TOLERANCE = 1e-9  # relative error of static compliance, given a root; 1e-13 but where elements are 1e-4 long
@@ -68,7 +68,7 @@ def with_residual(basis: Basis, M: Matrix, K: Matrix, directions: Matrix, root: 
     """
     M, K = checked_pair(M, K, "with_residual")
     B = _directions(directions, K.shape[0], "with_residual")
-    still = basis.vectors[:, basis.omega == 0.0]
+    still = checked_basis(basis, "with_residual").vectors[:, basis.omega == 0.0]
     shapes = static_shapes(M, K, B, still, root)
     left = _orthogonal(shapes, basis.vectors, M)
     turned = _recombined(B, _strain(K, root, left), np.diag(_strain(K, root, shapes)), root)
@@ -173,7 +173,7 @@ def static_share(basis: Basis, M: Matrix, K: Matrix, directions: Matrix, root: M
     """
     M, K = checked_pair(M, K, "static_share")
     B = _directions(directions, K.shape[0], "static_share")
-    shapes = static_shapes(M, K, B, basis.vectors[:, basis.omega == 0.0], root)
+    shapes = static_shapes(M, K, B, checked_basis(basis, "static_share").vectors[:, basis.omega == 0.0], root)
     return np.diag(_compliance(basis, B)) / np.sum(B * shapes, axis=0)
 
 
@@ -202,7 +202,7 @@ def static_shapes(M: Matrix, K: Matrix, B: Vector, rigid: Vector, root: Matrix |
 
 def _directions(directions: Matrix, size: int, where: str) -> Vector:
     """Checked columns (N, m)."""
-    B = np.array(directions.toarray() if sparse.issparse(directions) else directions, dtype=float)
+    B = reals(directions.toarray() if sparse.issparse(directions) else directions, "directions", where)
     if B.ndim != 2 or B.shape[0] != size or B.shape[1] == 0:
         raise ValueError(f"directions must have shape ({size}, m), m > 0, got {B.shape} in {where}; give columns")
     if not np.all(np.isfinite(B)) or not np.all(np.any(B != 0, axis=0)):

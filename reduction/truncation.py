@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import linalg as sparse_linalg
 
-from reduction.basis import Basis, Vector
+from reduction.basis import Basis, Vector, reals
 from reduction.modal import Matrix, checked_matrix, modal_basis
 
 Enough = Callable[[Basis], int | None]
@@ -63,7 +63,7 @@ def below(omega_max: float) -> Enough:
     >>> fewest_modes(np.eye(3), np.diag([1.0, 4.0, 9.0]), below(1.5)).count
     1
     """
-    if not 0 < omega_max < np.inf:
+    if not 0 < _number(omega_max) < np.inf:
         raise ValueError(f"omega_max must be positive and finite (rad/s), got {omega_max!r} in below; give a frequency")
 
     def count(basis: Basis) -> int | None:
@@ -87,9 +87,12 @@ def carrying(share: float, load: ArrayLike, mass: float) -> Enough:
     >>> fewest_modes(M, K, carrying(0.7, load, moved_mass(M, load))).count
     1
     """
-    if not 0 < share <= 1:
+    load = reals(load, "load", "carrying")
+    if not np.isfinite(load).all():
+        raise ValueError(f"load must be finite, got {load} in carrying; give M r")
+    if not 0 < _number(share) <= 1:
         raise ValueError(f"share must lie in (0, 1], got {share!r} in carrying; give a part such as 0.95")
-    if not 0.0 < mass < np.inf:
+    if not 0.0 < _number(mass) < np.inf:
         raise ValueError(f"mass must be positive and finite (kg), got {mass!r} in carrying; use moved_mass(M, load)")
 
     def count(basis: Basis) -> int | None:
@@ -107,4 +110,16 @@ def moved_mass(M: Matrix, load: Vector) -> float:
     >>> moved_mass(np.diag([3.0, 1.0]), np.array([3.0, 1.0]))
     4.0
     """
-    return float(load @ sparse_linalg.splu(checked_matrix(M, "M", "moved_mass")).solve(np.asarray(load, dtype=float)))
+    b, matrix = reals(load, "load", "moved_mass"), checked_matrix(M, "M", "moved_mass")
+    if b.shape != matrix.shape[:1] or not np.isfinite(b).all():
+        raise ValueError(f"load must be {matrix.shape[0]} finite numbers, got {load!r} in moved_mass; give M r")
+    return float(b @ sparse_linalg.splu(matrix).solve(b))
+
+
+def _number(value: object) -> float:
+    """The value as a float, nan where it is no real number."""
+    real = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    try:
+        return float(value) if real else np.nan  # type: ignore[arg-type]
+    except OverflowError:  # a whole number beyond the floats
+        return np.inf

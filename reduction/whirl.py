@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import linalg, sparse
 
-from reduction.basis import Basis, Vector
+from reduction.basis import Basis, Vector, checked_basis, reals
 
 SKEW_TOLERANCE = 1e-9
 ALIKE = 1e-9  # relative: frequencies this near are one, whose motions are taken as circles
@@ -133,14 +133,14 @@ def critical_speeds(basis: Basis, G: Any, x: ArrayLike, y: ArrayLike) -> Whirl:
 
 def _checked(basis: Basis, G: Any, x: ArrayLike, y: ArrayLike) -> tuple[Vector, tuple[Vector, Vector]]:
     """ΦᵀGΦ and the rows on the basis."""
-    matrix: Any = G if sparse.issparse(G) else np.asarray(G, dtype=float)
-    size = len(basis.vectors)
+    matrix: Any = G if sparse.issparse(G) else reals(G, "G", "whirl")
+    size = len(checked_basis(basis, "whirl").vectors)
     if matrix.shape != (size, size):
         raise ValueError(f"G must be ({size}, {size}), as the basis has {size} dofs, got {matrix.shape}")
     wrong, largest = abs(matrix + matrix.T).max(), abs(matrix).max()
     if not wrong <= SKEW_TOLERANCE * largest:
         raise ValueError(f"G must be skew, G = -Gᵀ; its largest |G + Gᵀ| is {wrong:g}")
-    rows = tuple(np.atleast_2d(np.asarray(row, dtype=float)) for row in (x, y))
+    rows = tuple(np.atleast_2d(reals(row, name, "whirl")) for name, row in (("x", x), ("y", y)))
     if rows[0].shape != rows[1].shape or rows[0].shape[1:] != (size,) or not np.isfinite(rows).all():
         raise ValueError(
             f"x and y must be finite rows (k, {size}) of the same places, got {rows[0].shape} and {rows[1].shape}"

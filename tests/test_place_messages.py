@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import fembeam as fb
+import reduction
 from contacts import KelvinVoigt
 
 LAW = KelvinVoigt(1e5, 10.0)
@@ -24,6 +25,57 @@ def stop(body, place, direction="x"):
 def run():
     scene = fb.Scene(BENT, [fb.Clamped("33")], stops=[fb.Stop("N35", LAW, direction="z")])
     return scene.reduce(1).simulate(0.01, 1e-3)
+
+
+@pytest.fixture(scope="module")
+def straight():
+    return fb.Scene(BEAM, [fb.Clamped(0.0)], base=fb.Harmonic(1e-3, 50.0)).reduce(1)
+
+
+@pytest.mark.parametrize(
+    "bad", ["abc", "9.81", None, True, 1 + 2j, [True], ["a"], [None], [[1.0], [2.0, 3.0]]], ids=repr
+)
+@pytest.mark.parametrize("name", ["z", "omega", "start", "duration", "dt", "body"])
+def test_a_model_says_which_argument_is_no_number(straight, name, bad):
+    calls = {
+        "z": lambda: straight.simulate(0.01, 1e-3).displacement(bad),
+        "omega": lambda: straight.frequency_response(bad, output=0.4),
+        "start": lambda: straight.simulate(0.01, start=bad),
+        "duration": lambda: straight.for_duration(bad),
+        "dt": lambda: straight.simulate(0.01, bad),
+        "body": lambda: straight.phi(0.4, body=bad),
+    }
+    if bad is None and name in ("start", "dt"):
+        return  # stands for rest, and for no samples
+    said = "places of a beam must be" if name == "z" and isinstance(bad, str) else f"{name} must be"
+    with pytest.raises(ValueError, match=re.escape(said)) as raised:
+        calls[name]()
+    assert repr(bad) in str(raised.value)
+
+
+@pytest.mark.parametrize("bad", ["abc", None, True, 1 + 2j, float("nan")], ids=repr)
+@pytest.mark.parametrize(("make", "what"), [
+    (lambda bad: fb.RollOff(bad, 10.0), "RollOff level"),
+    (lambda bad: fb.RollOff(1.0, corner=bad), "RollOff corner"),
+    (lambda bad: fb.Joint(("A-B", bad), to=(1, "B")), "z"),
+    (lambda bad: fb.Joint("A", to=(1, ["A-B", bad])), "z"),
+    (lambda bad: fb.Multisine([bad], [1.0]), "Multisine amplitude"),
+    (lambda bad: fb.Structure.of_modes(bad, np.eye(1), [("A", "x")]), "omega"),
+    (lambda bad: fb.response_spectrum([0.0, 1.0], [0.0, 1.0], bad), "omega"),
+    (lambda bad: fb.psd(np.sin(np.arange(300.0)), 0.1, overlap=bad), "overlap"),
+    (lambda bad: reduction.below(bad), "omega_max"),
+    (lambda bad: reduction.carrying(bad, [1.0, 1.0], 2.0), "share"),
+    (lambda bad: reduction.carrying(0.5, bad, 2.0), "load"),
+    (lambda bad: reduction.moved_mass(np.eye(1), [bad]), "load"),
+    (lambda bad: reduction.modal_basis(np.eye(1), [[bad]]), "K"),
+    (lambda bad: reduction.Basis([[bad]], [1.0]), "vectors"),
+    (lambda bad: reduction.guyan(np.eye(1), np.eye(1), [[bad]]), "directions"),
+])  # fmt: skip
+def test_what_is_no_number_is_refused_where_it_is_written(make, what, bad):
+    if bad is None and what == "omega" and make.__code__.co_names[-1] == "response_spectrum":
+        return  # periods stand for it
+    with pytest.raises(ValueError, match=f"{what}.* (must|needs)"):
+        make(bad)
 
 
 def test_names_of_digits_are_names():

@@ -1,6 +1,7 @@
 """Figures: what they show, without a display."""
 
 import dataclasses
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -292,6 +293,15 @@ def test_a_partial_run_says_so(run):
     partial = dataclasses.replace(run, status="interrupted: partial result")
     assert "PARTIAL RESULT: interrupted" in texts(plot.densities(partial))
     assert "PARTIAL" not in texts(plot.densities(run))
+
+
+def test_rates_of_contacts_do_not_depend_on_samples(run):
+    """The log lasts to the end of the run, the last sample may lie before."""
+    end = run.reached
+    part = run.model.simulate(end, [0.0, 0.1 * end])
+    rates = [re.search(r"[^ ]+ per second", texts(plot.contacts(one)))[0] for one in (run, part)]
+    assert rates[0] == rates[1]
+    assert report.summary(part)["contacts"][0]["rate"] == report.summary(run)["contacts"][0]["rate"]
 
 
 def test_a_run_too_short_gets_the_figures_it_can(run):

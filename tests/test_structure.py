@@ -73,7 +73,7 @@ BAD = [
     (lambda: fb.Structure(K, M, points={"end": 5}), "point 'end' must be a node of labels; 1 is the nearest"),
     (lambda: fb.Structure(K, M, nodes={0: (1.0,)}), r"nodes\[0\] must be three numbers"),
     (lambda: fb.Structure(K, M, lines=[(0, 1)]), "lines must join nodes whose coordinates are given"),
-    (lambda: fb.Structure("K", M), "K must be a real matrix"),
+    (lambda: fb.Structure("K", M), "K must be numbers, got .K. in Structure"),
     (lambda: fb.Structure(K, M).assembled(elements=3), "elements must be left out"),
     (lambda: beam_structure().rows("tp"), "a place must be a point or a node of the structure; 'tip' is the nearest"),
     (lambda: fb.Scale("mm", "ton"), "mass must be one of kg, t, g"),

@@ -82,6 +82,9 @@ class Beam:
     @classmethod
     def of_spans(cls, spans: Sequence[Span], foundation: float = 0.0, axial_force: float = 0.0) -> Beam:
         """A beam of several spans [(length, section), …], rigidly joined, from z = 0 on."""
+        listed = isinstance(spans, (list, tuple))
+        paired = listed and all(isinstance(one, (list, tuple)) and len(one) == 2 for one in spans)
+        require(paired, "spans must be pairs", spans, "Beam.of_spans", "give [(length, section), …]")
         spans = tuple((length, section) for length, section in spans)
         require(len(spans) > 0, "spans must not be empty", spans, "Beam.of_spans", "give (length, section) pairs")
         for index, (length, _) in enumerate(spans):

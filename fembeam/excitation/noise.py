@@ -18,7 +18,7 @@ import numpy as np
 from fembeam.excitation.line_spectrum import checked_band, checked_order
 from fembeam.excitation.noise_lines import NoiseLines
 from fembeam.excitation.psd import Psd, RollOff, Table, checked_table
-from fembeam.support import is_whole, number
+from fembeam.support import is_finite, is_whole, number
 
 AUTOMATIC_LINES = 4096  # kurtosis 3 - 1.5/4096: Gaussian to far below any sampling error
 FEWEST_LINES = 8  # below this a sum of cosines is visibly not Gaussian (kurtosis under 2.8)
@@ -81,7 +81,7 @@ class BandNoise(NoiseLines):
     def __post_init__(self) -> None:
         band = checked_band("BandNoise band", self.band)
         computed_std, computed_period = self._computed
-        free = self.period is None or self.period == computed_period
+        free = self.period is None or (is_finite(self.period) and self.period == computed_period)
         automatic = AUTOMATIC_LINES * 2 * math.pi / (band[1] - band[0])
         period = automatic if free else number("BandNoise period (s)", self.period, above=0.0)
         self._set(band=band, period=period, seed=_checked_seed(self.seed), order=checked_order(self.order))

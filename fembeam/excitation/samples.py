@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.support import frozen
+from fembeam.support import frozen, numbers
 
 Vector = NDArray[np.float64]
 FEWEST_SAMPLES = 8
@@ -22,8 +22,8 @@ JUMP = 0.05  # of the largest value: what a record may jump by to the zeros behi
 def checked_samples(t: ArrayLike, y: ArrayLike) -> tuple[Vector, Vector]:
     """Read-only times from 0 and values, or an error that names the first bad row."""
     try:
-        times, values = np.asarray(t, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    except (TypeError, ValueError):
+        times, values = (numbers(name, given, "Record", "give an array") for name, given in (("t", t), ("y", y)))
+    except ValueError:
         raise ValueError("Record t and y must be arrays of numbers") from None
     if times.ndim != 1 or times.shape != values.shape or times.size < FEWEST_SAMPLES:
         need = f"Record needs t and y of one length of at least {FEWEST_SAMPLES}"

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.excitation.line_spectrum import checked_order
 from fembeam.excitation.unlimited import Unlimited
-from fembeam.support import frozen, number
+from fembeam.support import frozen, number, numbers
 
 Tones = tuple[NDArray[np.float64], NDArray[np.complex128]]
 MOST_SHOWN = 8  # numbers of a kind in a repr
@@ -164,8 +164,8 @@ def _quarter_turns(order: int) -> tuple[float, float]:
 def _checked_column(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """A read-only one-dimensional finite array, or an error that names the first bad entry."""
     try:
-        column = frozen(np.atleast_1d(values))
-    except (TypeError, ValueError):
+        column = frozen(np.atleast_1d(numbers(name, values, "a signal", "give a list of them")))
+    except ValueError:
         raise ValueError(f"{name} must be a list of numbers, got {values!r}") from None
     if column.ndim != 1:
         raise ValueError(f"{name} must have one dimension, got shape {column.shape}")

@@ -32,7 +32,7 @@ from fembeam.scene import (
     weight,
 )
 from fembeam.scene.contact_rows import ContactRow
-from fembeam.support import require
+from fembeam.support import is_whole, require
 
 if TYPE_CHECKING:
     from fembeam.response import SectionForces
@@ -168,8 +168,15 @@ class ModalEquations:
 
         Of other bodies at (place, direction), or a list of such pairs.
         """
-        shapes = (self.shapes, *self.others)[body]
+        shapes = self.body_shapes(body, "phi")
         return shapes(shapes.place(z), derivative)
+
+    def body_shapes(self, body: int, where: str) -> Any:
+        """Mode shapes of one body; ValueError unless there is one of that number."""
+        every: Any = (self.shapes, *self.others)
+        known = is_whole(body) and 0 <= body < len(every)
+        require(known, f"body must be below {len(every)}, the number of bodies", body, where, "0 is the scene's own")
+        return every[body]
 
     @cached_property
     def section_forces(self) -> tuple[SectionForces | FrameForces | JoinedForces | None, ...]:

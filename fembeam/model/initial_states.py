@@ -17,7 +17,7 @@ from scipy.sparse import linalg as sparse_linalg
 import reduction
 from contacts.path import borders
 from fembeam.scene import BodyMatrices, support_loads, tangent, told
-from fembeam.support import require, require_finite
+from fembeam.support import numbers, require, require_finite
 
 if TYPE_CHECKING:
     from fembeam.model.equations import ModalEquations
@@ -63,7 +63,7 @@ def state(model: Model, displacement: Field | Sequence[Field], velocity: Field |
 
 def split_start(model: Model, start: ArrayLike) -> tuple[Vector, Vector, tuple[Vector, ...]]:
     """q, q̇ and, where given, what each law has latched, of a start (2n,) or the (2n + l,) of `Run.end`."""
-    x, n = np.asarray(start, dtype=float), len(model.omega)
+    x, n = numbers("start", start, "Model.simulate", "use model.state(displacement, velocity)"), len(model.omega)
     sizes = [one.latched for one in model.contact_rows]
     require(x.shape in ((2 * n,), (2 * n + sum(sizes),)), f"start must have shape ({2 * n},), [q, q_dot]", x.shape,
             "Model.simulate", "use model.state(displacement, velocity)")  # fmt: skip
@@ -149,6 +149,8 @@ def equilibrium(model: Model, loads: Mapping[float, float]) -> Vector:
     load = model.omega**2 * start[:n] if len(model.following) else np.zeros(n)
     for direction, g in model.scene.pulls.items():
         load = load - model.participation_along(direction) * g
+    named = isinstance(loads, Mapping)
+    require(named, "loads must name their places", loads, "Model.equilibrium", "write {z: force}, in m and N")
     for z, force in loads.items():
         require_finite(f"force at z = {z} m", force, "Model.equilibrium", "give N, positive up")
         load = load + force * model.phi(z)

@@ -22,7 +22,7 @@ from fembeam.model.equations import ModalEquations
 from fembeam.response import PlacedLog
 from fembeam.response.shapes import Vector
 from fembeam.scene import for_duration, respun, with_signals, with_value
-from fembeam.support import Part, Printed, bar, note, require, require_no_text, require_positive
+from fembeam.support import Part, Printed, bar, is_whole, note, numbers, require, require_positive
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -109,7 +109,8 @@ class Model(Printed, ModalEquations):
         stop : its number.
         """
         require_positive("speed", speed, "Model.strike", "give the speed of arrival in m/s")
-        require(0 <= stop < len(self.scene.stops), f"stop must be below {len(self.scene.stops)}", stop, "Model.strike",
+        known = is_whole(stop) and 0 <= stop < len(self.scene.stops)
+        require(known, f"stop must be below {len(self.scene.stops)}", stop, "Model.strike",
                 "count from 0")  # fmt: skip
         contact = initial_states.smooth(self.system.contacts[stop])
         start, mode = np.zeros((2, len(self.omega))), 0
@@ -175,6 +176,7 @@ class Model(Printed, ModalEquations):
 
     def for_duration(self, duration: float) -> Model:
         """The same model with every signal valid for a run of ``duration`` s; noise without a period gets one."""
+        require_positive("duration", duration, "Model.for_duration", "give s")
         scene = with_signals(self.scene, lambda signal: for_duration(signal, duration))
         return self if scene is self.scene else self.under(scene)
 
@@ -209,9 +211,11 @@ class Model(Printed, ModalEquations):
         """
         from fembeam.model.run import Made, Run
 
-        require_no_text("Model.simulate", duration=duration, dt=dt, start=start)
+        require_positive("duration", duration, "Model.simulate", "give s")
+        if dt is not None:
+            numbers("dt", dt, "Model.simulate", "give the output sampling in s, or output times")
         q, q_dot, memory = initial_states.split_start(self, self.rest() if start is None else start)
-        model = self.for_duration(duration) if 0.0 < duration < np.inf else self
+        model = self.for_duration(duration)
         with bar(duration, progress) as report:
             solution = solvers.integrate(
                 model.system, q, q_dot, duration, dt, solver, progress=report, memory=memory or None

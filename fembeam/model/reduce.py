@@ -15,7 +15,7 @@ from fembeam.model.model import Model
 from fembeam.response import PlacedShapes, Shapes, placed_shapes
 from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, carried_on, check_counts, loaded, watched
 from fembeam.structures import COMPONENTS
-from fembeam.support import is_whole, require
+from fembeam.support import is_finite, is_whole, require
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -89,7 +89,8 @@ def check_reduction(
     if omega_max is not None:
         reduction.below(omega_max)
     if mass_share is not None:
-        require(0.0 < mass_share <= 1.0, "mass_share must lie in (0, 1]", mass_share, "Scene.reduce", "try 0.95")
+        right = is_finite(mass_share) and 0.0 < mass_share <= 1.0
+        require(right, "mass_share must lie in (0, 1]", mass_share, "Scene.reduce", "try 0.95")
     check_counts(elements, None)
     _check_static(scene, residual, interface)
 

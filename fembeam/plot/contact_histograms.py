@@ -51,7 +51,7 @@ def contacts(run: Run, discard: float = 0.0, axes: Sequence[Axes] | None = None)
     if axes is None:
         count, stops = int(np.count_nonzero(kept)), len(np.unique(log.stop[kept]))
         of = f" of {stops} stops" if stops > 1 else ""
-        rate = count / (float(run.t[-1]) - discard)
+        rate = count / (run.reached - discard)
         heading(drawn, f"{counted(count, 'contact')}{of}, {rate:.3g} per second", True, run=run)
     return figure
 

@@ -17,7 +17,7 @@ from fembeam.response.readout import Readout
 from fembeam.response.section_forces import extremes, frame_forces_of, rows_of
 from fembeam.scene import split, unit_of
 from fembeam.structures import COMPONENTS, UP, Six
-from fembeam.support import is_whole, require
+from fembeam.support import is_whole, numbers, require
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -195,7 +195,8 @@ class Histories:
                 given = list(shapes.usual.values()) if quantity == "displacement" else self._sections(body)
             at: Any = [given] if isinstance(given, tuple) else list(given)
         else:
-            at = shapes.nodes if z is None else np.atleast_1d(np.asarray(z, dtype=float))
+            at = shapes.nodes if z is None else np.atleast_1d(numbers("z", z, "Run", "give m along the beam"))
+        require(len(at) > 0, "z must not be empty", z, "Run.extremes", "leave it out for all of the body")
         q = self._q_of(body)
         found = extremes(self.t, q, *rows_of(self, quantity, at, body))
         if quantity in ("displacement", "slope"):
@@ -213,8 +214,8 @@ class Histories:
     def _beam(self, body: int) -> Any:
         """A beam's shapes; ValueError unless there is one of that number."""
         beams = (self.shapes, *self.others)
-        require(body in range(len(beams)), f"body must be below {len(beams)}, the number of beams", body, "Run",
-                "0 is the scene's own")  # fmt: skip
+        known = is_whole(body) and 0 <= body < len(beams)
+        require(known, f"body must be below {len(beams)}, the number of beams", body, "Run", "0 is the scene's own")
         return beams[body]
 
     def _field(self, quantity: str, z: ArrayLike, body: int) -> Vector:
@@ -224,7 +225,7 @@ class Histories:
             shapes, _, offset = rows_of(self, quantity, z if isinstance(z, list) else [z], body)
             along = self._q_of(body) @ shapes.T + offset
             return along if isinstance(z, list) else along[:, 0]
-        places = np.asarray(z, dtype=float)
+        places = numbers("z", z, "Run", "give m along the beam")
         shapes, _, offset = rows_of(self, quantity, np.atleast_1d(places), body)
         values = self._q_of(body) @ shapes.T + offset
         return values if places.ndim else values[:, 0]

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.beams import hermite_rows
 from fembeam.scene import at_parts
-from fembeam.support import require
+from fembeam.support import numbers, require
 
 Vector = NDArray[np.float64]
 
@@ -71,7 +71,7 @@ class Shapes:
 
     def __call__(self, z: ArrayLike, derivative: int = 0) -> Vector:
         """φ(z): (n,) at one z, (k, n) at z (k,); derivative 1 is the slope, 2 the curvature."""
-        places = np.asarray(z, dtype=float)
+        places = numbers("z", z, "phi", "give m along the beam")
         outside = ~((places >= self.nodes[0]) & (places <= self.nodes[-1]))
         require(not np.any(outside), f"z must lie on the beam, 0 to {self.nodes[-1]} m",
                 places[outside].tolist(), "phi", "keep to the beam")  # fmt: skip

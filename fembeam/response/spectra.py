@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.support import require
+from fembeam.support import numbers, require
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -143,8 +143,8 @@ def floor_spectrum(
 
 def _checked_record(t: ArrayLike, acceleration: ArrayLike) -> tuple[float, Vector]:
     """The step and the samples."""
-    times, values = np.asarray(t, dtype=float), np.asarray(acceleration, dtype=float)
     where = "response_spectrum"
+    times, values = numbers("t", t, where, "give s"), numbers("acceleration", acceleration, where, "give m/s²")
     fits = times.ndim == 1 and times.shape == values.shape and times.size > 1
     require(fits, "t and acceleration must have one length of at least 2", (times.shape, values.shape), where,
             "give one sample for each time")  # fmt: skip
@@ -164,7 +164,7 @@ def checked_oscillators(omega: ArrayLike | None, periods: ArrayLike | None) -> V
     require((omega is None) != (periods is None), "give omega or periods, one of them", (omega, periods),
             "response_spectrum", "omega in rad/s, or periods in s")  # fmt: skip
     name, given = ("omega", omega) if periods is None else ("periods", periods)
-    values = np.atleast_1d(np.array(given, dtype=float))
+    values = np.atleast_1d(numbers(name, given, "response_spectrum", "give at least one"))
     valid = values.ndim == 1 and values.size > 0 and bool(np.all(np.isfinite(values) & (values > 0)))
     require(valid, f"{name} must be positive and finite", given, "response_spectrum", "give at least one")
     return values if periods is None else 2 * np.pi / values
@@ -172,7 +172,7 @@ def checked_oscillators(omega: ArrayLike | None, periods: ArrayLike | None) -> V
 
 def checked_damping(zeta: ArrayLike) -> Vector:
     """Damping ratios (d,)."""
-    values = np.atleast_1d(np.array(zeta, dtype=float))
+    values = np.atleast_1d(numbers("zeta", zeta, "response_spectrum", "give ratios such as 0.05"))
     valid = values.ndim == 1 and values.size > 0 and bool(np.all((values >= 0) & (values < 1)))
     require(valid, "zeta must be at least 0 and below 1", zeta, "response_spectrum", "give ratios such as 0.05")
     return values

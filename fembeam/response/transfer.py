@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.scene import signals_of, split, unit_of
 from fembeam.structures import COMPONENTS, turns
-from fembeam.support import is_finite, require
+from fembeam.support import is_finite, numbers, require
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -74,7 +74,7 @@ def frequency_response(
     slipping: bool = False,
 ) -> FrequencyResponse:
     """The response of a model without its contacts; `Model.frequency_response` explains it."""
-    shapes: Any = (model.shapes, *model.others)[body]
+    shapes = model.body_shapes(body, WHERE)
     output, driven = shapes.place(output), _named_input(model, driven)
     moved = isinstance(driven, str) and driven.split(".")[0] == "base"
     require(not absolute or moved, "absolute is for the input 'base'", driven, WHERE, "leave it out")
@@ -169,7 +169,7 @@ def _driving(model: Model, driven: Any) -> tuple[Vector, int, str, str]:
 
 def _checked(omega: ArrayLike, model: Model, slipping: bool) -> Vector:
     """Frequencies (k,) at which the system is not singular."""
-    values = np.atleast_1d(np.array(omega, dtype=float))
+    values = np.atleast_1d(numbers("omega", omega, WHERE, "give frequencies in rad/s"))
     valid = values.ndim == 1 and values.size > 0 and bool(np.all(np.isfinite(values) & (values >= 0)))
     require(valid, "omega must be at least 0 and finite, (k,)", omega, WHERE, "give frequencies in rad/s")
     C, K = _linear(model, slipping)

@@ -127,7 +127,7 @@ def summary(
     return {
         "status": run.status,
         "complete": run.complete,
-        "simulated_seconds": float(run.t[-1]) if len(run.t) else 0.0,
+        "simulated_seconds": run.reached,
         "discarded_seconds": discard,
         "wall_seconds": run.cost.seconds if seconds is None else seconds,
         "omega": plot.natural(run).tolist(),
@@ -189,7 +189,7 @@ def _confidence(run: Run, discard: float) -> str:
 def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:
     """Number, rate, means and maxima of every stop's contacts that ended."""
     log = run.contacts
-    span = max(float(run.t[-1]) - discard, 0.0) if len(run.t) else 0.0
+    span = max(run.reached - discard, 0.0)
     rows, parts = [], plot.batches(run, discard)
     for stop in np.flatnonzero(run.kinds[:, 1] == 0).tolist():
         kept = (log.stop == stop) & (log.t_in >= discard) & np.isfinite(log.t_out)

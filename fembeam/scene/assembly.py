@@ -331,6 +331,7 @@ def _check_buckling(scene: Scene) -> None:
 
 def buckling_load(scene: Scene, elements: int | None = None) -> float:
     """Lowest P of (K - P G) φ = 0 for the own beam, less its compression; `Scene.buckling_load` explains it."""
+    check_counts(elements, None)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         beam = replace(scene.beam, axial_force=0.0)

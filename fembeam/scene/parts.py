@@ -186,7 +186,7 @@ class LumpedMass(ScenePart):
 
 def _tensor(inertia: Any, where: str) -> tuple[tuple[float, ...], ...] | None:
     """The checked rows of an inertia tensor; None of what is none."""
-    rows = tuple(inertia) if isinstance(inertia, (list, tuple, np.ndarray)) else ()
+    rows = tuple(inertia) if isinstance(inertia, (list, tuple)) or np.ndim(inertia) else ()
     if not any(isinstance(row, (list, tuple, np.ndarray)) for row in rows):
         return None
     right = all(np.shape(row) == (3,) and all(is_finite(one) for one in row) for row in rows) and len(rows) == 3

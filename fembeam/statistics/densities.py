@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.statistics.batches import Estimate
-from fembeam.support import is_whole
+from fembeam.support import is_whole, numbers
 
 MOST_BINS = 200
 
@@ -129,10 +129,7 @@ def moments(samples: ArrayLike) -> Moments:
 
 def checked_samples(caller: str, samples: ArrayLike, fewest: int = 2) -> NDArray[np.float64]:
     """The samples as finite floats, or an error that names the first bad one."""
-    try:
-        values = np.asarray(samples, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError(f"{caller}: samples must be an array of numbers") from None
+    values = numbers("samples", samples, caller, "give an array of a signal's values")
     if values.size < fewest:
         raise ValueError(f"{caller} needs at least {fewest} samples, got {values.size}")
     if not np.isfinite(values).all():
@@ -154,7 +151,7 @@ def _edges(values: NDArray[np.float64], bins: int | ArrayLike) -> NDArray[np.flo
         if not is_whole(bins) or bins < 1:
             raise ValueError(f"pdf: bins must be a whole number of at least 1, or edges, got {bins!r}")
         return np.histogram_bin_edges(values, int(bins))
-    edges = np.asarray(bins, dtype=np.float64)
+    edges = numbers("edges of bins", bins, "pdf", "give rising values, or a count")
     if edges.ndim != 1 or edges.size < 2 or not np.all(np.diff(edges) > 0):
         raise ValueError("pdf: edges of bins must increase strictly and be at least 2")
     if not (edges[0] <= values.min() and values.max() <= edges[-1]):

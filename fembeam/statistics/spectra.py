@@ -122,7 +122,7 @@ def psd(x: ArrayLike, dt: float, segment: int | None = None, overlap: float = 0.
         raise ValueError(f"psd needs a signal of one dimension, got shape {samples.shape}")
     length = segment_length(samples.size, segment)
     rate = 1 / number("psd: dt (s)", dt, above=0.0)
-    if not 0 <= overlap < 1:
+    if not 0 <= number("psd: overlap", overlap) < 1:
         raise ValueError(f"psd: overlap must lie in [0, 1), got {overlap!r}")
     from scipy.signal import welch
 

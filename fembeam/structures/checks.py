@@ -44,8 +44,14 @@ def matrix(name: str, values: Any, where: str) -> sparse.csr_matrix:
 
 
 def real(name: str, values: Any, where: str) -> Any:
-    """Values without their imaginary parts; ValueError where there are any."""
-    if not np.iscomplexobj(values):
+    """Numbers without their imaginary parts; ValueError where there are any, or what is no number."""
+    given: Any = getattr(values, "data", None) if sparse.issparse(values) else values
+    try:
+        kind: str = np.asarray(given).dtype.kind
+    except ValueError:  # rows of unequal length
+        kind = "O"
+    require(kind in "iufc", f"{name} must be numbers", values, where, "give an array of them")
+    if kind != "c":
         return values
     turned = float(np.abs(np.imag(values.data if sparse.issparse(values) else values)).max(initial=0.0))
     require(turned == 0.0, f"{name} must be real; its largest imaginary part is", turned, where,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -76,6 +76,8 @@ class Frame:
         from fembeam.structures.frame_checks import check_frame, checked_nodes
 
         object.__setattr__(self, "nodes", checked_nodes(self.nodes))
+        listed = isinstance(self.members, Iterable) and not isinstance(self.members, (str, Mapping))
+        require(listed, "members must be a list", self.members, "Frame", "give [Member(a, b, section), …]")
         object.__setattr__(self, "members", tuple(self.members))
         require_finite("spin", self.spin, "Frame", "give rad/s")
         check_frame(self)

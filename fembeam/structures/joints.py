@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 
 from fembeam.structures.assembled import COMPONENTS, Assembled
-from fembeam.support import is_whole, require
+from fembeam.support import is_whole, require, require_place
 
 Vector = NDArray[np.float64]
 
@@ -70,6 +70,8 @@ class Joint:
             require(is_whole(number) and number >= 0, "bodies must be counted from 0, the first", number, "Joint",
                     "write to=(1, 'flange')")  # fmt: skip
         require(self.body != self.to[0], "a joint must join two bodies", self.to, "Joint", "name another body")
+        require_place(self.place, self)
+        require_place(self.to[1], self)
         object.__setattr__(self, "to", (int(self.to[0]), _tuples(self.to[1])))
         object.__setattr__(self, "place", _tuples(self.place))
         if self.dofs is not None:

@@ -72,7 +72,7 @@ def is_name(value: object) -> TypeGuard[str]:
         float(value)  # type: ignore[arg-type]
     except ValueError:
         return isinstance(value, str) and bool(value.strip())
-    except TypeError:
+    except (TypeError, OverflowError):  # the latter of a whole number beyond the floats
         return False
     return False
 
@@ -89,12 +89,6 @@ def require_place(z: Any, part: object) -> None:
     require_finite("z", z, type(part).__name__, "give the coordinate along the beam in m")
 
 
-def require_no_text(where: str, **values: object) -> None:
-    """Raise ValueError for an argument that is text where numbers are meant."""
-    for name, value in values.items():
-        require(not isinstance(value, str), f"{name} must not be text", value, where, "drop the quotes")
-
-
 def number(name: str, value: Any, above: float = -math.inf, least: float = -math.inf) -> float:
     """The value as a finite float above one bound and not below another, or a clear error."""
     try:
@@ -109,6 +103,16 @@ def number(name: str, value: Any, above: float = -math.inf, least: float = -math
         bound = f" above {above:g}" if above > -math.inf else f" of at least {least:g}"
         raise ValueError(f"{name} must be finite{bound if max(above, least) > -math.inf else ''}, got {value!r}")
     return result
+
+
+def numbers(name: str, values: Any, where: str, advice: str) -> NDArray[np.float64]:
+    """Real numbers of any shape as a new array of floats, nan and inf among them, or a clear error."""
+    try:
+        given = np.asarray(values)
+    except ValueError:  # rows of unequal length
+        given = np.asarray(None)
+    require(given.dtype.kind in "iuf", f"{name} must be real numbers", values, where, advice)
+    return given.astype(np.float64)
 
 
 def frozen(values: ArrayLike) -> NDArray[np.float64]:
