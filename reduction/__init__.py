@@ -7,7 +7,7 @@ Imports: numpy, scipy. Begin with `modal.modal_basis`.
 """
 
 from reduction.basis import AccuracyError, Basis, oriented
-from reduction.interface import craig_bampton, guyan, static_share, with_residual
+from reduction.interface import craig_bampton, guyan, static_shapes, static_share, with_residual
 from reduction.modal import modal_basis
 from reduction.truncation import below, carrying, fewest_modes, moved_mass
 from reduction.whirl import Whirl, critical_speeds, whirl
@@ -25,6 +25,7 @@ __all__ = [
     "modal_basis",
     "moved_mass",
     "oriented",
+    "static_shapes",
     "static_share",
     "whirl",
     "with_residual",

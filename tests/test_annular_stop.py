@@ -182,7 +182,7 @@ def test_tables_and_figures(run, tmp_path):
     with pytest.raises(ValueError, match="the window must hold at least 2 samples"):
         fb.plot.orbit_in_clearance(run, window=(3.0, 4.0))
     texts = [text.get_text() for text in run.model.scene.figure().axes[0].texts]
-    assert any("clearance 0.2 mm" in text.replace("\n", " ") for text in texts)
+    assert any("clearance 0.2 mm" in " ".join(text.split()) for text in texts)
     for draw in (fb.plot.time_history, fb.plot.densities, fb.plot.spectrum, fb.plot.contacts):
         assert draw(run).axes
     assert not _limits(run.model)  # of methods that do not take it

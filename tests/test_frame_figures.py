@@ -4,6 +4,7 @@ import meshio
 import numpy as np
 import pytest
 from frames import portal, space_l
+from mpl_toolkits.mplot3d import proj3d
 
 import fembeam as fb
 from contacts import KelvinVoigt
@@ -101,6 +102,25 @@ def test_rig_of_a_frame():
     for word in ("clamp at A", "hinge", "box, 2 kg", "stop at B- C + 0.7 m, -y, gap 1 mm"):
         assert word.replace("- ", "-") in texts.replace("- ", "-")
     assert "base motion along x" in axis.get_title(loc="left")
+
+
+def test_texts_of_a_rig_in_space_lie_apart():
+    """A shaft with stops close together: numbers at the places, and a list of all names beside the axes."""
+    law = KelvinVoigt(1e6, 50.0)
+    shaft = fb.Frame.straight(1.0, fb.Section.circle(2.1e11, 7850.0, 0.03))
+    stops = [fb.AnnularStop(z, law, clearance=1e-4) for z in (0.5, 0.8)]
+    stops += [fb.Stop("B", law, gap=1e-4, direction=way) for way in ("x", "-y")]
+    figure = fb.Scene(shaft, [fb.Clamped("A")], stops=stops).figure()
+    figure.draw_without_rendering()
+    *numbers, listed = figure.axes[0].texts
+    assert [text.get_text().strip() for text in numbers] == ["1", "2", "3", "4"]
+    for name in ("clamp at A", "annular stop at 0.8 m", "stop at B, x", "stop at B, -y, gap 0.1 mm"):
+        assert name in listed.get_text()
+    axis, box = figure.axes[0], listed.get_window_extent()
+    x, y, _ = proj3d.proj_transform(*np.transpose([text.get_position_3d() for text in numbers]), axis.get_proj())
+    at = axis.transData.transform(np.column_stack([x, y]))
+    assert np.linalg.norm(np.diff(at, axis=0), axis=1).min() > listed.get_fontsize()
+    assert at[:, 0].max() + 50.0 < box.x0 < box.x1 <= figure.bbox.x1
 
 
 def test_rigs_in_space_of_unknown_places_and_of_several_bodies():

@@ -106,3 +106,21 @@ def test_joints_balance():
     assert np.allclose(column[1], girder[0], atol=1e-6 * size[0])
     assert np.allclose(column[2], girder[2], atol=1e-6 * size[2])
     assert found.names == FORCES[:3]
+
+
+@pytest.mark.parametrize("space", [False, True])
+def test_a_thick_stub_at_the_end_of_a_rod_has_the_forces_of_statics(space):
+    """0.2 mm long: times its stiffness the rounding of displacements is 2e-3 of the load; stresses have none."""
+    rod, stub = (fb.Section.rectangle(2.1e11, 7850.0, side, side) for side in (0.01, 0.02))
+    points = {"A": (0, 0), "B": (1.5, 0), "C": (1.5002, 0), "D": (1.5002, 0.7)}
+    nodes = {name: (*at, 0) if space else at for name, at in points.items()}
+    frame = fb.Frame(nodes, [fb.Member("A", "B", rod), fb.Member("B", "C", stub), fb.Member("C", "D", rod)])
+    loads = {("D", "x"): 20.0, ("B", "y"): 30.0}
+    forces = [fb.PointForce(place, fb.Harmonic(size, 0.0), direction=way) for (place, way), size in loads.items()]
+    model = fb.Scene(frame, [fb.Clamped("A")], forces=forces).reduce(modes=4, residual=True)
+    run = model.simulate(1e-6, 1e-6, model.equilibrium(loads))
+    for place, wanted in ((("B-C", 1e-4), (20.0, 0.0, -14.0)), (("A-B", 0.5), (20.0, -30.0, 16.0))):
+        found = run.section_forces(place)
+        assert [found[name][0] for name in ("N", "Q", "M")] == pytest.approx(wanted, abs=1e-6)
+    reaction = run.reactions()[0]
+    assert [reaction[name][0] for name in ("x", "y", "rz")] == pytest.approx((-20.0, -30.0, -31.0), abs=3e-5)

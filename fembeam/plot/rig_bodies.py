@@ -32,6 +32,8 @@ REACH = 0.12  # of the body's size, length of springs and arrows
 BESIDE = 0.5  # of it, where what strikes stands
 RING = 0.4  # of that, radius of a circular clearance
 FREE = 0.03  # the same, between a place and the arrow of a stop
+LISTED = 32  # characters of a line in the list of what stands on a body in space
+SLIMMEST = 0.7  # of its longest side, what a box in space is wide at least, so that its axes can be read
 ZIGZAG = np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]) * 0.12  # of the length of a spring
 HEAD = np.array([[0.0, 0.0], [1.0, 0.0], [0.7, 0.12], [1.0, 0.0], [0.7, -0.12]])  # an arrow of length 1
 
@@ -115,8 +117,21 @@ class _Panel:
         self._texts(axis, words)
         self._finish(axis)
 
+    def _listed(self, axis: Any, words: dict[str, list[str]]) -> None:
+        """A number at each place of a body in space, where texts would lie on each other, and what stands there."""
+        lines = []
+        for number, (key, texts) in enumerate(words.items(), 1):
+            axis.text(*self.places[key], f" {number}", fontsize=8, weight="bold", va="bottom")
+            wrapped = [line for text in texts for line in textwrap.wrap(text, LISTED)]
+            lines += [f"{number if i == 0 else '':<2} {line}" for i, line in enumerate(wrapped)]
+        size = min(7.0, 300.0 / max(len(lines), 1))  # points: what the height of a panel takes
+        axis.text2D(1.1, 0.95, "\n".join(lines), transform=axis.transAxes, fontsize=size, va="top", parse_math=False,
+                    family="monospace")  # fmt: skip
+
     def _texts(self, axis: Any, words: dict[str, list[str]]) -> None:
         """One text for each place, above it, or below where another one is near."""
+        if self.space:
+            return self._listed(axis, words)
         above: list[Vector] = []
         for key, texts in words.items():
             at = self.places[key]
@@ -125,7 +140,8 @@ class _Panel:
             shift, va = REACH * self.size * np.array([0.15, 0.3, 0.0]), "bottom" if free else "top"
             at = at + shift * (1.0, 1.0 if free else -1.0, 1.0)
             lines = [line for text in texts for line in textwrap.wrap(text, WIDE)]
-            axis.text(*at[: 3 if self.space else 2], "\n".join(lines), fontsize=7, va=va, parse_math=False)
+            axis.text(*at[:2], "\n".join(lines), fontsize=7, va=va, parse_math=False)
+        return None
 
     def _parts(self, axis: Any) -> Any:
         """Draw every part; yields it with its label."""
@@ -230,7 +246,8 @@ class _Panel:
             size = ", ".join(f"{g:.4g}" for g in np.atleast_1d(np.asarray(scene.gravity, dtype=float)))
             words.append(f"gravity ({size}) m/s²" if "," in size else f"gravity {size} m/s²")
         words += ["places are not known: nodes in a row"] if self.row else []
-        axis.set_title("; ".join([*([f"body {self.number}"] if self.number else []), *words]), fontsize=8)
+        title = "; ".join([*([f"body {self.number}"] if self.number else []), *words])
+        axis.set_title("\n".join(textwrap.wrap(title, 90)), fontsize=8)
         axis.margins(0.25)
         if self.row:
             axis.set_aspect("equal", adjustable="datalim")
@@ -240,6 +257,9 @@ class _Panel:
         axis.set_ylabel("y / m")
         axis.locator_params(nbins=5)
         if self.space:
+            limits = np.array([axis.get_xlim(), axis.get_ylim(), axis.get_zlim()])
+            half = np.maximum(np.ptp(limits, axis=1), SLIMMEST * np.ptp(limits, axis=1).max()) / 2
+            axis.set(**{f"{c}lim": (m - h, m + h) for c, m, h in zip("xyz", limits.mean(axis=1), half, strict=True)})
             axis.set_aspect("equal")
             axis.set_zlabel("z / m")
         else:

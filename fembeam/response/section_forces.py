@@ -24,7 +24,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+import reduction
 from fembeam.beams import Beam, element_matrices, joining, on_beam
+from fembeam.response.body_reactions import balanced, rigid_shapes, static_solver
 from fembeam.scene import BodyMatrices, carried_on, loaded
 from fembeam.structures import FrameForces, JoinedForces
 from fembeam.support import require
@@ -97,30 +99,61 @@ def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | Fram
     rows = sparse.vstack([sparse.csr_matrix((0, beam.M.shape[0])), *(at.row(beam) for at in loaded(model.scene, body))])
     if beam.coupling is not None:
         rows = sparse.vstack([rows, beam.coupling[::3]])
-    inertia = _everywhere(beam, _inertia(beam, vectors, model.omega, rows.toarray().T))
-    moved = np.hstack([_everywhere(beam, vectors), carried_on(model.scene, beam, body)])
+    inertia, load = _inertia(beam, vectors, model.omega, rows.toarray().T)
+    inertia = _everywhere(beam, inertia)
+    carried = carried_on(model.scene, beam, body)
+    moved = np.hstack([_everywhere(beam, vectors), carried])
     # less the inertia of the shapes which follow supports: they have none
     inertia = np.hstack([inertia, -inertia @ model.following.T])
     if isinstance(beam, BodyMatrices):
         made: Any = beam.assembled
-        forces: FrameForces | JoinedForces | None = made.section_forces(moved, inertia)
+        stresses = _stresses(beam, vectors, load, carried)
+        forces: FrameForces | JoinedForces | None = made.section_forces(moved, inertia, stresses)
         return forces
     return _of_vectors(beam, moved, inertia)
 
 
-def _inertia(beam: Matrices, vectors: Vector, omega: Vector, rows: Vector) -> Vector:
-    """The inertia a (N, n) with K v = M a + point loads along rows (N, m), where static shapes are loaded."""
+def _inertia(beam: Matrices, vectors: Vector, omega: Vector, rows: Vector) -> tuple[Vector, Vector]:
+    """The inertia a (N, n) with K v = M a + point loads along rows (N, m), where static shapes are loaded, and K v.
+
+    Loads are fitted to the shapes that they make where K = RᵀR, else to K v, which has the rounding of K.
+    """
     a = vectors * omega**2
     load = beam.K @ vectors
     left = np.linalg.norm(load - beam.M @ a, axis=0)
     others = left > BALANCED * np.linalg.norm(load, axis=0)
-    if np.any(others):  # static shapes, orthogonal to modes or not: point loads beside inertia of the basis
-        terms = np.hstack([beam.M @ vectors, rows])
-        size = np.linalg.norm(terms, axis=0)
-        scale = np.where(size > 0, size, 1.0)
-        found = np.linalg.lstsq(terms / scale, load[:, others], rcond=1e-12)[0] / scale[:, None]
-        a[:, others] = vectors @ found[: vectors.shape[1]]
-    return a
+    if not np.any(others):
+        return a, beam.M @ a
+    # static shapes, orthogonal to modes or not: point loads beside inertia of the basis
+    rooted = isinstance(beam, BodyMatrices) and beam.root is not None
+    basis, rigid = (vectors[:, omega > 0.0], rigid_shapes(beam)) if rooted else (vectors, vectors[:, :0])  # type: ignore[arg-type]
+    terms = np.hstack([beam.M @ basis, rows])
+    if rooted:
+        shapes = reduction.static_shapes(beam.M, beam.K, terms, rigid, beam.root)
+        found = _fitted(shapes, vectors[:, others], 1e-14)
+    else:
+        found = _fitted(terms, load[:, others], 1e-12)
+    acting, carried = beam.M @ a, rigid @ (rigid.T @ (terms @ found))  # what loads accelerate the whole by
+    a[:, others] = basis @ found[: basis.shape[1]] - carried
+    acting[:, others] = terms @ found - beam.M @ carried
+    return a, acting
+
+
+def _fitted(terms: Vector, given: Vector, least: float) -> Vector:
+    """Least squares (m, n): terms (N, m) that make up the given ones (N, n); what they share to `least` is one."""
+    size = np.linalg.norm(terms, axis=0)
+    scale = np.where(size > 0, size, 1.0)
+    return np.asarray(np.linalg.lstsq(terms / scale, given, rcond=least)[0] / scale[:, None])
+
+
+def _stresses(beam: BodyMatrices, vectors: Vector, load: Vector, carried: Vector) -> Vector | None:
+    """R v (k, n + c) of a body with K = RᵀR, balanced with the load (N, n) on the first n; None where K has no R."""
+    own = beam.assembled.root
+    if beam.root is None or own is None:
+        return None
+    solve = static_solver(beam.K, beam.M, rigid_shapes(beam))
+    found = balanced(beam.root, solve, load, beam.root @ vectors)
+    return np.hstack([found[: own.shape[0]], own @ carried])
 
 
 def _of_vectors(beam: Matrices, vectors: Vector, inertia: Vector) -> SectionForces:

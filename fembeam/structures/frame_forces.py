@@ -117,15 +117,20 @@ class FrameForces:
         return member, end * float(frame.lengths[member])
 
 
-def frame_forces(made: FrameMatrices, vectors: Vector, inertia: Vector) -> FrameForces:
+def frame_forces(made: FrameMatrices, vectors: Vector, inertia: Vector, stresses: Vector | None = None) -> FrameForces:
     """Section forces of displacements (N, n) and of the inertia (N, n) that their stiffness balances, on all dofs.
 
+    `stresses` R v (k, n), K = RᵀR, are taken in place of those of the displacements, where they are known better.
     The preload of members is apart from N; with spin, gyroscopic moments are left out.
     """
     elements = made.mesh.elements
     u, a = elements.join @ vectors, elements.join @ inertia
     P = inertia_root(elements)
-    forces = sum(sign * (R.T @ (R @ u)) for sign, R in stiffness_parts(elements)) - P.T @ (P @ a)
+    parts = stiffness_parts(elements)
+    if stresses is None:
+        forces = sum(sign * (R.T @ (R @ u)) for sign, R in parts) - P.T @ (P @ a)
+    else:
+        forces = parts[0][1].T @ stresses - P.T @ (P @ a)
     (push, turn), (shift, tilt) = (_at_ends(values, vectors.shape[1]) for values in (forces, a))
     side, p = np.array([-1.0, 1.0])[None, :, None], elements.properties
 

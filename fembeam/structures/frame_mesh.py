@@ -207,9 +207,9 @@ class FrameMatrices(Assembled):
                 [one.name for one in self.mesh.frame.members if one.release], where,
                 "release less, or support it there")  # fmt: skip
 
-    def section_forces(self, vectors: Vector, inertia: Vector) -> FrameForces:
+    def section_forces(self, vectors: Vector, inertia: Vector, stresses: Vector | None = None) -> FrameForces:
         """Section forces of displacements (N, n) and of the inertia (N, n) that their stiffness balances."""
-        return frame_forces(self, vectors, inertia)
+        return frame_forces(self, vectors, inertia, stresses)
 
 
 def assemble(

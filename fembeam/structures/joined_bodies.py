@@ -290,13 +290,15 @@ class JoinedMatrices(Assembled):
             if isinstance(one, (FrameMatrices, JoinedMatrices)) and moving:
                 one.check_mechanism(mine, where)
 
-    def section_forces(self, vectors: Vector, inertia: Vector) -> JoinedForces | None:
+    def section_forces(self, vectors: Vector, inertia: Vector, stresses: Vector | None = None) -> JoinedForces | None:
         """Section forces of the frames among the bodies; None if there are none."""
         found: dict[int, Any] = {}
+        rows = np.cumsum([0, *(0 if one.root is None else one.root.shape[0] for one in self.made)])
         for number, one in enumerate(self.made):
             if isinstance(one, (FrameMatrices, JoinedMatrices)):
                 T = self.of_body(number)
-                forces = one.section_forces(np.asarray(T @ vectors), np.asarray(T @ inertia))
+                mine = None if stresses is None else stresses[rows[number] : rows[number + 1]]
+                forces = one.section_forces(np.asarray(T @ vectors), np.asarray(T @ inertia), mine)
                 found |= {} if forces is None else {number: forces}
         return JoinedForces(self.body, found) if found else None
 
