@@ -292,9 +292,9 @@ def _enough(scene: Scene, elements: int | None, omega_max: float | None, mass_sh
     raise ValueError(f"{goal} must be reached by {MOST_TRIED} modes in Scene.reduce, got less; lower it, or give modes")
 
 
-def _carrying(basis: reduction.Basis, beam: Matrices, load: Any, share: float) -> int | None:
+def _carrying(basis: reduction.Basis, beam: Matrices, way: str, share: float) -> int | None:
     """How many modes carry a share of the mass that a motion of the frame moves; 1 if it moves none."""
-    mass = reduction.moved_mass(beam.M, load)
+    mass, load = beam.moved_masses[way], beam.base_loads[way]
     return reduction.carrying(share, load, mass)(basis) if mass > 0.0 or not beam.named else 1
 
 
@@ -305,7 +305,7 @@ def _enough_of(beam: Matrices, tried: int, omega_max: float | None, mass_share: 
     if omega_max is not None:
         enough = reduction.below(omega_max)
     else:
-        counts = [_carrying(basis, beam, load, float(mass_share or 0.0)) for load in beam.base_loads.values()]
+        counts = [_carrying(basis, beam, way, float(mass_share or 0.0)) for way in beam.base_loads]
         return None if None in counts and tried < beam.M.shape[0] else max((c or tried for c in counts), default=1)
     count = enough(basis)
     if count is None and tried == beam.M.shape[0]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -78,6 +78,7 @@ class Matrices:
     impactors : of all bodies, one dof each, the last ones.
     carried : (N_all, k) what the k dofs of supports that move carry along by themselves, on all dofs; None: none moves.
     coupling : (3 k, N): for each of these dofs the loads of its displacement, speed and acceleration.
+    limit : {direction: kg}, the mass that a motion of the frame moves in the limit of fine meshes; {}: that of M.
     """
 
     beam: Any
@@ -96,12 +97,23 @@ class Matrices:
     impactors: tuple[Impactor, ...] = ()
     carried: sparse.csr_matrix | None = None
     coupling: sparse.csr_matrix | None = None
+    limit: dict[str, float] = field(default_factory=dict)
     named = False  # whether its places have names and directions, see `BodyMatrices`
 
     @property
     def base_loads(self) -> dict[str, Vector]:
         """The load (N,) of every direction in which the frame may move: of a beam "y" alone."""
         return {"y": self.base_load}
+
+    @property
+    def moved_masses(self) -> dict[str, float]:
+        """The mass (kg) that a motion of the frame moves in every direction: the sum of all effective masses."""
+        if not self.bodies:
+            return {way: self.limit.get(way) or reduction.moved_mass(self.M, b) for way, b in self.base_loads.items()}
+        each = [body.moved_masses for body in self.bodies]
+        beside = [{way: one.mass * one.along[COMPONENTS.index(way)] ** 2 for way in COMPONENTS[:3]}
+                  for one in self.impactors]  # fmt: skip
+        return {way: sum(part.get(way, 0.0) for part in (*each, *beside)) for way in self.base_loads}
 
     @cached_property
     def C(self) -> sparse.csr_matrix:
@@ -368,8 +380,10 @@ def _on_nodes(scene: Scene, nodes: Vector, modes: int | None) -> Matrices:
         root = (sparse.vstack([root, springs], format="csr") if springs.shape[0] else root)[:, free]
 
     r = np.tile([1.0, 0.0], len(nodes))
+    limit = {} if modes is None else {"y": float(r @ (M @ r)) + moved_by_rows(arms, free, r)}
     M, K, C = (A.tocsr()[free][:, free] for A in (M_all, K_all, C_all))
-    found = Matrices(scene.beam, M, K, root, C, scene.damping, r[free], (M_all @ r)[free], nodes, dofs, modes)
+    found = Matrices(scene.beam, M, K, root, C, scene.damping, r[free], (M_all @ r)[free], nodes, dofs, modes,
+                     limit=limit)  # fmt: skip
     carried = _carried(scene, nodes)
     if carried is None:
         return found
@@ -415,6 +429,24 @@ def _lumped(nodes: Vector, items: Sequence[tuple[Any, ...]]) -> sparse.csr_matri
     u, slope = hermite_rows(nodes, z, 0), hermite_rows(nodes, z, 1)
     arm = sparse.diags(np.sqrt(a)) @ (u + sparse.diags(e) @ slope)
     return sparse.vstack([arm, sparse.diags(np.sqrt(b)) @ slope], format="csr")
+
+
+def moved_by_rows(arms: sparse.csr_matrix, free: Any, r: Vector) -> float:
+    """What rigid bodies add to the moved mass in the limit of fine meshes, kg: bᵀ(AᵀA)⁺b, b = AᵀA r on the free dofs.
+
+    There the beam's own mass is ρA l, whatever holds it: what a support keeps at rest is a part of one element.
+
+    Parameters
+    ----------
+    arms : A (k, N_all), AᵀA their mass matrix. free : numbers of the free dofs. r : (N_all,), 1 on translations.
+    """
+    columns = arms.tocsc()[:, free]
+    touched = columns[:, np.flatnonzero(np.diff(columns.indptr))].toarray()
+    if not touched.size:
+        return 0.0
+    touched = touched / np.linalg.norm(touched, axis=0)
+    moved = touched @ np.linalg.lstsq(touched, arms @ r)[0]
+    return float(moved @ moved)
 
 
 def borders_of(scene: Scene, probes: Sequence[float]) -> Vector:

@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 import reduction
-from fembeam.scene.assembly import DEFAULT_MODES, UNIT, Matrices, Vector, moving
+from fembeam.scene.assembly import DEFAULT_MODES, UNIT, Matrices, Vector, moved_by_rows, moving
 from fembeam.scene.places import place_words, told
 from fembeam.scene.rotors import Disk, gyroscopic, turned
 from fembeam.scene.signals import support_motion
-from fembeam.structures import COMPONENTS, Assembled, Six, check_buckling, following
+from fembeam.structures import COMPONENTS, Assembled, Frame, Six, check_buckling, following
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -118,6 +118,8 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
     held = _held(scene, assembled)
     require(len(held) < assembled.M.shape[0], "supports must leave dofs free", len(held), "Scene", "remove one")
     found = _of(scene, assembled, modes, held, condense=True)
+    if elements is None and isinstance(scene.beam, Frame):
+        found = replace(found, limit=_limit(scene, found))
     moved = [_dof(scene, assembled, support, dof) for support in scene.supports for dof in support_motion(support)]
     if moved:
         require(not found.massless, "a support that moves needs mass on all dofs", found.massless[:3], "Scene",
@@ -128,6 +130,17 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
     _warn_of_massless(scene, found)
     _check_moving(scene, found)
     return found
+
+
+def _limit(scene: Scene, matrices: BodyMatrices) -> dict[str, float]:
+    """The mass that a motion of the frame moves in each direction in the limit of fine meshes, kg."""
+    assembled, masses = matrices.assembled, _masses(scene, matrices.assembled)
+    free = np.unique(matrices.spread.tocoo().row)
+    body = np.diag(assembled.translations.T @ (assembled.M @ assembled.translations))
+    return {
+        way: float(own) + moved_by_rows(masses, free, r)
+        for way, own, r in zip(matrices.along, body, assembled.translations.T, strict=True)
+    }
 
 
 def _dof(scene: Scene, assembled: Assembled, support: Any, component: str) -> int:
@@ -236,11 +249,17 @@ def _with_parts(scene: Scene, assembled: Assembled) -> tuple[Any, Any, Any, Any]
     size = assembled.M.shape[0]
     C = sparse.csr_matrix((size, size)) if assembled.C is None else assembled.C
     springs = _strengthened(scene, assembled, [(s, s.stiffness) for s in scene.springs])
-    masses = sparse.vstack([sparse.csr_matrix((0, size)), *(_arms(assembled, scene, m) for m in scene.masses)])
+    masses = _masses(scene, assembled)
     root = assembled.root
     root = None if root is None else sparse.vstack([root, springs], format="csr")
     M = (assembled.M + masses.T @ masses).tocsr()
     return M, (assembled.K + springs.T @ springs).tocsr(), (C + _dashpots(scene, assembled)).tocsr(), root
+
+
+def _masses(scene: Scene, assembled: Assembled) -> sparse.csr_matrix:
+    """Rows A of all rigid bodies, AᵀA their mass matrix (N_all, N_all)."""
+    none = sparse.csr_matrix((0, assembled.M.shape[0]))
+    return sparse.vstack([none, *(_arms(assembled, scene, mass) for mass in scene.masses)], format="csr")
 
 
 def _dashpots(scene: Scene, assembled: Assembled) -> sparse.csr_matrix:
