@@ -297,3 +297,20 @@ def test_copies_of_a_used_system_know_no_address_of_it():
     for other in (copy.copy(system), copy.deepcopy(system), pickle.loads(pickle.dumps(system))):
         assert not other.kept
         np.testing.assert_array_equal(solvers.integrate(other, [0.0], [-1.0], 0.1).q, here.q)
+
+
+@pytest.mark.parametrize("value", ["9.81", None, True, [1.0, 2.0], 1j])
+def test_what_is_no_number_is_refused_by_name(value):
+    system = System.modal([2.0], [0.0])
+    for call, what in (
+        (lambda: Contact([1.0], LAW, gap=value), "gap of a Contact"),
+        (lambda: solvers.Friction(value, 1e5), "mu of Friction"),
+        (lambda: solvers.integrate(system, [1.0], [0.0], value), "duration"),
+    ):
+        with pytest.raises(TypeError, match=f"{what} must be a number, got"):
+            call()
+
+
+def test_a_whole_number_beyond_the_floats_is_not_finite():
+    with pytest.raises(ValueError, match="mu of Friction must be finite"):
+        solvers.Friction(10**400, 1e5)

@@ -82,17 +82,18 @@ class Beam:
     @classmethod
     def of_spans(cls, spans: Sequence[Span], foundation: float = 0.0, axial_force: float = 0.0) -> Beam:
         """A beam of several spans [(length, section), …], rigidly joined, from z = 0 on."""
-        listed = isinstance(spans, (list, tuple))
-        paired = listed and all(isinstance(one, (list, tuple)) and len(one) == 2 for one in spans)
-        require(paired, "spans must be pairs", spans, "Beam.of_spans", "give [(length, section), …]")
-        spans = tuple((length, section) for length, section in spans)
-        require(len(spans) > 0, "spans must not be empty", spans, "Beam.of_spans", "give (length, section) pairs")
-        for index, (length, _) in enumerate(spans):
+        try:
+            parts = tuple((length, section) for length, section in spans)
+        except (TypeError, ValueError):
+            parts = ()
+        require(len(parts) > 0, "spans must be pairs, one at least", spans, "Beam.of_spans",
+                "give [(length, section), …]")  # fmt: skip
+        for index, (length, _) in enumerate(parts):
             require_positive(f"length of span {index}", length, "Beam.of_spans", "give the length in m")
-        single = spans[0][1] if len(spans) == 1 else None
-        total = sum(length for length, _ in spans)
+        single = parts[0][1] if len(parts) == 1 else None
+        total = sum(length for length, _ in parts)
         total = max(total, float(f"{total:.15g}"))  # 0.7 + 0.1 is 0.7999999999999999, and 0.8 lies on the beam
-        return cls(total, single, spans, foundation, axial_force)
+        return cls(total, single, parts, foundation, axial_force)
 
     @classmethod
     def from_mesh(cls, path: str | os.PathLike[str], sections: Mapping[Any, Section | Taper], **options: Any) -> Beam:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.problem.matrices import Array
+from solvers.problem.matrices import Array, number
 
 (MU, STIFFNESS, ARM, SPIN, CODE, SLIDER, PEAK, BEGUN, CUT, SCRATCH) = range(10)
 """Places of a contact's friction behind its law's parameters: μ; k_t, N/m; R, m, negative where the place runs around a
@@ -60,14 +60,11 @@ class Friction:
             value: Any = getattr(self, name)
             if name == "stiffness" and value is None:
                 raise ValueError("Friction needs stiffness > 0, the tangential one of the contact (N/m)")
-            try:
-                number = float(value)
-            except (TypeError, ValueError):
-                raise TypeError(f"{name} of Friction must be a number, got {value!r}") from None
+            found = number(value, f"{name} of Friction")
             least = ">= 0" if name == "mu" else "> 0 (N/m)"
-            if not math.isfinite(number) or number < 0.0 or (name == "stiffness" and number == 0.0):
+            if not math.isfinite(found) or found < 0.0 or (name == "stiffness" and found == 0.0):
                 raise ValueError(f"{name} of Friction must be finite and {least}, got {value!r}")
-            object.__setattr__(self, name, number)
+            object.__setattr__(self, name, found)
 
 
 class Rubbing:

@@ -1,4 +1,4 @@
-"""Dense and sparse matrices alike: products, checks."""
+"""Numbers, and dense and sparse matrices alike: products, checks."""
 
 from __future__ import annotations
 
@@ -10,6 +10,18 @@ from numpy.typing import NDArray
 
 _ONE_THREAD = 200_000  # multiplications below which BLAS stays on one thread
 Array = NDArray[np.float64]
+
+
+def number(value: Any, what: str) -> float:
+    """A real number as a float, nan and inf among them, or a clear error."""
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
+        raise TypeError(f"{what} must be a number, got {value!r}; give SI units")
+    try:
+        return float(value)
+    except OverflowError:  # a whole number beyond the floats
+        return math.inf
 
 
 def product(rows: Array, matrix: Any) -> Array:

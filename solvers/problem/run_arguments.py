@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.problem import Array, Contact, Parameter, System
+from solvers.problem.matrices import number
 
 _MOST_SAMPLES = 500_000_000
 _SHORTEST = 1e-50  # s, of a run: derivatives of sampled loads are fifth powers of parts of it
@@ -107,6 +108,7 @@ def _joined(n: int, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
 
 def output_times(duration: float, dt: Any) -> Array | None:
     """Output times of a sampling, or those given; None for none."""
+    duration = number(duration, "duration")
     if not 0.0 < duration < math.inf:
         raise ValueError(f"duration must be positive and finite (s), got {duration!r}")
     if duration < _SHORTEST:
@@ -118,6 +120,7 @@ def output_times(duration: float, dt: Any) -> Array | None:
         return None
     if np.ndim(dt) > 0:
         return _given_times(duration, dt)
+    dt = number(dt, "dt")
     if not 0.0 < dt < math.inf:
         raise ValueError(f"dt must be positive and finite (s), got {dt!r}")
     if dt > duration * (1.0 + 1e-12):

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 from solvers.problem.decoupling import Blocks, decouple
 from solvers.problem.friction import Friction, Rubbing, row_of
-from solvers.problem.matrices import Array, check_mass, dense, product, square_matrix
+from solvers.problem.matrices import Array, check_mass, dense, number, product, square_matrix
 from solvers.problem.memo import Memo
 
 
@@ -132,19 +132,19 @@ class Contact:
         direction = np.array(self.direction, dtype=float, ndmin=1)
         if isinstance(self.law, Rubbing):  # of a contact that this one is made of
             object.__setattr__(self, "law", self.law.law)
+        object.__setattr__(self, "gap", number(self.gap, "gap of a Contact"))
         self._check_map(direction)
         if getattr(self.law, "memory", ()) and getattr(self.law, "one_sided", False):
             object.__setattr__(self, "always", True)  # its law itself says where it is open
         elif getattr(self.law, "memory", ()) and not self.always:
             raise ValueError(f"{self.law!r} has a memory and acts at both signs of delta: give always=True")
-        if not np.isfinite(self.gap):
+        if not math.isfinite(self.gap):
             raise ValueError(f"gap must be finite, got {self.gap!r}; use no Contact at all for a stop out of reach")
         if not hasattr(self.law, "entry_rate_floor") or isinstance(self.law, type):
             hint = "decorate the function with @law and call it" if callable(self.law) else "use one of contacts"
             raise TypeError(f"law of a Contact must be a contact law, got {self.law!r}; {hint}")
         direction.setflags(write=False)
         object.__setattr__(self, "direction", direction)
-        object.__setattr__(self, "gap", float(self.gap))
         self._check_friction(direction)
 
     def _check_map(self, direction: Array) -> None:
