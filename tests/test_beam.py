@@ -69,7 +69,7 @@ def test_beam_rejects_lengths(bad):
 
 
 def test_beam_rejects_sections():
-    with pytest.raises(ValueError, match="spans must (not be empty|be pairs)"):
+    with pytest.raises(ValueError, match="spans must be pairs, one at least"):
         Beam.of_spans([])
     with pytest.raises(TypeError, match="section of span 0 must be a Section"):
         Beam(1.0, 3.0)
