@@ -64,8 +64,7 @@ rolled = {n: response(fb.BandNoise.rolled_off(2.5e-4, broad, 300.0, seed=3), n)[
 filtered = fb.BandNoise.of_psd(fb.RollOff(1e-9, 300.0), narrow["harmonic"], seed=4)  # 18-22
 coloured, half = {n: response(filtered, n)["δ"] for n in (1, 2)}, response(replace(filtered, band=narrow["1/2"]))["δ"]
 parts, wide = ([0, 300, 600, 900, 0], [300, 600, 900, 1200, np.inf]), (0.6, 1.15) if quick else (0.7, 1.0)
-high = (1.2, 2.4) if quick else (1.5, 2.0)  # the error of a quick run is at most 0.06
-for name, x, least, most in (("broad", rolled, *wide), ("harmonic", coloured, *high)):
+for name, x, least, most in (("broad", rolled, *wide), ("harmonic", coloured, *((1.2, 2.4) if quick else (1.5, 2.0)))):
     claim(f"{name}: one mode over two", [least, 0.0], [most, 0.3], *(x[n].power([0, 750], [300, 810]) for n in (1, 2)))
 claim("three modes over two", wide[0], np.maximum([1.1] * 4 + [1], wide[1]), *(rolled[n].power(*parts) for n in (3, 2)))
 claim("variance of 1/2 over harmonic, rolled off", 1.0, 2.0, half.variance, coloured[2].variance)
