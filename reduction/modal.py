@@ -29,6 +29,7 @@ MOST_RAISED = 8  # times by ten
 ELASTIC = 1e3  # of that shift, above which ω² is not that of a rigid-body mode
 RIGID = 1e-7  # of max √(K_ii/M_ii): rounding of K, a few √eps, hides lower frequencies
 RIGID_WITH_ROOT = 1e-12  # same, when R is given: rounding stays below 4e-14 up to 2000 elements
+ROUNDED, GAP = 10.0, 1e6  # times that: rounding of superelements reaches 1.2e-12; no elastic mode within the gap behind
 FINE = 1000  # free dofs, above which more vectors than wanted are corrected
 GUARDS = 6  # so many further: two vectors alone do not settle on 5000 elements, eight do
 SETTLED = 1e-9  # relative change of the frequencies by the last correction
@@ -180,8 +181,8 @@ def _with_root(
     if not mismatch <= SYMMETRY_TOLERANCE * abs(K).max():
         raise ValueError(f"root must satisfy rootᵀ root = K, got a difference of {mismatch} in modal_basis; fix it")
     solve: Callable[[Vector], Vector] = sparse_linalg.splu((K + shift * M).tocsc()).solve
-    rigid = RIGID_WITH_ROOT * _scale(M, K)
     omega, vectors = _ritz(M, R, vectors)
+    rigid = _rigid_with_root(omega, _scale(M, K))
     change, turn, before, corrections = np.inf, np.inf, np.inf, 0
     while not (change <= SETTLED and (turn <= SHAPED or turn > STALLED * before)):
         if corrections == MOST_CORRECTIONS:
@@ -197,6 +198,13 @@ def _with_root(
     return Basis(vectors, np.where(omega <= rigid, 0.0, omega))
 
 
+def _rigid_with_root(omega: Vector, scale: float) -> float:
+    """The frequency up to which modes are rigid-body motions: what rounding of R makes of zero; omega ascends."""
+    limit = RIGID_WITH_ROOT * scale
+    elastic = omega[omega > ROUNDED * limit]
+    return ROUNDED * limit if elastic.size and elastic[0] > GAP * limit else limit
+
+
 def _largest(part: Vector, omega: Vector, rigid: float) -> float:
     """The largest part of an elastic mode's frequency."""
     return float(np.max(np.where(omega > rigid, part / np.maximum(omega, rigid), 0.0)))
@@ -207,11 +215,11 @@ def ritz(M: Matrix, K: Matrix, root: Matrix | None, vectors: Vector) -> tuple[Ve
     unit = vectors / np.sqrt(np.sum(vectors * (M @ vectors), axis=0))
     if root is None:
         values, rotation = linalg.eigh(unit.T @ (K @ unit), unit.T @ (M @ unit))
-        omega, vectors, rigid = np.sqrt(np.maximum(values, 0.0)), unit @ rotation, RIGID
+        omega, vectors = np.sqrt(np.maximum(values, 0.0)), unit @ rotation
     else:
         omega, vectors = _ritz(M, sparse.csr_matrix(root), unit)
-        rigid = RIGID_WITH_ROOT
-    return np.where(omega <= rigid * _scale(M, K), 0.0, omega), vectors
+        return np.where(omega <= _rigid_with_root(omega, _scale(M, K)), 0.0, omega), vectors
+    return np.where(omega <= RIGID * _scale(M, K), 0.0, omega), vectors
 
 
 def _ritz(M: sparse.csc_matrix, R: sparse.csr_matrix, vectors: Vector) -> tuple[Vector, Vector]:

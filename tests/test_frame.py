@@ -38,7 +38,8 @@ def test_rows_between_nodes(place, seed):
     found = [
         made.rows(("B-C", place)) @ static(made, load, "A") for made, load in zip((whole, split), loads, strict=True)
     ]
-    assert np.allclose(found[0], found[1], rtol=0, atol=1e-11 * np.abs(found[1]).max())
+    # rounding of u: eps times the condition 5e5 of K scaled to a diagonal of 1
+    assert np.allclose(found[0], found[1], rtol=0, atol=1.2e-10 * np.abs(found[1]).max())
     unit = split.rows(("B-C", place))
     assert unit.nnz == 6
     assert np.all(unit.data == 1.0)

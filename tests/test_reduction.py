@@ -178,3 +178,20 @@ def test_basis_rejects_shapes():
         reduction.Basis(np.eye(3), np.ones(2))
     with pytest.raises(ValueError, match="omega of a Basis must be finite, got nan"):
         reduction.Basis(np.eye(2), np.array([1.0, np.nan]))
+
+
+@pytest.mark.parametrize(("stretch", "rigid"), [(3e-12, True), (3e-11, False)])
+def test_rounding_of_a_root_is_no_frequency(stretch, rigid):
+    """A free chain whose root has a rounding of rigid motion, as those of superelements have: 1e-11 of the scale."""
+    size = 80
+    root = np.vstack([np.diff(np.eye(size), axis=0), np.full((1, size), stretch * np.sqrt(2.0 / size))])
+    found = reduction.modal_basis(np.eye(size), root.T @ root, count=3, root=root).omega
+    exact = 2.0 * np.sin(0.5 * np.pi * np.arange(3) / size)
+    np.testing.assert_allclose(found[1:], exact[1:], rtol=1e-9)
+    assert (found[0] == 0.0) == rigid
+
+
+def test_a_slow_mode_with_no_gap_behind_it_is_elastic():
+    omega = np.array([3e-12, 1e-7, 1.0])
+    found = reduction.modal_basis(np.eye(3), np.diag(omega**2), count=2, root=np.diag(omega)).omega
+    np.testing.assert_allclose(found, omega[:2], rtol=1e-9)
