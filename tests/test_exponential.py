@@ -342,6 +342,19 @@ def test_cost_of_the_papers_scene_does_not_creep(n, steps, calls):
     assert cost.law_calls <= 1.3 * calls
 
 
+def test_a_pulse_on_a_stop_at_rest_takes_few_steps():
+    """A step across the onset sees the turn of δ̇ at its very beginning; the next ones must not creep up to that."""
+    made = Viscoelastic(stiffness=1.3e8, damping=2.5e4, exponent=1.5, approach_only=True)
+    row, K = np.array([1.0, -0.04, -1.0]), np.diag([34.0, 540.0, 2700.0])
+    gap = row @ np.linalg.solve(K, row) * 5.0 + (5.0 / made.stiffness) ** (2 / 3)  # so that 5 N press at rest
+    pulse = np.array([0.6, -1.0, 0.9]), fb.Pulse(12.5, 0.0026, at=0.2158)
+    system = System(np.eye(3), np.diag([0.1, 0.5, 1.0]), K, [Contact(row, made, gap=-gap)], [pulse])
+    start = np.linalg.solve(K, row) * 5.0 * np.array([1.0, 1.00001, 1.00001]), np.zeros(3)
+    ours, theirs = (integrate(system, *start, 0.5, method=m) for m in (Exponential(1e-6), DormandPrince(1e-11)))
+    assert ours.cost.steps < 500  # it was 281 037
+    assert np.abs(ours.q_dot - theirs.q_dot).max() < 1e-5 * np.abs(theirs.q_dot).max()
+
+
 @pytest.mark.parametrize("rtol", [0.0, -1e-8, 1e-13, 0.1, math.nan, math.inf])
 def test_rtol_out_of_range(rtol):
     with pytest.raises(ValueError, match="rtol must lie in"):

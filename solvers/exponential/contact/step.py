@@ -74,6 +74,7 @@ from solvers.exponential.energy.contact_balance import account_contact
 
 _ERROR_GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
+_CROSSING_KNOWN = 8  # levels, √2 each, shorter at once: a step not resolved yet may see a crossing near its start
 _ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # ratio of the errors of two steps whose lengths differ by √2, one level
 
 
@@ -281,7 +282,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
         copy(scratch.side_at_begin, scratch.side, scratch.side.size)
         state.count[REJECTED] += 1
         if crossing >= 0:  # end a step shortly before, so that the next one can land
-            level = max(level + 1, level_of(tables, 0.9 * first))
+            level = min(max(level + 1, level_of(tables, 0.9 * first)), level + _CROSSING_KNOWN)
             continue
         level = min(shortest, level + (1 + int(2.0 / _ORDER * math.log2(error / _ERROR_GOAL)) if error < np.inf else 2))
         wanted = level
