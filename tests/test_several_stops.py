@@ -260,12 +260,13 @@ def test_a_run_without_samples_that_gains_energy_is_refused(monkeypatch):
 def test_random_scenes(monkeypatch):
     """Motion, and every number of every contact, of 8 scenes of all kinds against the reference.
 
-    Two more begin at rest on the surface of a preloaded stop, with dashpots: what δ̇ is rounded to must not open it.
+    Two more begin at rest on the surface of a preloaded stop, with dashpots: what δ̇ is rounded to must not open it. Two
+    begin so on stops whose dashpot is strong after a slow entry: Newton's method must not end on the way from 1e15 m.
     """
     monkeypatch.syspath_prepend(str(Path(__file__).parent / "bench"))
     from random_scenes import judge
 
-    kinds = {seed: judge(seed)[1].kind for seed in (*range(2000, 2008), 931476, 930422)}
+    kinds = {seed: judge(seed)[1].kind for seed in (*range(2000, 2008), 931476, 930422, 36002581, 36003788)}
     allowed = "fine", "ill-conditioned", "the reference failed"
     assert {seed: kind for seed, kind in kinds.items() if kind not in allowed} == {}
     assert list(kinds.values()).count("fine") > 7

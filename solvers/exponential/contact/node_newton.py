@@ -15,6 +15,7 @@ from solvers.exponential.contact.node_response import motion_of, node_forces, re
 from solvers.exponential.contact.nodes import S
 
 MOST_ITERATIONS = 16
+_MOST_NOISE = 1e-3  # of a force by rounding of δ̇; iterates that come down from far off change by more
 
 
 @inner
@@ -129,6 +130,7 @@ def newton(problem, tables, state, scratch, node_set, level):
             if not change < np.inf:
                 return False
             noise = max(3e-14 * largest, 0.1 * scratch.viscous[s] * rate_tolerance(problem, s, state.x))
+            noise = min(noise, _MOST_NOISE * largest)  # of forces far off, whose slopes are as large
             found &= change <= max(scratch.force_tolerance[s], noise)
             place += S
         if found:
