@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from oscillators import Tone
 from scipy.linalg import expm
 
-from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic, WaltonBraun, law
+from contacts import BoucWen, Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic, WaltonBraun, law
 from solvers import Contact, DormandPrince, Exponential, Parameter, SolverError, System, integrate, lyapunov, orbit
 
 OMEGA, ZETA = np.array([109.13, 790.6, 2303.7, 4700.0, 7800.0]), np.array([0.02, 0.01, 0.01, 0.01, 0.01])
@@ -164,6 +164,21 @@ def test_saltation_of_a_force_jump_in_closed_form():
     # q = gap + (v m/c)(1 - decay), with the entry at (gap - q0)/v
     expected = [[decay, (1.0 - decay) * m / c + gap / v * decay], [-c / m * decay, decay * (1.0 - c / m * gap / v)]]
     np.testing.assert_allclose(found, expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("speed", [1e-7, 3e-7, 1e-6])
+def test_hysteresis_that_turns_at_once(speed):
+    """z of Bouc and Wen is 1e-13 m at the reversal, less than what its border's slopes are differences over."""
+    element = Contact([1.0], BoucWen(45.0, 0.3, 1.0, 4e6, 8e5, n=2), always=True)
+    system = System([[1.0]], [[0.1]], [[30.0]], [element], [([1.0], Tone(-0.01, 1e-3))])
+    run = integrate(system, [0.0], [speed], 1.0, method=Exponential(1e-11), tangent=True)
+    assert run.transitions.event[:2].tolist() == ["reversal", "zero"]
+    h = 1e-8
+    by_place, by_speed = (
+        (end(system, [q], [speed + v], 1.0) - end(system, [-q], [speed - v], 1.0)) / (2.0 * h)
+        for q, v in ((h, 0.0), (0.0, h))
+    )
+    assert_allclose(run.tangent, np.transpose([by_place, by_speed]), atol=1e-5)
 
 
 def test_error_falls_with_the_tolerance():

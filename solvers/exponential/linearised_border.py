@@ -17,6 +17,7 @@ from solvers.compiled.kernels import (
     copy,
     force_at,
     indentation_and_rate,
+    inlined,
     inner,
     merged,
     rhs,
@@ -28,6 +29,7 @@ from solvers.exponential.circles.friction_derivative import pass_slider
 
 _LEFT_BEHIND = 1e-6  # margin, in units of its terms, below which its border is not reached but left behind
 _SHARE, _LEAST = 1e-7, 1e-10  # steps of differences: relative, and least, in the unit of the number; margins may bend
+_JUMP = 1e4  # ratio of the slopes of both sides from which one is that of a jump
 
 
 @inner
@@ -40,18 +42,31 @@ def _margin(problem, past, s, j, delta, rate, row, derivatives):
     return values[j]
 
 
+@inlined
+def _slope(behind, here, ahead, step):
+    """Slope of a margin by central differences, of one side where it jumps on the other.
+
+    It jumps where a number that is smaller than the step changes its sign, as z of Bouc and Wen just after a reversal.
+    """
+    before, after = (here - behind) / step, (ahead - here) / step
+    if abs(before) > _JUMP * abs(after):
+        return after
+    return before if abs(after) > _JUMP * abs(before) else 0.5 * (before + after)
+
+
 @merged
 def _slopes_of_margin(problem, past, s, j, delta, rate, derivatives, out):
-    """∂b/∂δ, ∂b/∂δ̇ and ∂b/∂L by central differences."""
+    """∂b/∂δ, ∂b/∂δ̇ and ∂b/∂L by differences."""
     width, most = problem.parameters.shape[1], problem.latched.shape[1]
     row = derivatives.renewed[most * (2 + most) : most * (2 + most) + width]
     copy(problem.parameters[s], row, width)
+    here = _margin(problem, past, s, j, delta, rate, row, derivatives)
     step = max(_SHARE * abs(delta), _LEAST)
     ahead = _margin(problem, past, s, j, delta + step, rate, row, derivatives)
-    out[0] = (ahead - _margin(problem, past, s, j, delta - step, rate, row, derivatives)) / (2.0 * step)
+    out[0] = _slope(_margin(problem, past, s, j, delta - step, rate, row, derivatives), here, ahead, step)
     step = max(_SHARE * abs(rate), _LEAST)
     ahead = _margin(problem, past, s, j, delta, rate + step, row, derivatives)
-    out[1] = (ahead - _margin(problem, past, s, j, delta, rate - step, row, derivatives)) / (2.0 * step)
+    out[1] = _slope(_margin(problem, past, s, j, delta, rate - step, row, derivatives), here, ahead, step)
     for i in range(most):
         place, out[2 + i] = problem.latched[s, i], 0.0
         if place < 0:
@@ -60,7 +75,7 @@ def _slopes_of_margin(problem, past, s, j, delta, rate, derivatives, out):
         row[place] = known + step
         ahead = _margin(problem, past, s, j, delta, rate, row, derivatives)
         row[place] = known - step
-        out[2 + i] = (ahead - _margin(problem, past, s, j, delta, rate, row, derivatives)) / (2.0 * step)
+        out[2 + i] = _slope(_margin(problem, past, s, j, delta, rate, row, derivatives), here, ahead, step)
         row[place] = known
 
 

@@ -165,7 +165,7 @@ def differences(a: dict[str, Any], b: dict[str, Any], measure: dict[str, Any], p
             size[: len(fast)] = np.maximum(size[: len(fast)], fast)
         found[name] = apart / np.maximum(size, 1e-300)
     for name, scale in measure["scale"].items():
-        apart = np.abs(a[name] - b[name]) / scale
+        apart = np.abs(a[name] - b[name]) / np.maximum(scale, 1e-300)
         found[name] = np.where(np.isnan(a[name]) & np.isnan(b[name]), 0.0, apart)
     return found
 
