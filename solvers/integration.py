@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -56,6 +56,44 @@ from solvers.problem.run_arguments import (
 _SAMPLES = 64  # of a run that is made again for its balance
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
 _NOTHING = np.empty(0)  # latched by a law without memory
+
+
+class Engine(Protocol):
+    """One run of a method: what a new method offers.
+
+    Its ``engine(system, z, prepared, duration)`` makes one, with z the start in the coordinates that it steps in.
+    """
+
+    watched: ClassVar[bool]  # whether ``march`` watches the energy itself, and returns a code where it grows
+    duration: float
+    method: Any
+    problem: Any
+    back: Any  # (2n, ·): [q, q̇] from the coordinates that are stepped
+
+    @property
+    def state(self) -> State:
+        """What has been reached, and the outputs."""
+
+    def record(self, **arrays: Array) -> None:
+        """Replace arrays of the state that outputs go to: ``log``, ``out``, ``due``, ``event_record``."""
+
+    def start(self) -> None:
+        """What is to be done once before the first step."""
+
+    def march(self, budget: int) -> int:
+        """Advance by about so many steps; the place in `STATUSES` of what ended it."""
+
+    def keeps_ledger(self, sampled: bool) -> bool:
+        """Whether input and damping of the energy balance are known."""
+
+    def has_gained(self, exchanged: Callable[[], Array]) -> bool:
+        """Whether the finished run holds more energy than it can have been given."""
+
+    def explain(self, status: Status) -> str:
+        """What the method can say about a failure."""
+
+    def release(self) -> None:
+        """Leave working arrays to other runs; the state must not be read any more."""
 
 
 def integrate(
@@ -121,9 +159,9 @@ def integrate(
         solution = replace(solution, tangent=np.column_stack((known, column)))
     if check and status not in (Status.DONE, Status.INTERRUPTED):
         raise SolverError(
-            f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}{run.explanation(status)}", solution
+            f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}{run.engine.explain(status)}", solution
         )
-    run.release()
+    run.engine.release()
     return solution
 
 
@@ -146,7 +184,7 @@ def prepared_run(
     times = output_times(duration, dt)
     prepared = prepared_once(system, method, duration)
     latched = latched_at_start(system, memory)
-    engine = method.engine(system, z, prepared, duration)
+    engine: Engine = method.engine(system, z, prepared, duration)
     for s, numbers in latched:
         law: Any = system.contacts[s].law
         engine.problem.parameters[s, list(law.memory)] = numbers
@@ -182,7 +220,7 @@ def _kept_forcing(system: System, duration: float, rtol: float) -> Forcing:
 class _Run:
     """One run: a method's engine, its output, and the loop over blocks of steps."""
 
-    def __init__(self, system: System, engine: Any, times: Array | None, tangent: Any) -> None:
+    def __init__(self, system: System, engine: Engine, times: Array | None, tangent: Any) -> None:
         self.system, self.engine, self.times = system, engine, times
         if times is not None:
             due = np.full(len(times) + 1, math.inf)
@@ -203,8 +241,7 @@ class _Run:
     @property
     def state(self) -> State:
         """What has been reached, and the outputs."""
-        found: State = self.engine.state
-        return found
+        return self.engine.state
 
     def _derivatives(self) -> dict[str, Array]:
         """Derivatives of the end, with and without what is latched."""
@@ -231,10 +268,6 @@ class _Run:
     def time(self) -> float:
         """Simulated time reached."""
         return float(self.state.now[T])
-
-    def explanation(self, status: Status) -> str:
-        """What the method can say about a failure."""
-        return self.engine.explain(status) if hasattr(self.engine, "explain") else ""
 
     def to_the_end(self, progress: Callable[[float], None] | None) -> Status:
         """Block after block until done, failed or interrupted."""
@@ -297,12 +330,12 @@ class _Run:
         return found
 
     def _balances(self, record: Record) -> bool:
-        """Whether the energy balance closes, where it is kept; methods without `gains` are checked step by step."""
-        if not hasattr(self.engine, "gains"):
+        """Whether the energy balance closes, where it is kept and has not been watched along."""
+        if self.engine.watched:
             return True
         if record.complete and len(record.motion):
             return not unbalanced(record, self.engine.method.rtol)
-        return not self.engine.gains(record.exchanged) or self._balances_sampled()
+        return not self.engine.has_gained(record.exchanged) or self._balances_sampled()
 
     def _balances_sampled(self) -> bool:
         """Whether a run that exceeds the bound of its energy balances when it is made again with samples."""
@@ -311,11 +344,6 @@ class _Run:
         memory = self.latched if self.system.latches else None
         again = integrate(self.system, q, q_dot, duration, duration / _SAMPLES, method, check=False, memory=memory)
         return again.status is Status.DONE
-
-    def release(self) -> None:
-        """Return working arrays for use by other runs."""
-        if hasattr(self.engine, "release"):
-            self.engine.release()
 
     def _sampled(self, status: Status) -> int:
         """Samples written; the last one may lie a rounding beyond the end."""

@@ -65,7 +65,7 @@ from solvers.exponential.energy.flight_balance import account_state, start_accou
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, NO_ENERGY_TABLES
 from solvers.exponential.preparation import SCRATCH, TABLES, Prepared, prepare_run
 from solvers.exponential.safe_steps import fly
-from solvers.problem import Array, Forcing, System
+from solvers.problem import Array, Forcing, Status, System
 
 _problem, _planar_problem, _tables = unpacker(PROBLEM), unpacker(PLANAR_PROBLEM), unpacker(TABLES)
 _state, _scratch, _energy_tables = unpacker(STATE), unpacker(SCRATCH), unpacker(ENERGY_TABLES)
@@ -184,6 +184,8 @@ def _spacing(due: Array) -> float:
 class Engine:
     """One run: the problem with a block per tone, its tables, its state."""
 
+    watched: ClassVar[bool] = False
+
     def __init__(
         self, method: Exponential, system: System, z: Array, prepared: tuple[Forcing, Prepared], duration: float
     ) -> None:
@@ -221,11 +223,15 @@ class Engine:
     def start(self) -> None:
         """Nothing to do: the compiled loop starts by itself."""
 
+    def explain(self, status: Status) -> str:
+        """Nothing beyond the status."""
+        return ""
+
     def keeps_ledger(self, sampled: bool) -> bool:
         """Whether input and damping of the energy balance are known."""
         return self.method.ledger and sampled
 
-    def gains(self, exchanged: Callable[[], Array]) -> bool:
+    def has_gained(self, exchanged: Callable[[], Array]) -> bool:
         """Whether the finished run holds more energy than it can have been given."""
         return has_gained(self.system, self.workspace.energy, self.problem, self.duration, exchanged, self.method.rtol)
 

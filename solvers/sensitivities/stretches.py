@@ -70,7 +70,7 @@ def replayed(
     solution = run.solution(status, 0.0)
     rows = run.state.log[: int(run.state.count[_LOGGED])]
     rows = rows[rows[:, at.GUARD] != at.FRICTION]
-    run.release()
+    run.engine.release()
     if solution.status is not Status.DONE:
         raise SolverError(f"the run has no derivative to its end: {solution.status.value}", solution)
     return solution, rows

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -42,6 +43,8 @@ def absolute_tolerance(method: Any, problem: Any, z: Array, fastest: float) -> f
 
 class Engine:
     """One run of a stepping method: problem, state, and its part of the loop."""
+
+    watched: ClassVar[bool] = True
 
     def __init__(self, method: Any, system: System, z: Array, forcing: Forcing, duration: float) -> None:
         self.method, self.duration, self.system = method, duration, system
@@ -81,7 +84,7 @@ class Engine:
         return True
 
     def march(self, budget: int) -> int:
-        """Advance by at most ``budget`` steps."""
+        """Advance by ``budget`` steps at most."""
         method = self.method
         if self.state.now[T] == 0.0 and not np.isfinite(self.state.rate).all():
             return LAW_NOT_FINITE  # loads and starts have been checked before
@@ -92,6 +95,13 @@ class Engine:
         )
         return GAINED if code in (DONE, RUNNING) and self._gained() else code
 
+    def has_gained(self, exchanged: Callable[[], Array]) -> bool:
+        """No: ``march`` would have told."""
+        return False
+
+    def release(self) -> None:
+        """Nothing: no other run uses these arrays."""
+
     def _gained(self) -> bool:
         """Whether a run with coupling damping gained energy; see `gains`."""
         if not self.problem.loss.size or self.method.adaptive:
@@ -101,9 +111,9 @@ class Engine:
         self.space.watch[IN_A_ROW] = STEPS_OF_GAIN
         return bool(gains(self.problem, self.state, self.space))
 
-    def explain(self, code: Status) -> str:
+    def explain(self, status: Status) -> str:
         """Which coordinate grew, and which step to try."""
-        if code not in (Status.GAINED, Status.DIVERGED) or self.method.adaptive:
+        if status not in (Status.GAINED, Status.DIVERGED) or self.method.adaptive:
             return ""
         q, q_dot = np.split(self.back @ self.state.x[: 2 * self.problem.k.size], 2)
         return explanation(self.method, self.system, q, q_dot, self.duration)

@@ -36,7 +36,7 @@ IGNORED, HENON, LOCATED = range(3)
 
 
 @kernel
-def in_contact(segment):
+def count_in_contact(segment):
     """Number of stops in contact."""
     count = 0
     for s in range(segment.size):

@@ -42,7 +42,7 @@ from solvers.compiled.state import (
 from solvers.problem import Array
 from solvers.stepping.borders import border_ahead, border_space, renew_border, renew_together
 from solvers.stepping.energy_gain import modal_gains
-from solvers.stepping.events import HENON, LOCATED, NONE, UNRESOLVED, entry_by_sign, in_contact
+from solvers.stepping.events import HENON, LOCATED, NONE, UNRESOLVED, count_in_contact, entry_by_sign
 from solvers.stepping.henon import hermite
 from solvers.stepping.henon import land as henon_landing
 from solvers.stepping.located import NEAR_END, SWITCHED, accept, before_step, first_crossing, first_kink, land
@@ -163,7 +163,7 @@ def march(step, rate_of, gained, problem, state, space, budget, steps, tolerance
             return code
 
         # --- try a step
-        phase = H_CONTACT if in_contact(state.segment) > 0 else H_FLIGHT
+        phase = H_CONTACT if count_in_contact(state.segment) > 0 else H_FLIGHT
         reached_kink = reached_kink if phase == H_CONTACT else 0.0
         h = min(now[phase], dt_contact if phase == H_CONTACT else dt_flight, t_end - now[T])
         if adaptive:

@@ -37,7 +37,7 @@ from solvers.compiled.kernels import (
 from solvers.problem import Array, System, require_step
 from solvers.stepping.constant_step import ConstantStep
 from solvers.stepping.critical_step import newmark_oscillator
-from solvers.stepping.events import in_contact
+from solvers.stepping.events import count_in_contact
 from solvers.stepping.henon import hermite
 from solvers.stepping.shared import shared
 from solvers.stepping.stability import Radius, alpha_radius
@@ -117,7 +117,7 @@ def _solve_contact(problem, s, h, entry_rate, x_new, rate_new, work):
 @shared
 def _add_contacts(reply, problem, h, segment, entry_rate, x_new, rate_new, work):
     """Find the forces of all stops in contact at the end of a step by Gauss–Seidel sweeps; returns the law calls."""
-    active, force, calls = in_contact(segment), work[0], 0
+    active, force, calls = count_in_contact(segment), work[0], 0
     if active == 0:
         return 0
     for s in range(problem.law.size):
