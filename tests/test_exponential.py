@@ -355,6 +355,20 @@ def test_a_pulse_on_a_stop_at_rest_takes_few_steps():
     assert np.abs(ours.q_dot - theirs.q_dot).max() < 1e-5 * np.abs(theirs.q_dot).max()
 
 
+@pytest.mark.parametrize("coupled", [0.0, 1e-6])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-8])
+def test_a_load_that_moves_no_stop_is_resolved_in_contact(rtol, coupled):
+    """A body rests on a stop while a pulse hits another one: the stop's rate does not show what a step leaves out."""
+    row, K = np.array([1.0, coupled]), np.diag([100.0, 900.0])
+    start, gap = np.linalg.solve(K, row * 5.0), -0.05 - 5e-6 ** (2 / 3)
+    pulse = np.array([0.0, 1.0]), fb.Pulse(1.0, 0.01, at=0.5)
+    system = System(np.eye(2), np.diag([0.5, 1.0]), K, [Contact(row, Hertz(1e6), gap)], [pulse])
+    ours, theirs = (integrate(system, start, [0, 0], 2.0, 0.05, m) for m in (Exponential(rtol), DormandPrince(1e-12)))
+    apart = np.abs(ours.q_dot[:, 1] - theirs.q_dot[:, 1]).max() / np.abs(theirs.q_dot[:, 1]).max()
+    assert apart < 10.0 * rtol  # it was 0.2 and 0.48
+    assert ours.cost.steps < 100
+
+
 @pytest.mark.parametrize("rtol", [0.0, -1e-8, 1e-13, 0.1, math.nan, math.inf])
 def test_rtol_out_of_range(rtol):
     with pytest.raises(ValueError, match="rtol must lie in"):

@@ -14,7 +14,8 @@ two before them. The part of the force that the polynomial leaves out is estimat
 Its effect on the indentation rate of every stop, in contact or not, is compared with rtol × the reference speed of that
 stop. The stop's own dashpot damps this error up to the end of the step, less if the stop is being left. Added are the
 oscillation of modes too fast for the nodes, and the part of the sampled signals that their polynomials leave out, for
-which all nodes of their tables are compared. A kink of the law between an end of the step and the nearest node does not
+which all nodes of their tables are compared; this part is also compared with the motion of the blocks that a signal
+drives, which need not move a stop. A kink of the law between an end of the step and the nearest node does not
 show in the coefficients; there the law is compared with the polynomial.
 
 In this error, what a light element takes from a heavy structure is lost. So, where the slope of a law with memory
@@ -230,7 +231,7 @@ def step_error(problem, tables, state, scratch, node_set, level):
             damped, stiffness = False, max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
         span = h * _undamped_part(problem, tables, scratch, node_set, h, s) if damped else h
         scratch.unresolved[u] = span * (unresolved + 0.03 * stiffness * ripple)
-    _sum_errors(problem, tables, scratch, node_set, state.now[T], h)
+    worst = max(worst, _sum_errors(problem, tables, state, scratch, node_set, h))
     for r in range(problem.gap.size):
         speed = scratch.reference_speed[element_of(problem, r)]
         if r < row_of(problem, element_of(problem, r)) + 2:  # the third row, of rotation, keeps the reference speed
@@ -296,19 +297,57 @@ def _undamped_part(problem, tables, scratch, node_set, h, s):
 
 
 @merged
-def _sum_errors(problem, tables, scratch, node_set, t, h):
-    """Errors of the rates of all rows, m/s, by unresolved forces and signals, into ``scratch.per_row``."""
-    rows, error = problem.gap.size, scratch.per_row
+def _sum_errors(problem, tables, state, scratch, node_set, h):
+    """Errors of the rates of all rows, m/s, by unresolved forces and signals, into ``scratch.per_row``.
+
+    Returns the largest error of the blocks' motion by an unresolved signal, in units of its tolerance.
+    """
+    rows, error, worst = problem.gap.size, scratch.per_row, 0.0
     for r in range(rows):
         error[r] = 0.0
     for j in range(problem.table_dt.size):
-        unresolved = h * unresolved_signal(problem, tables, scratch, node_set, j, t, h)
+        unresolved = h * unresolved_signal(problem, tables, scratch, node_set, j, state.now[T], h)
+        worst = max(worst, _driven_error(problem, tables, state, scratch, j, unresolved))
         for r in range(rows):
             error[r] += abs(tables.load_acceleration[r, problem.table_load[j]]) * unresolved
     for u in range(rows):
         if scratch.unresolved[u] != 0.0:
             for r in range(rows):
                 error[r] += abs(tables.accelerance[r, u]) * scratch.unresolved[u]
+    return worst
+
+
+@merged
+def _driven_error(problem, tables, state, scratch, j, unresolved):
+    """Error of the blocks that sampled signal j drives by an unresolved impulse, in units of rtol × their energy norm.
+
+    A load far from all stops, or on another body, moves none of them, so that their rates do not show it. Each block
+    counts by its share of the load: blocks that move but are not driven are no measure. Driven blocks at rest are
+    measured by `Scratch.driven_speed`.
+    """
+    n, norm, x, x_new = problem.k.size, tables.load_norm[problem.table_load[j]], state.x, scratch.x_new
+    load, before, after = 0.0, 0.0, 0.0
+    for b in range(n):
+        share, k = norm[b] * norm[b], problem.k[b]
+        load += share
+        before += share * (x[n + b] * x[n + b] + k * x[b] * x[b])
+        after += share * (x_new[n + b] * x_new[n + b] + k * x_new[b] * x_new[b])
+    if unresolved == 0.0 or load == 0.0:
+        return 0.0
+    speed = max(math.sqrt(max(before, after) / load), scratch.driven_speed[j])
+    return unresolved * math.sqrt(load) / (scratch.accuracy[RTOL] * max(speed, 1e-300))
+
+
+@inner
+def note_signals(problem, tables, scratch):
+    """Set what every sampled signal can drive within a cell of its table, as its largest value there would."""
+    for j in range(problem.table_dt.size):
+        largest, square = 0.0, 0.0
+        for node in range(problem.table_start[j], problem.table_start[j + 1]):
+            largest = max(largest, abs(problem.table[node, 0]))
+        for norm in tables.load_norm[problem.table_load[j]]:
+            square += norm * norm
+        scratch.driven_speed[j] = largest * math.sqrt(square) * min(problem.table_dt[j], 1.0 / tables.fastest)
 
 
 @merged
