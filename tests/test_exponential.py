@@ -10,7 +10,7 @@ from problems import PAPER_LAW, free_mass, paper_scene, two_sided_scene
 from regularised import regularised
 
 import fembeam as fb
-from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic, law
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic, WaltonBraun, law
 from solvers import Contact, DormandPrince, Exponential, Status, System, integrate
 from solvers.exponential.preparation import prepare_system
 from solvers.integration import prepared_once
@@ -367,6 +367,19 @@ def test_a_load_that_moves_no_stop_is_resolved_in_contact(rtol, coupled):
     apart = np.abs(ours.q_dot[:, 1] - theirs.q_dot[:, 1]).max() / np.abs(theirs.q_dot[:, 1]).max()
     assert apart < 10.0 * rtol  # it was 0.2 and 0.48
     assert ours.cost.steps < 100
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("stop", [WaltonBraun(1e4, 3e4), WaltonBraun(1e4, 3e4, "forgotten")])
+def test_a_yielding_stop_touched_at_rest_waits_for_a_later_load(stop, rtol):
+    """Nothing moves before the pulse: a step across its onset that does not resolve it must not tell what begins."""
+    pulses = [fb.Pulse(13.1, length, at=at) for length in (0.003, 0.087) for at in (0.1811, 0.2, 0.3561)]
+    for pulse in pulses:
+        row, vector = np.array([2.0, 0.65]), np.array([0.66, -0.51])
+        system = System.modal([90.1, 18.8], 0.05, [Contact(row, stop, 0.0)], [(vector, pulse)])
+        ours, theirs = (integrate(system, [0, 0], [0, 0], 0.5, 0.1, m) for m in (Exponential(rtol), DormandPrince(1e-11)))
+        assert len(theirs.contacts) > 0
+        assert np.abs(ours.q_dot - theirs.q_dot).max() < 30.0 * rtol * np.abs(theirs.q_dot).max()
 
 
 @pytest.mark.parametrize("rtol", [0.0, -1e-8, 1e-13, 0.1, math.nan, math.inf])
