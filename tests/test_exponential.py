@@ -377,9 +377,21 @@ def test_a_yielding_stop_touched_at_rest_waits_for_a_later_load(stop, rtol):
     for pulse in pulses:
         row, vector = np.array([2.0, 0.65]), np.array([0.66, -0.51])
         system = System.modal([90.1, 18.8], 0.05, [Contact(row, stop, 0.0)], [(vector, pulse)])
-        ours, theirs = (integrate(system, [0, 0], [0, 0], 0.5, 0.1, m) for m in (Exponential(rtol), DormandPrince(1e-11)))
+        methods = Exponential(rtol), DormandPrince(1e-11)
+        ours, theirs = (integrate(system, [0, 0], [0, 0], 0.5, 0.1, method) for method in methods)
         assert len(theirs.contacts) > 0
         assert np.abs(ours.q_dot - theirs.q_dot).max() < 30.0 * rtol * np.abs(theirs.q_dot).max()
+
+
+def test_rounding_of_the_indentation_does_not_shorten_steps():
+    """δ = 3e-10 m of a place that a load has moved by metres has seven digits: shorter steps do not find more."""
+    made, row, K = Hertz(1.44e12, exponent=1.25), np.array([1.0, 2.0]), np.diag([16.2**2, 1679.0**2])
+    start = np.linalg.solve(K, row)
+    gap, load = -row @ start - 1.44e12**-0.8, (np.array([-1.0, 0.3]), fb.Step(1e4, rise=0.13, at=0.008))
+    system = System(np.eye(2), np.diag([3.3, 6.7]), K, [Contact(row, made, gap)], [load])
+    coarse, fine = (integrate(system, start, [0, 0], 0.16, method=Exponential(rtol)) for rtol in (1e-8, 1e-10))
+    assert fine.cost.steps < 40_000  # it was 665 878
+    assert np.abs(fine.q - coarse.q).max() < 3e-8 * np.abs(fine.q).max()
 
 
 @pytest.mark.parametrize("rtol", [0.0, -1e-8, 1e-13, 0.1, math.nan, math.inf])

@@ -51,7 +51,7 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import largest8, least8, load8
-from solvers.compiled.state import CALLS, LAST_EVENT, T_END, T, acts
+from solvers.compiled.state import CALLS, LAST_EVENT, T_END, T, acts, rate_tolerance, surface_tolerance
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
@@ -75,6 +75,8 @@ from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 from solvers.problem.friction import STIFFNESS as FRICTION_STIFFNESS
 
 _END_ERROR, _INNER_ERROR = 1.5e-19, 2.7e-11  # of ẍ = -ω² x: at the end, over (ωh)^17; inside, over (ωh)^9; ωh < 6
+_NEAR_ROUNDING = 1e-5  # part of a force left out, relative, below which it may be rounding
+_TOO_MUCH, _LITTLE = 6.0, 0.03  # such a part, in force tolerances, by which steps get shorter, and a level longer
 _FADED, _MOST_RADIANS = 100.0, 1e5  # e^-100 counts as zero; more radians in a run take over 25 000 steps
 
 
@@ -225,6 +227,9 @@ def step_error(problem, tables, state, scratch, node_set, level):
             viscous = largest_size(scratch.slope[s, 1])
             if _slope_changes(scratch.slope[s, 0], stiffness) or _slope_changes(scratch.slope[s, 1], viscous):
                 worst = max(worst, error_of_work(problem, state, scratch, s, unresolved, largest, (stiffness, viscous)))
+        if _TOO_MUCH * scratch.force_tolerance[s] < unresolved < _NEAR_ROUNDING * largest and u == row_of(problem, s):
+            rounding = _force_rounding(problem, state, scratch, s, stiffness)
+            unresolved = max(unresolved - rounding, _LITTLE * scratch.force_tolerance[s])
         ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
         damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # nothing damps motion across a radius
         if rubs(problem, s):
@@ -244,6 +249,16 @@ def step_error(problem, tables, state, scratch, node_set, level):
     if state.event_record.shape[0]:
         worst = max(worst, _derivative_error(problem, tables, state, scratch, h))
     return worst
+
+
+@merged
+def _force_rounding(problem, state, scratch, s, stiffness):
+    """Rounding of a force, N, by that of δ and δ̇: no shorter step resolves more of it.
+
+    A stiff stop on a structure that has moved far has few digits of its δ.
+    """
+    by_rate = scratch.viscous[s] * rate_tolerance(problem, s, state.x)
+    return stiffness * surface_tolerance(problem, s, state.x) + by_rate
 
 
 @merged
