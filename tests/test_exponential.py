@@ -10,7 +10,7 @@ from problems import PAPER_LAW, free_mass, paper_scene, two_sided_scene
 from regularised import regularised
 
 import fembeam as fb
-from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic, law
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic, WaltonBraun, law
 from solvers import Contact, DormandPrince, Exponential, Status, System, integrate
 from solvers.exponential.preparation import prepare_system
 from solvers.integration import prepared_once
@@ -353,6 +353,45 @@ def test_a_pulse_on_a_stop_at_rest_takes_few_steps():
     ours, theirs = (integrate(system, *start, 0.5, method=m) for m in (Exponential(1e-6), DormandPrince(1e-11)))
     assert ours.cost.steps < 500  # it was 281 037
     assert np.abs(ours.q_dot - theirs.q_dot).max() < 1e-5 * np.abs(theirs.q_dot).max()
+
+
+@pytest.mark.parametrize("coupled", [0.0, 1e-6])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-8])
+def test_a_load_that_moves_no_stop_is_resolved_in_contact(rtol, coupled):
+    """A body rests on a stop while a pulse hits another one: the stop's rate does not show what a step leaves out."""
+    row, K = np.array([1.0, coupled]), np.diag([100.0, 900.0])
+    start, gap = np.linalg.solve(K, row * 5.0), -0.05 - 5e-6 ** (2 / 3)
+    pulse = np.array([0.0, 1.0]), fb.Pulse(1.0, 0.01, at=0.5)
+    system = System(np.eye(2), np.diag([0.5, 1.0]), K, [Contact(row, Hertz(1e6), gap)], [pulse])
+    ours, theirs = (integrate(system, start, [0, 0], 2.0, 0.05, m) for m in (Exponential(rtol), DormandPrince(1e-12)))
+    apart = np.abs(ours.q_dot[:, 1] - theirs.q_dot[:, 1]).max() / np.abs(theirs.q_dot[:, 1]).max()
+    assert apart < 10.0 * rtol  # it was 0.2 and 0.48
+    assert ours.cost.steps < 100
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("stop", [WaltonBraun(1e4, 3e4), WaltonBraun(1e4, 3e4, "forgotten")])
+def test_a_yielding_stop_touched_at_rest_waits_for_a_later_load(stop, rtol):
+    """Nothing moves before the pulse: a step across its onset that does not resolve it must not tell what begins."""
+    pulses = [fb.Pulse(13.1, length, at=at) for length in (0.003, 0.087) for at in (0.1811, 0.2, 0.3561)]
+    for pulse in pulses:
+        row, vector = np.array([2.0, 0.65]), np.array([0.66, -0.51])
+        system = System.modal([90.1, 18.8], 0.05, [Contact(row, stop, 0.0)], [(vector, pulse)])
+        methods = Exponential(rtol), DormandPrince(1e-11)
+        ours, theirs = (integrate(system, [0, 0], [0, 0], 0.5, 0.1, method) for method in methods)
+        assert len(theirs.contacts) > 0
+        assert np.abs(ours.q_dot - theirs.q_dot).max() < 30.0 * rtol * np.abs(theirs.q_dot).max()
+
+
+def test_rounding_of_the_indentation_does_not_shorten_steps():
+    """δ = 3e-10 m of a place that a load has moved by metres has seven digits: shorter steps do not find more."""
+    made, row, K = Hertz(1.44e12, exponent=1.25), np.array([1.0, 2.0]), np.diag([16.2**2, 1679.0**2])
+    start = np.linalg.solve(K, row)
+    gap, load = -row @ start - 1.44e12**-0.8, (np.array([-1.0, 0.3]), fb.Step(1e4, rise=0.13, at=0.008))
+    system = System(np.eye(2), np.diag([3.3, 6.7]), K, [Contact(row, made, gap)], [load])
+    coarse, fine = (integrate(system, start, [0, 0], 0.16, method=Exponential(rtol)) for rtol in (1e-8, 1e-10))
+    assert fine.cost.steps < 40_000  # it was 665 878
+    assert np.abs(fine.q - coarse.q).max() < 3e-8 * np.abs(fine.q).max()
 
 
 @pytest.mark.parametrize("rtol", [0.0, -1e-8, 1e-13, 0.1, math.nan, math.inf])

@@ -58,6 +58,7 @@ from solvers.compiled.state import (
     switch,
     switch_on_surface,
 )
+from solvers.exponential.contact.collocation import note_signals
 from solvers.exponential.contact.first_step import BALANCED, BEGUN, NEW, begin_steps, latest_entered
 from solvers.exponential.contact.step import advance_contact
 from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy
@@ -80,6 +81,7 @@ def _advance(problem, tables_at, state_at, scratch_at, energy_at, budget):
     if not control[BEGUN]:
         control[BEGUN], control[BALANCED] = 1, 1 if energy_tables.active > 0.0 else 0
         scratch.energy[FIRST] = own_energy(problem, tables, state.x)
+        note_signals(problem, tables, scratch)
         begin_contacts(problem, state)
         log_begin(problem, state)
         if in_contact(state):

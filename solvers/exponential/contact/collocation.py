@@ -14,7 +14,8 @@ two before them. The part of the force that the polynomial leaves out is estimat
 Its effect on the indentation rate of every stop, in contact or not, is compared with rtol × the reference speed of that
 stop. The stop's own dashpot damps this error up to the end of the step, less if the stop is being left. Added are the
 oscillation of modes too fast for the nodes, and the part of the sampled signals that their polynomials leave out, for
-which all nodes of their tables are compared. A kink of the law between an end of the step and the nearest node does not
+which all nodes of their tables are compared; this part is also compared with the motion of the blocks that a signal
+drives, which need not move a stop. A kink of the law between an end of the step and the nearest node does not
 show in the coefficients; there the law is compared with the polynomial.
 
 In this error, what a light element takes from a heavy structure is lost. So, where the slope of a law with memory
@@ -50,7 +51,7 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import largest8, least8, load8
-from solvers.compiled.state import CALLS, LAST_EVENT, T_END, T, acts
+from solvers.compiled.state import CALLS, LAST_EVENT, T_END, T, acts, rate_tolerance, surface_tolerance
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
@@ -74,6 +75,8 @@ from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 from solvers.problem.friction import STIFFNESS as FRICTION_STIFFNESS
 
 _END_ERROR, _INNER_ERROR = 1.5e-19, 2.7e-11  # of ẍ = -ω² x: at the end, over (ωh)^17; inside, over (ωh)^9; ωh < 6
+_NEAR_ROUNDING = 1e-5  # part of a force left out, relative, below which it may be rounding
+_TOO_MUCH, _LITTLE = 6.0, 0.03  # such a part, in force tolerances, by which steps get shorter, and a level longer
 _FADED, _MOST_RADIANS = 100.0, 1e5  # e^-100 counts as zero; more radians in a run take over 25 000 steps
 
 
@@ -224,13 +227,16 @@ def step_error(problem, tables, state, scratch, node_set, level):
             viscous = largest_size(scratch.slope[s, 1])
             if _slope_changes(scratch.slope[s, 0], stiffness) or _slope_changes(scratch.slope[s, 1], viscous):
                 worst = max(worst, error_of_work(problem, state, scratch, s, unresolved, largest, (stiffness, viscous)))
+        if _TOO_MUCH * scratch.force_tolerance[s] < unresolved < _NEAR_ROUNDING * largest and u == row_of(problem, s):
+            rounding = _force_rounding(problem, state, scratch, s, stiffness)
+            unresolved = max(unresolved - rounding, _LITTLE * scratch.force_tolerance[s])
         ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
         damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # nothing damps motion across a radius
         if rubs(problem, s):
             damped, stiffness = False, max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
         span = h * _undamped_part(problem, tables, scratch, node_set, h, s) if damped else h
         scratch.unresolved[u] = span * (unresolved + 0.03 * stiffness * ripple)
-    _sum_errors(problem, tables, scratch, node_set, state.now[T], h)
+    worst = max(worst, _sum_errors(problem, tables, state, scratch, node_set, h))
     for r in range(problem.gap.size):
         speed = scratch.reference_speed[element_of(problem, r)]
         if r < row_of(problem, element_of(problem, r)) + 2:  # the third row, of rotation, keeps the reference speed
@@ -243,6 +249,16 @@ def step_error(problem, tables, state, scratch, node_set, level):
     if state.event_record.shape[0]:
         worst = max(worst, _derivative_error(problem, tables, state, scratch, h))
     return worst
+
+
+@merged
+def _force_rounding(problem, state, scratch, s, stiffness):
+    """Rounding of a force, N, by that of δ and δ̇: no shorter step resolves more of it.
+
+    A stiff stop on a structure that has moved far has few digits of its δ.
+    """
+    by_rate = scratch.viscous[s] * rate_tolerance(problem, s, state.x)
+    return stiffness * surface_tolerance(problem, s, state.x) + by_rate
 
 
 @merged
@@ -296,19 +312,57 @@ def _undamped_part(problem, tables, scratch, node_set, h, s):
 
 
 @merged
-def _sum_errors(problem, tables, scratch, node_set, t, h):
-    """Errors of the rates of all rows, m/s, by unresolved forces and signals, into ``scratch.per_row``."""
-    rows, error = problem.gap.size, scratch.per_row
+def _sum_errors(problem, tables, state, scratch, node_set, h):
+    """Errors of the rates of all rows, m/s, by unresolved forces and signals, into ``scratch.per_row``.
+
+    Returns the largest error of the blocks' motion by an unresolved signal, in units of its tolerance.
+    """
+    rows, error, worst = problem.gap.size, scratch.per_row, 0.0
     for r in range(rows):
         error[r] = 0.0
     for j in range(problem.table_dt.size):
-        unresolved = h * unresolved_signal(problem, tables, scratch, node_set, j, t, h)
+        unresolved = h * unresolved_signal(problem, tables, scratch, node_set, j, state.now[T], h)
+        worst = max(worst, _driven_error(problem, tables, state, scratch, j, unresolved))
         for r in range(rows):
             error[r] += abs(tables.load_acceleration[r, problem.table_load[j]]) * unresolved
     for u in range(rows):
         if scratch.unresolved[u] != 0.0:
             for r in range(rows):
                 error[r] += abs(tables.accelerance[r, u]) * scratch.unresolved[u]
+    return worst
+
+
+@merged
+def _driven_error(problem, tables, state, scratch, j, unresolved):
+    """Error of the blocks that sampled signal j drives by an unresolved impulse, in units of rtol × their energy norm.
+
+    A load far from all stops, or on another body, moves none of them, so that their rates do not show it. Each block
+    counts by its share of the load: blocks that move but are not driven are no measure. Driven blocks at rest are
+    measured by `Scratch.driven_speed`.
+    """
+    n, norm, x, x_new = problem.k.size, tables.load_norm[problem.table_load[j]], state.x, scratch.x_new
+    load, before, after = 0.0, 0.0, 0.0
+    for b in range(n):
+        share, k = norm[b] * norm[b], problem.k[b]
+        load += share
+        before += share * (x[n + b] * x[n + b] + k * x[b] * x[b])
+        after += share * (x_new[n + b] * x_new[n + b] + k * x_new[b] * x_new[b])
+    if unresolved == 0.0 or load == 0.0:
+        return 0.0
+    speed = max(math.sqrt(max(before, after) / load), scratch.driven_speed[j])
+    return unresolved * math.sqrt(load) / (scratch.accuracy[RTOL] * max(speed, 1e-300))
+
+
+@inner
+def note_signals(problem, tables, scratch):
+    """Set what every sampled signal can drive within a cell of its table, as its largest value there would."""
+    for j in range(problem.table_dt.size):
+        largest, square = 0.0, 0.0
+        for node in range(problem.table_start[j], problem.table_start[j + 1]):
+            largest = max(largest, abs(problem.table[node, 0]))
+        for norm in tables.load_norm[problem.table_load[j]]:
+            square += norm * norm
+        scratch.driven_speed[j] = largest * math.sqrt(square) * min(problem.table_dt[j], 1.0 / tables.fastest)
 
 
 @merged

@@ -65,6 +65,7 @@ class Scratch(NamedTuple):
     signal_terms: Annotated[Any, "tables, 6"]  # value and derivatives of every sampled signal
     values: Annotated[Any, "14"]  # coefficients of a polynomial
     norms: Annotated[Any, "N"]  # energy norms of the blocks, √(v² + k p²), √J
+    driven_speed: Annotated[Any, "tables"]  # √J: energy norm that its largest value drives in a cell of a table
     signal_bounds: Annotated[Any, "L"]  # bounds of the sampled signals on some cells
     per_row: Annotated[Any, "R"]  # bounds of |δ̈| in m/s², errors of δ in m, or of δ̇ in m/s
     split_state: Annotated[Any, "6, 2, N8"]  # p and v of the blocks, of several states; see `energy.flight_balance`
