@@ -1,0 +1,46 @@
+"""Derivatives of runs of scenes against differences of runs, where elements turn together and numbers are zero."""
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+from contacts import BoucWen, Coulomb, KelvinVoigt, PiecewiseLinear, Polynomial
+from fembeam.scene import value_of, with_value
+from solvers import Exponential
+
+BAR = fb.Section.rectangle(2.0e11, 7800.0, width=0.02, height=0.003)
+FINE = Exponential(1e-11)
+
+
+def rig(law=None, element=None, masses=(), **parts):
+    """A cantilever that is shaken onto a stop at its tip, perhaps with an element beside it."""
+    return fb.Scene(
+        fb.Beam(0.25, BAR),
+        [fb.Clamped(0.0)],
+        masses=masses or [fb.LumpedMass(0.25, mass=0.05)],
+        stops=[fb.Stop(0.25, law or Polynomial([2e4]), gap=1e-4)],
+        elements=[] if element is None else [fb.Element(0.2, element)],
+        damping=fb.ModalDamping(0.02),
+        base=fb.Harmonic(1e-3, 110.0),
+        **parts,
+    )
+
+
+def simulated(scene, modes=1, duration=0.12, dt=3e-3):
+    return scene.reduce(modes=modes).simulate(duration, dt, solver=FINE)
+
+
+def differences(scene, path, step, read, sides=(-2, -1, 1, 2), weights=(1 / 12, -2 / 3, 2 / 3, -1 / 12), **options):
+    """Derivative of what is read off a run by five-point differences."""
+    value = value_of(scene, path)
+    values = [read(simulated(with_value(scene, path, value + k * step), **options)) for k in sides]
+    return sum(weight * one for weight, one in zip(weights, values, strict=True)) / step
+
+
+@pytest.mark.parametrize("element", [Coulomb(0.3, 1e4), BoucWen(1e4, 0.2, 1.0, 2e3, 1e3)])
+def test_a_force_that_peaks_where_an_element_turns(element):
+    """One mode turns at once in the stop and in the element, so that the largest force lies on the element's event."""
+    scene, path = rig(element=element), "masses[0].mass"
+    found = simulated(scene, duration=0.15).sensitivity(path)
+    by_differences = differences(scene, path, 1e-6, lambda run: run.contacts.peak_force, duration=0.15)
+    np.testing.assert_allclose(found.peak_force, by_differences, rtol=3e-6)
