@@ -44,3 +44,10 @@ def test_a_force_that_peaks_where_an_element_turns(element):
     found = simulated(scene, duration=0.15).sensitivity(path)
     by_differences = differences(scene, path, 1e-6, lambda run: run.contacts.peak_force, duration=0.15)
     np.testing.assert_allclose(found.peak_force, by_differences, rtol=3e-6)
+
+
+def test_a_last_sample_that_rounds_beyond_the_end():
+    """50 × (duration/50) may be more than the duration by rounding."""
+    duration, count = next((t, k) for t in (0.011, 0.013, 0.017) for k in range(40, 400) if k * (t / k) > t)
+    run = simulated(rig(), duration=duration, dt=duration / count)
+    assert run.sensitivity("base.phase").q[-1].any()

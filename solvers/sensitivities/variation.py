@@ -142,7 +142,7 @@ def sensitivities(
         system,
         _state(q0, q_dot0),
         duration,
-        np.atleast_1d(np.asarray(times, dtype=float)),
+        np.atleast_1d(np.asarray(times, dtype=float)).clip(max=duration),  # k dt may round to more
         replace(method, ledger=False) if isinstance(method, Exponential) else method,
         memory,
         Change(system, [unchanged(system) if one is None else one for one, _ in parameters], duration),
