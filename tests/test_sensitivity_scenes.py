@@ -46,6 +46,15 @@ def test_a_force_that_peaks_where_an_element_turns(element):
     np.testing.assert_allclose(found.peak_force, by_differences, rtol=3e-6)
 
 
+@pytest.mark.parametrize("name", ["A", "beta", "gamma", "stiffness", "alpha"])
+def test_numbers_of_smooth_hysteresis(name):
+    """Its displacement z passes zero in every cycle, where it is latched as zero."""
+    scene, path = rig(element=BoucWen(1e4, 0.2, 1.0, 2e3, 1e3)), f"elements[0].law.{name}"
+    found = simulated(scene).sensitivity(path).displacement(0.25)
+    by_differences = differences(scene, path, 1e-4 * value_of(scene, path), lambda run: run.displacement(0.25))
+    np.testing.assert_allclose(found, by_differences, rtol=0.0, atol=5e-7 * np.abs(by_differences).max())
+
+
 def test_a_last_sample_that_rounds_beyond_the_end():
     """50 × (duration/50) may be more than the duration by rounding."""
     duration, count = next((t, k) for t in (0.011, 0.013, 0.017) for k in range(40, 400) if k * (t / k) > t)

@@ -9,6 +9,7 @@ formulas of the parameter; the motion is not: its derivative solves the variatio
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -34,7 +35,8 @@ if TYPE_CHECKING:
     from fembeam.model.run import Run
 
 Vector = NDArray[np.float64]
-STRUCTURE, SIGNAL, OTHER = 1e-3, 1e-6, 1e-4  # steps of the data, in units of the value: modes are known less exactly
+STRUCTURE, SIGNAL, OTHER = 1e-3, 1e-6, 1e-5  # steps of the data, in units of the value: modes are known less exactly
+KNOT = 1e-7  # of knots of laws: times between the present knot and one nearby have the slope of the other side
 UNIT = 1.0  # what stands for a value that is zero, of a load, a gap or a law
 FELT = 1e-6  # relative change of frequencies or shapes by which a step of a number that is zero is felt
 ROUGH = 1e-2  # by which differences of one and of two steps may differ, relatively
@@ -267,7 +269,8 @@ class _Varied:
         """Systems near the present one."""
         if self.models is not None:
             return self.models.map(lambda one: one.system)
-        step = (SIGNAL if is_of_signal(self.path) else OTHER) * (abs(self.value) or UNIT)
+        share = SIGNAL if is_of_signal(self.path) else KNOT if _is_knot(self.path) else OTHER
+        step = share * (abs(self.value) or UNIT)
         return self._near(lambda value: self.model.system_like(self._scene(value)), step)
 
     @cached_property
@@ -314,6 +317,11 @@ class _Varied:
         if self.models is None or not np.array_equal(x, self.model.rest()):
             return None
         return self.models.derivative(lambda one: one.rest())
+
+
+def _is_knot(path: str) -> bool:
+    """Whether a full path means an indentation at which a law has a kink."""
+    return re.search(r"\.(knots|indentation)\[\d+\]$", path) is not None
 
 
 def _check_smooth(models: Nearby, path: str) -> None:
