@@ -55,8 +55,48 @@ def test_numbers_of_smooth_hysteresis(name):
     np.testing.assert_allclose(found, by_differences, rtol=0.0, atol=5e-7 * np.abs(by_differences).max())
 
 
+def test_a_knot_that_is_hardly_passed():
+    """Most times beyond the knot lie before nearby values of it, if these are not very near."""
+    options = {"duration": 0.06, "dt": 1e-3}
+    deepest = simulated(rig(PiecewiseLinear([1e4])), **options).contacts.peak_indentation[0]
+    scene, path = rig(PiecewiseLinear([1e4, 3e4], knots=[deepest * (1.0 - 1e-5)])), "stops[0].law.knots[0]"
+    found = simulated(scene, **options).sensitivity(path)
+    by_differences = differences(scene, path, 2e-7 * deepest, lambda run: run.contacts.impulse, **options)
+    np.testing.assert_allclose(found.impulse, by_differences, rtol=2e-2)
+
+
 def test_a_last_sample_that_rounds_beyond_the_end():
     """50 × (duration/50) may be more than the duration by rounding."""
     duration, count = next((t, k) for t in (0.011, 0.013, 0.017) for k in range(40, 400) if k * (t / k) > t)
     run = simulated(rig(), duration=duration, dt=duration / count)
     assert run.sensitivity("base.phase").q[-1].any()
+
+
+def test_a_clearance_about_its_centre():
+    """A hole narrower than the step that other zeros are differenced by."""
+    shaft = fb.Frame.straight(0.3, fb.Section.circle(2.1e11, 7850.0, 0.02), bending_only=True)
+    base = {"x": fb.Harmonic(1e-4, 300.0)}
+    hole = fb.AnnularStop("B", KelvinVoigt(1e6, 10.0), clearance=2e-5)
+    scene, path = (
+        fb.Scene(shaft, [fb.Clamped("A")], stops=[hole], damping=fb.ModalDamping(0.02), base=base),
+        "centre[0]",
+    )
+    options = {"modes": 2, "duration": 0.02, "dt": 1e-3}
+    found = simulated(scene, **options).sensitivity(path).displacement("B", "x")
+    by_differences = differences(scene, path, 1e-9, lambda run: run.displacement("B", "x"), **options)
+    np.testing.assert_allclose(found, by_differences, rtol=0.0, atol=1e-6 * np.abs(by_differences).max())
+
+
+@pytest.mark.parametrize("size", [1.0, 0.05])
+def test_an_inertia_and_an_axial_force_that_are_zero(size):
+    """Steps of both follow the size of the rig: some were refused as changing the modes abruptly."""
+    section = fb.Section.rectangle(2.0e11, 7800.0, width=0.02 * size, height=0.003 * size)
+    mass = fb.LumpedMass(0.2 * size, mass=0.05 * size**3)
+    model = fb.Scene(fb.Beam(0.25 * size, section), [fb.Pinned(0.0), fb.Pinned(0.25 * size)], [mass],
+                     damping=fb.ModalDamping(0.02), base=fb.Harmonic(1e-3, 110.0)).reduce(modes=1)  # fmt: skip
+    run = model.simulate(0.01, 1e-3)
+    buckling = model.scene.buckling_load()
+    for path, step in (("beam.axial_force", 1e-4 * buckling), ("masses[0].inertia", 1e-4 * mass.mass * size**2)):
+        found = run.sensitivity(path).models.derivative(lambda one: one.omega)
+        a, b, c = (with_value(model.scene, path, k * step).reduce(modes=1).omega for k in (0, 1, 2))
+        np.testing.assert_allclose(found, (4.0 * b - 3.0 * a - c) / (2.0 * step), rtol=1e-4)

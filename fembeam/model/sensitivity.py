@@ -37,8 +37,10 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 STRUCTURE, SIGNAL, OTHER = 1e-3, 1e-6, 1e-5  # steps of the data, in units of the value: modes are known less exactly
 KNOT = 1e-7  # of knots of laws: times between the present knot and one nearby have the slope of the other side
+SMALL = 1e-6  # of that step, of a value that is zero, where it is refused
 UNIT = 1.0  # what stands for a value that is zero, of a load, a gap or a law
-FELT = 1e-6  # relative change of frequencies or shapes by which a step of a number that is zero is felt
+FELT = 1e-4  # relative change of frequencies or shapes by which a step of a number that is zero is felt
+FIRST, LEAST = 1e-6, 1e-30  # of these steps, the first that is tried and the smallest
 ROUGH = 1e-2  # by which differences of one and of two steps may differ, relatively
 CHAOS = 1e6  # growth of small changes above which a derivative says little
 LONGEST = 60  # contacts that are printed
@@ -271,7 +273,15 @@ class _Varied:
             return self.models.map(lambda one: one.system)
         share = SIGNAL if is_of_signal(self.path) else KNOT if _is_knot(self.path) else OTHER
         step = share * (abs(self.value) or UNIT)
-        return self._near(lambda value: self.model.system_like(self._scene(value)), step)
+        try:
+            return self._near(self._system, step)
+        except ValueError:
+            if self.value:
+                raise
+        return self._near(self._system, SMALL * step)  # such as the centre of a narrow hole
+
+    def _system(self, value: float) -> Any:
+        return self.model.system_like(self._scene(value))
 
     @cached_property
     def lengthening(self) -> float:
@@ -285,17 +295,26 @@ class _Varied:
         return replaced(self.model.scene, self.path, value)
 
     def _felt(self) -> float:
-        """A step of a number that is zero and changes modes, which they feel."""
-        step, here = FELT, self.model
-        while step < 1.0 / FELT:
-            there = here.again(self._scene(step))
-            require(len(there.system.loads) == len(here.system.loads), "it must not bring a load that is not there yet",
-                    step, self.called, "begin from a small value, such as gravity=1e-6")  # fmt: skip
-            pairs = ((here.omega**2, there.omega**2), (here.directions, there.directions), (here.zeta, there.zeta))
-            if any(np.abs(b - a).max(initial=0.0) > FELT * np.abs(a).max(initial=0.0) for a, b in pairs):
+        """A step of a number that is zero and changes modes, which they feel about as much as `STRUCTURE`."""
+        step, here = FIRST, self.model
+        while LEAST < step < 1.0 / FIRST:
+            change = self._change(here, step)
+            if change > STRUCTURE:
+                step *= 0.1
+            elif step < FIRST or change > FELT:
                 break
-            step *= 10.0
+            else:
+                step *= 10.0
         return step
+
+    def _change(self, here: Model, step: float) -> float:
+        """Largest relative change of frequencies, shapes or damping by a step from zero."""
+        there = here.again(self._scene(step))
+        require(len(there.system.loads) == len(here.system.loads), "it must not bring a load that is not there yet",
+                step, self.called, "begin from a small value, such as gravity=1e-6")  # fmt: skip
+        pairs = (here.omega**2, there.omega**2), (here.directions, there.directions), (here.zeta, there.zeta)
+        sizes = [(np.abs(b - a).max(initial=0.0), np.abs(a).max(initial=0.0)) for a, b in pairs]
+        return max(0.0 if change == 0.0 else change / size if size > 0.0 else np.inf for change, size in sizes)
 
     def _near(self, make: Any, step: float) -> Nearby:
         """What is made at five-point formulas' values."""
