@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.model.equations import load_period
+from fembeam.model.extremes import of_top, time_of_top
 from fembeam.response import PlacedLog, directed
 from fembeam.scene import called, changes_structure, path_of, replaced, value_of
 from fembeam.scene.signals import is_of_signal
@@ -192,42 +193,6 @@ class Sensitivity(Printed):
         names += ["d t_in", "d t_out", "d peak force", "d impulse"]
         more: list[Part] = [f"and {counted(left, 'contact')} more"] if left else []
         return [head, growth, *([(names, rows)] if rows else []), *more]
-
-
-def _time_of_top(t: Vector, u: Vector, v: Vector) -> float:
-    """Time of the highest value of the cubics through u and v."""
-    i = int(np.argmax(u))
-    best, found = u[i], float(t[i])
-    for j in (i - 1, i):
-        if not (0 <= j < len(t) - 1 and v[j] > 0.0 > v[j + 1]):
-            continue
-        h, places = t[j + 1] - t[j], np.linspace(0.0, 1.0, 2001)
-        values = _cubic(places, h, u[j : j + 2], v[j : j + 2])
-        top = int(np.argmax(values))
-        if values[top] > best:
-            best, found = values[top], float(t[j] + places[top] * h)
-    return found
-
-
-def of_top(t: Vector, u: Vector, v: Vector, du: Vector, dv: Vector) -> float:
-    """Derivative of the highest value of the cubics through u and v, by those of u and v at fixed times."""
-    i = int(np.argmax(u))
-    best, found = u[i], float(du[i])
-    for j in (i - 1, i):
-        if not (0 <= j < len(t) - 1 and v[j] > 0.0 > v[j + 1]):
-            continue
-        h, places = t[j + 1] - t[j], np.linspace(0.0, 1.0, 2001)
-        top = int(np.argmax(_cubic(places, h, u[j : j + 2], v[j : j + 2])))
-        if _cubic(places[top], h, u[j : j + 2], v[j : j + 2]) > best:
-            best = _cubic(places[top], h, u[j : j + 2], v[j : j + 2])
-            found = float(_cubic(places[top], h, du[j : j + 2], dv[j : j + 2]))
-    return found
-
-
-def _cubic(x: Any, h: float, u: Vector, v: Vector) -> Any:
-    """The cubic through values and slopes at 0 and 1."""
-    rest = 1.0 - x
-    return rest**2 * ((1.0 + 2.0 * x) * u[0] + x * h * v[0]) + x**2 * ((3.0 - 2.0 * x) * u[1] - rest * h * v[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -412,7 +377,7 @@ def of_amplitude(orbit: Orbit, z: Any, parameter: str) -> float:
     whole period. Errors as for `Orbit.sensitivity`.
     """
     u, v = orbit.run.displacement(z), orbit.run.velocity(z)
-    highest, lowest = (_time_of_top(orbit.run.t, sign * u, sign * v) for sign in (1.0, -1.0))
+    highest, lowest = (time_of_top(orbit.run.t, sign * u, sign * v) for sign in (1.0, -1.0))
     found = of_orbit(orbit, parameter, np.unique([highest, lowest]))
     du = found.displacement(z)
     return 0.5 * float(du[np.searchsorted(found.t, highest)] - du[np.searchsorted(found.t, lowest)])
