@@ -100,3 +100,21 @@ def test_an_inertia_and_an_axial_force_that_are_zero(size):
         found = run.sensitivity(path).models.derivative(lambda one: one.omega)
         a, b, c = (with_value(model.scene, path, k * step).reduce(modes=1).omega for k in (0, 1, 2))
         np.testing.assert_allclose(found, (4.0 * b - 3.0 * a - c) / (2.0 * step), rtol=1e-4)
+
+
+def test_what_is_no_number_is_refused_by_name():
+    """Text, complex numbers, ragged rows and lists of paths ended in the words of NumPy or of Python."""
+    run, law = simulated(rig(), duration=0.01, dt=1e-3), Polynomial([2e4])
+    for values in ("fast", [1j], [[1.0], [1.0, 2.0]]):
+        with pytest.raises(ValueError, match="start must be real numbers"):
+            run.sensitivity(start=values)
+        with pytest.raises(ValueError, match="amplitudes must be real numbers"):
+            fb.study.equivalent(law, values)
+        with pytest.raises(ValueError, match="levels must be real numbers"):
+            fb.study.backbone(run.model, values, (50.0, 200.0))
+        with pytest.raises(ValueError, match="spins must be real numbers"):
+            rig().campbell(values)
+    with pytest.raises(ValueError, match="parameter must be the path of one number"):
+        run.sensitivity(["stops[0].gap"])
+    with pytest.raises(ValueError, match="constraints must be"):
+        fb.study.minimise(rig(), {"stops[0].gap": (1e-4, 1e-3)}, "rms", [3.0], duration=0.01, dt=1e-3)

@@ -25,7 +25,7 @@ from fembeam.model.extremes import of_top, time_of_top
 from fembeam.response import PlacedLog, directed
 from fembeam.scene import called, changes_structure, path_of, replaced, value_of
 from fembeam.scene.signals import is_of_signal
-from fembeam.support import Part, Printed, require
+from fembeam.support import Part, Printed, numbers, require
 from solvers.orbits import codes, counts, delayed
 from solvers.problem import counted, dataframe
 from solvers.sensitivities import Nearby, indentation_change, sensitivities, sensitivity
@@ -320,6 +320,8 @@ def of_run(run: Run, parameter: str | None, start: ArrayLike | None) -> Sensitiv
     require((parameter is None) != (start is None), "give a parameter or a direction of the start", (parameter, start),
             "Run.sensitivity", "e.g. 'stops[0].gap'")  # fmt: skip
     if parameter is not None:
+        require(isinstance(parameter, str), "parameter must be the path of one number", parameter, "Run.sensitivity",
+                "e.g. 'stops[0].gap'")  # fmt: skip
         return _warned(by_each(run, [parameter])[0])
     model, known, options = _made(run)
     return _warned(Sensitivity("start", float("nan"), run, sensitivity(
@@ -351,7 +353,7 @@ def _made(run: Run) -> tuple[Model, tuple[Vector, Vector, float], dict[str, Any]
 
 def _direction(model: Model, start: Any) -> Vector:
     """A checked direction of the start."""
-    direction = np.asarray(start, dtype=float)
+    direction = numbers("start", start, "Run.sensitivity", "e.g. model.state(displacement=lambda z: z)")
     fits = direction.shape == (2 * len(model.omega),) and bool(np.isfinite(direction).all())
     require(fits, f"start must be a direction of the start, ({2 * len(model.omega)},) finite numbers", start,
             "Run.sensitivity", "e.g. model.state(displacement=lambda z: z)")  # fmt: skip

@@ -17,7 +17,7 @@ from fembeam import plot
 from fembeam.scene import Scene
 from fembeam.structures import COMPONENTS, Frame
 from fembeam.study.result import Result
-from fembeam.support import Part, is_whole, require
+from fembeam.support import Part, is_whole, numbers, require
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -109,7 +109,7 @@ def campbell(scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | Non
     >>> found.signed[1].round(1).tolist(), found.critical.round(1).tolist()
     ([-208.8, 223.9], [-211.1, 221.9])
     """
-    speeds = np.atleast_1d(np.array(spins, dtype=float))
+    speeds = np.atleast_1d(numbers("spins", spins, WHERE, "give rad/s, such as np.linspace(0, 600)"))
     valid = speeds.ndim == 1 and speeds.size > 0 and bool(np.isfinite(speeds).all() and np.all(np.diff(speeds) > 0))
     require(valid, "spins must be finite and ascending, (k,)", spins, WHERE, "give rad/s, such as np.linspace(0, 600)")
     require(is_whole(modes) and modes > 0, "modes must be a whole number above 0", modes, WHERE, "give a count")
