@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fembeam as fb
-from contacts import Hertz, Jenkins, KelvinVoigt, Polynomial
+from contacts import Hertz, Jenkins, KelvinVoigt, PiecewiseLinear, Polynomial
 from fembeam.response import backbone
 
 BEAM = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
@@ -45,6 +45,16 @@ def test_two_linear_stops_with_a_gap():
             through = np.arctan(free * gap / speed) / free
             exact = np.pi / 2 / (turn + through)
         assert backbone(one, 0.5, np.array([amplitude]))[0] == pytest.approx(exact, rel=1e-8)
+
+
+def test_a_knot_is_a_stop_with_a_gap():
+    """A law whose slope rises at a knot is two springs, one of them behind a gap."""
+    soft, rise, knot = 4e4, 4e6, 2e-4
+    one = model(fb.Stop(0.5, PiecewiseLinear([soft, soft + rise], knots=[knot])))
+    share = float(one.phi(0.25)[0] / one.phi(0.5)[0])  # of the tip's motion at a place where a stop may stand, too
+    behind = fb.Stop(0.25, KelvinVoigt(rise / share**2, 0.0), gap=share * knot)
+    two = model(fb.Stop(0.5, KelvinVoigt(soft, 0.0)), behind)
+    assert backbone(one, 0.5, AMPLITUDES) == pytest.approx(backbone(two, 0.5, AMPLITUDES), rel=1e-6)
 
 
 def test_an_element_acts_on_both_sides():

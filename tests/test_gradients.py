@@ -11,6 +11,8 @@ from test_vary import kick, reach, rod, struck
 import fembeam as fb
 import solvers
 from contacts import Jenkins, KelvinVoigt
+from fembeam.model import extremes_of
+from fembeam.model.extremes import of_top
 from fembeam.scene import value_of
 from fembeam.study.gradients import NoGradientError, gradient
 from fembeam.study.measure import Plan
@@ -49,6 +51,21 @@ def differences(trial, x):
 
 
 # --- gradients --------------------------------------------------------------------------------------------------------
+
+
+def test_an_amplitude_between_samples():
+    """The highest of two maxima may lie between samples, the highest sample beside the other."""
+    t, beat = np.linspace(0.0, 2.0 * math.pi, 14), 0.002
+
+    def motion(p):
+        first, second = np.cos(2.0 * t - 0.1), p * np.cos(t) + beat * np.cos(3.0 * t)
+        return first + second, -2.0 * np.sin(2.0 * t - 0.1) - p * np.sin(t) - 3.0 * beat * np.sin(3.0 * t)
+
+    for p in np.linspace(-0.05, 0.05, 41):
+        up, down = (motion(p + step) for step in (1e-6, -1e-6))
+        change = [(a - b) / 2e-6 for a, b in zip(up, down, strict=True)]
+        by_differences = (extremes_of(t, *up)[1] - extremes_of(t, *down)[1]) / 2e-6
+        assert of_top(t, *motion(p), *change) == pytest.approx(by_differences, abs=1e-6)
 
 
 @pytest.mark.parametrize("names", [NAMES[:2], NAMES[2:4], NAMES[4:]])

@@ -71,6 +71,26 @@ def test_critical_speeds_are_where_the_whirl_has_the_spin():
     assert at_speed.signed.max() == pytest.approx(forward[0], rel=1e-9)
 
 
+def test_a_disk_that_spins_fast():
+    """It turns the shaft sharply, which few modes at standstill do not: as good as with modes to spare."""
+    mass = SECTION.line_mass * LENGTH
+    disk = fb.Disk("B", 0.25 * mass, diametral=0.003 * mass * LENGTH**2, polar=0.006 * mass * LENGTH**2)
+    stiffness = 3.0 * SECTION.bending_stiffness / LENGTH**3
+    springs = [
+        fb.Spring(end, share * stiffness, direction=way) for end, share in (("A", 20), ("B", 400)) for way in "xy"
+    ]
+    shaft = fb.Frame.straight(LENGTH, SECTION, bending_only=True)
+    few, many = (fb.Scene(shaft, [], masses=[disk], springs=springs).campbell([15e3], modes) for modes in (2, 24))
+    np.testing.assert_allclose(few.signed, many.signed[:, :2], rtol=5e-6)
+
+
+def test_twist_and_stretch_are_no_critical_speeds():
+    """They meet the spin at their own frequencies, which no unbalance excites."""
+    shaft = fb.Frame.straight(LENGTH, SECTION)
+    found = fb.Scene(shaft, [fb.Clamped("A")], masses=[DISK]).campbell([0.0, 3000.0], modes=4)
+    np.testing.assert_allclose(found.critical, rotor().campbell([0.0, 3000.0], modes=4).critical, rtol=1e-6)
+
+
 def test_table_text_and_figure():
     found = rotor().campbell(np.linspace(0.0, 400.0, 5), modes=2)
     rows = found.table()

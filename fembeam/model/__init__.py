@@ -7,8 +7,9 @@ Imports: `scene`, `response` and what they import, `reduction`, `solvers`; insid
 
 from fembeam.model.branch import Branch
 from fembeam.model.equations import load_period
+from fembeam.model.extremes import extremes_of
 from fembeam.model.model import Model
-from fembeam.model.orbit import Attractor, Orbit, extremes_of
+from fembeam.model.orbit import Attractor, Orbit
 from fembeam.model.reduce import check_reduction
 from fembeam.model.rub import Rub
 from fembeam.model.run import Run

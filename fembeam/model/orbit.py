@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.model.equations import load_period
+from fembeam.model.extremes import extremes_of
 from fembeam.response import PlacedLog
 from fembeam.support import Part, Printed, is_whole, require
 from solvers.orbits import at_zero, delayed, periods_of_decay, settled, state_after, with_initial_memory
@@ -148,20 +149,6 @@ class Orbit(Printed):
             contacts += f", {counted(len(self.transitions), 'transition')}"
         kind += ", one of a family" if self.found.family else ""
         return f"<{kind} orbit of period {self.period} with {contacts}, |μ| = {abs(self.found.transverse[0]):.4g}>"
-
-
-def extremes_of(t: Vector, u: Vector, v: Vector) -> tuple[float, float]:
-    """Extremes of the cubics through values u and slopes v."""
-    h, rise = np.diff(t), np.diff(u)
-    a, b, c = v[:-1] * h, 3.0 * rise - (2.0 * v[:-1] + v[1:]) * h, -2.0 * rise + (v[:-1] + v[1:]) * h
-    found = [u]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        root = np.sqrt(b * b - 3.0 * a * c)
-        for s in (-a / (b + root), -a / (b - root)):
-            inside = (s > 0.0) & (s < 1.0)
-            found.append((u[:-1] + s * (a + s * (b + s * c)))[inside])
-    values = np.concatenate(found)
-    return float(values.min()), float(values.max())
 
 
 def orbit(model: Model, period: int, start: ArrayLike | Orbit | None, shots: int | None) -> Orbit:

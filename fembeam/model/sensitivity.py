@@ -9,6 +9,7 @@ formulas of the parameter; the motion is not: its derivative solves the variatio
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -20,10 +21,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.model.equations import load_period
+from fembeam.model.extremes import of_top, time_of_top
 from fembeam.response import PlacedLog, directed
 from fembeam.scene import called, changes_structure, path_of, replaced, value_of
 from fembeam.scene.signals import is_of_signal
-from fembeam.support import Part, Printed, require
+from fembeam.support import Part, Printed, numbers, require
 from solvers.orbits import codes, counts, delayed
 from solvers.problem import counted, dataframe
 from solvers.sensitivities import Nearby, indentation_change, sensitivities, sensitivity
@@ -34,9 +36,12 @@ if TYPE_CHECKING:
     from fembeam.model.run import Run
 
 Vector = NDArray[np.float64]
-STRUCTURE, SIGNAL, OTHER = 1e-3, 1e-6, 1e-4  # steps of the data, in units of the value: modes are known less exactly
+STRUCTURE, SIGNAL, OTHER = 1e-3, 1e-6, 1e-5  # steps of the data, in units of the value: modes are known less exactly
+KNOT = 1e-7  # of knots of laws: times between the present knot and one nearby have the slope of the other side
+SMALL = 1e-6  # of that step, of a value that is zero, where it is refused
 UNIT = 1.0  # what stands for a value that is zero, of a load, a gap or a law
-FELT = 1e-6  # relative change of frequencies or shapes by which a step of a number that is zero is felt
+FELT = 1e-4  # relative change of frequencies or shapes by which a step of a number that is zero is felt
+FIRST, LEAST = 1e-6, 1e-30  # of these steps, the first that is tried and the smallest
 ROUGH = 1e-2  # by which differences of one and of two steps may differ, relatively
 CHAOS = 1e6  # growth of small changes above which a derivative says little
 LONGEST = 60  # contacts that are printed
@@ -190,42 +195,6 @@ class Sensitivity(Printed):
         return [head, growth, *([(names, rows)] if rows else []), *more]
 
 
-def _time_of_top(t: Vector, u: Vector, v: Vector) -> float:
-    """Time of the highest value of the cubics through u and v."""
-    i = int(np.argmax(u))
-    best, found = u[i], float(t[i])
-    for j in (i - 1, i):
-        if not (0 <= j < len(t) - 1 and v[j] > 0.0 > v[j + 1]):
-            continue
-        h, places = t[j + 1] - t[j], np.linspace(0.0, 1.0, 2001)
-        values = _cubic(places, h, u[j : j + 2], v[j : j + 2])
-        top = int(np.argmax(values))
-        if values[top] > best:
-            best, found = values[top], float(t[j] + places[top] * h)
-    return found
-
-
-def of_top(t: Vector, u: Vector, v: Vector, du: Vector, dv: Vector) -> float:
-    """Derivative of the highest value of the cubics through u and v, by those of u and v at fixed times."""
-    i = int(np.argmax(u))
-    best, found = u[i], float(du[i])
-    for j in (i - 1, i):
-        if not (0 <= j < len(t) - 1 and v[j] > 0.0 > v[j + 1]):
-            continue
-        h, places = t[j + 1] - t[j], np.linspace(0.0, 1.0, 2001)
-        top = int(np.argmax(_cubic(places, h, u[j : j + 2], v[j : j + 2])))
-        if _cubic(places[top], h, u[j : j + 2], v[j : j + 2]) > best:
-            best = _cubic(places[top], h, u[j : j + 2], v[j : j + 2])
-            found = float(_cubic(places[top], h, du[j : j + 2], dv[j : j + 2]))
-    return found
-
-
-def _cubic(x: Any, h: float, u: Vector, v: Vector) -> Any:
-    """The cubic through values and slopes at 0 and 1."""
-    rest = 1.0 - x
-    return rest**2 * ((1.0 + 2.0 * x) * u[0] + x * h * v[0]) + x**2 * ((3.0 - 2.0 * x) * u[1] - rest * h * v[1])
-
-
 @dataclass(frozen=True, eq=False)
 class _Varied:
     """A model with one number of its scene varied."""
@@ -267,8 +236,17 @@ class _Varied:
         """Systems near the present one."""
         if self.models is not None:
             return self.models.map(lambda one: one.system)
-        step = (SIGNAL if is_of_signal(self.path) else OTHER) * (abs(self.value) or UNIT)
-        return self._near(lambda value: self.model.system_like(self._scene(value)), step)
+        share = SIGNAL if is_of_signal(self.path) else KNOT if _is_knot(self.path) else OTHER
+        step = share * (abs(self.value) or UNIT)
+        try:
+            return self._near(self._system, step)
+        except ValueError:
+            if self.value:
+                raise
+        return self._near(self._system, SMALL * step)  # such as the centre of a narrow hole
+
+    def _system(self, value: float) -> Any:
+        return self.model.system_like(self._scene(value))
 
     @cached_property
     def lengthening(self) -> float:
@@ -282,17 +260,26 @@ class _Varied:
         return replaced(self.model.scene, self.path, value)
 
     def _felt(self) -> float:
-        """A step of a number that is zero and changes modes, which they feel."""
-        step, here = FELT, self.model
-        while step < 1.0 / FELT:
-            there = here.again(self._scene(step))
-            require(len(there.system.loads) == len(here.system.loads), "it must not bring a load that is not there yet",
-                    step, self.called, "begin from a small value, such as gravity=1e-6")  # fmt: skip
-            pairs = ((here.omega**2, there.omega**2), (here.directions, there.directions), (here.zeta, there.zeta))
-            if any(np.abs(b - a).max(initial=0.0) > FELT * np.abs(a).max(initial=0.0) for a, b in pairs):
+        """A step of a number that is zero and changes modes, which they feel about as much as `STRUCTURE`."""
+        step, here = FIRST, self.model
+        while LEAST < step < 1.0 / FIRST:
+            change = self._change(here, step)
+            if change > STRUCTURE:
+                step *= 0.1
+            elif step < FIRST or change > FELT:
                 break
-            step *= 10.0
+            else:
+                step *= 10.0
         return step
+
+    def _change(self, here: Model, step: float) -> float:
+        """Largest relative change of frequencies, shapes or damping by a step from zero."""
+        there = here.again(self._scene(step))
+        require(len(there.system.loads) == len(here.system.loads), "it must not bring a load that is not there yet",
+                step, self.called, "begin from a small value, such as gravity=1e-6")  # fmt: skip
+        pairs = (here.omega**2, there.omega**2), (here.directions, there.directions), (here.zeta, there.zeta)
+        sizes = [(np.abs(b - a).max(initial=0.0), np.abs(a).max(initial=0.0)) for a, b in pairs]
+        return max(0.0 if change == 0.0 else change / size if size > 0.0 else np.inf for change, size in sizes)
 
     def _near(self, make: Any, step: float) -> Nearby:
         """What is made at five-point formulas' values."""
@@ -316,6 +303,11 @@ class _Varied:
         return self.models.derivative(lambda one: one.rest())
 
 
+def _is_knot(path: str) -> bool:
+    """Whether a full path means an indentation at which a law has a kink."""
+    return re.search(r"\.(knots|indentation)\[\d+\]$", path) is not None
+
+
 def _check_smooth(models: Nearby, path: str) -> None:
     """ValueError where frequencies jump between the values: the mesh or the order of modes changes."""
     rough = max(models.disagreement(lambda one: one.omega**2), models.disagreement(lambda one: one.directions))
@@ -328,6 +320,8 @@ def of_run(run: Run, parameter: str | None, start: ArrayLike | None) -> Sensitiv
     require((parameter is None) != (start is None), "give a parameter or a direction of the start", (parameter, start),
             "Run.sensitivity", "e.g. 'stops[0].gap'")  # fmt: skip
     if parameter is not None:
+        require(isinstance(parameter, str), "parameter must be the path of one number", parameter, "Run.sensitivity",
+                "e.g. 'stops[0].gap'")  # fmt: skip
         return _warned(by_each(run, [parameter])[0])
     model, known, options = _made(run)
     return _warned(Sensitivity("start", float("nan"), run, sensitivity(
@@ -359,7 +353,7 @@ def _made(run: Run) -> tuple[Model, tuple[Vector, Vector, float], dict[str, Any]
 
 def _direction(model: Model, start: Any) -> Vector:
     """A checked direction of the start."""
-    direction = np.asarray(start, dtype=float)
+    direction = numbers("start", start, "Run.sensitivity", "e.g. model.state(displacement=lambda z: z)")
     fits = direction.shape == (2 * len(model.omega),) and bool(np.isfinite(direction).all())
     require(fits, f"start must be a direction of the start, ({2 * len(model.omega)},) finite numbers", start,
             "Run.sensitivity", "e.g. model.state(displacement=lambda z: z)")  # fmt: skip
@@ -385,7 +379,7 @@ def of_amplitude(orbit: Orbit, z: Any, parameter: str) -> float:
     whole period. Errors as for `Orbit.sensitivity`.
     """
     u, v = orbit.run.displacement(z), orbit.run.velocity(z)
-    highest, lowest = (_time_of_top(orbit.run.t, sign * u, sign * v) for sign in (1.0, -1.0))
+    highest, lowest = (time_of_top(orbit.run.t, sign * u, sign * v) for sign in (1.0, -1.0))
     found = of_orbit(orbit, parameter, np.unique([highest, lowest]))
     du = found.displacement(z)
     return 0.5 * float(du[np.searchsorted(found.t, highest)] - du[np.searchsorted(found.t, lowest)])

@@ -7,7 +7,8 @@ from one turning point to the other. The elastic part of the laws (δ' = 0) coun
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ def backbone(model: Model, z: float, amplitudes: Vector) -> Vector:
     """Ω (k,) in rad/s at which the lowest mode vibrates freely with max |u(z)| of so many m (k,), > 0.
 
     NaN where this does not hold: gravity or preload, bodies that touch each other, annular stops, friction, a mode at
-    rest at z, forces that attract, laws with memory. Errors below 1e-6 for smooth laws; where other modes take part the
+    rest at z, forces that attract, laws with memory. Errors below 1e-6; where other modes take part the
     backbone of the structure lies beside.
 
     References
@@ -60,7 +61,7 @@ def _turning_points(model: Model, furthest: Vector) -> tuple[Vector, Vector, Vec
 def _frequency(model: Model, low: float, high: float, energy: float) -> float:
     """Ω of the vibration between two turning points, with V there."""
     rows = zip(model.directions[:, 0], model.contact_rows, strict=True)
-    met = [-row.gap / w for w, row in rows if w != 0.0]
+    met = [-(row.gap + place) / w for w, row in rows if w != 0.0 for place in (0.0, *row.law.knots)]
     knots = np.unique([low, *(q for q in met if low < q < high), high])
     angle, weight = GAUSS
     angle, weight = 0.5 * np.pi * (1.0 + angle), 0.5 * np.pi * weight
@@ -74,11 +75,20 @@ def _frequency(model: Model, low: float, high: float, energy: float) -> float:
 
 def _potential(model: Model, q: Vector) -> Vector:
     """V (k,) of the lowest mode."""
-    at, weight = GAUSS
-    at, weight = 0.5 * (1.0 + at), 0.5 * weight
     energy = 0.5 * model.omega[0] ** 2 * q**2
     for w, row in zip(model.directions[:, 0], model.contact_rows, strict=True):
         delta = -w * q - row.gap
         delta = delta if row.always else np.maximum(delta, 0.0)
-        energy += delta * (row.force(delta[:, None] * at) @ weight)
+        energy += _stored(row, delta)
     return np.asarray(energy)
+
+
+def _stored(row: Any, delta: Vector) -> Vector:
+    """∫F dδ (k,) from 0, knot by knot of the law."""
+    at, weight = 0.5 * (1.0 + GAUSS[0]), 0.5 * GAUSS[1]
+    total = np.zeros_like(delta)
+    for low, high in pairwise((0.0, *row.law.knots, np.inf)):
+        span = np.minimum(delta, high) - low
+        span = np.maximum(span, 0.0) if low > 0.0 else span
+        total += span * (row.force(low + span[:, None] * at) @ weight)
+    return total

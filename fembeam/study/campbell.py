@@ -17,14 +17,16 @@ from fembeam import plot
 from fembeam.scene import Scene
 from fembeam.structures import COMPONENTS, Frame
 from fembeam.study.result import Result
-from fembeam.support import Part, is_whole, require
+from fembeam.support import Part, is_whole, numbers, require
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Vector = NDArray[np.float64]
 WHERE = "campbell"
-SPARE = 12  # modes at standstill besides twice those shown: errors below 1e-7 of the lowest
+SPARE = 12  # modes at standstill besides twice those shown that the mesh has to know
+BASIS = 48  # modes of that mesh besides twice those shown: a heavy disk that spins fast turns the shaft sharply
+ACROSS = 1e-12  # of the largest motion across the shaft, squared: less is twist or stretch, which spin does not excite
 STILL = 1e-9  # of |G|: a rigid motion that does not turn the shaft's axis, such as its own rotation
 SENSES = {1: "forward", -1: "backward", 0: "straight"}
 
@@ -107,19 +109,26 @@ def campbell(scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | Non
     >>> found.signed[1].round(1).tolist(), found.critical.round(1).tolist()
     ([-208.8, 223.9], [-211.1, 221.9])
     """
-    speeds = np.atleast_1d(np.array(spins, dtype=float))
+    speeds = np.atleast_1d(numbers("spins", spins, WHERE, "give rad/s, such as np.linspace(0, 600)"))
     valid = speeds.ndim == 1 and speeds.size > 0 and bool(np.isfinite(speeds).all() and np.all(np.diff(speeds) > 0))
     require(valid, "spins must be finite and ascending, (k,)", spins, WHERE, "give rad/s, such as np.linspace(0, 600)")
     require(is_whole(modes) and modes > 0, "modes must be a whole number above 0", modes, WHERE, "give a count")
     basis, G, across = _at_unit_spin(scene, int(modes), elements)
     found = [reduction.whirl(basis, spin * G, *across) for spin in speeds]
-    critical = reduction.critical_speeds(basis, G, *across).signed
+    met = reduction.critical_speeds(basis, G, *across)
+    critical = met.signed[_bends(met, across)]
     return Campbell(
         speeds,
         np.array([one.omega[:modes] for one in found]),
         np.array([one.turning[:modes] for one in found]),
         critical[np.abs(critical) <= np.abs(speeds).max()],
     )
+
+
+def _bends(found: reduction.Whirl, across: tuple[Any, Any]) -> NDArray[np.bool_]:
+    """(c,) whether a motion moves the shaft across its axis; twist and stretch meet the spin without being whirls."""
+    moved = sum(np.sum(np.abs(rows @ found.shapes) ** 2, axis=0) for rows in across)
+    return np.asarray(moved > ACROSS * np.max(moved, initial=0.0))
 
 
 def _at_unit_spin(scene: Scene, modes: int, elements: int | None) -> tuple[reduction.Basis, Any, tuple[Any, Any]]:
@@ -136,7 +145,7 @@ def _at_unit_spin(scene: Scene, modes: int, elements: int | None) -> tuple[reduc
     spun = replace(scene, beam=replace(body, spin=1.0), stops=(), elements=(), forces=(), base=None, gravity=0.0)
     wanted = 2 * modes + SPARE
     matrices: Any = spun.matrices(elements, wanted)
-    count = min(wanted, matrices.M.shape[0])
+    count = min(2 * modes + BASIS, matrices.M.shape[0])
     require(modes <= count, f"modes must be at most {count} (free dofs)", modes, WHERE, "ask for fewer")
     basis, G = reduction.modal_basis(matrices.M, matrices.K, count, root=matrices.root), matrices.gyroscopic
     tilts = np.linalg.norm(G @ basis.vectors, axis=0) > STILL * abs(G).max() * np.linalg.norm(basis.vectors, axis=0)

@@ -212,6 +212,8 @@ def box_of(parameters: Mapping[str, Any]) -> Vector:
 
 def _limits(constraints: Mapping[Any, float]) -> list[tuple[Quantity, float]]:
     """Constrained quantities with their bounds, checked."""
+    right = isinstance(constraints, Mapping)
+    require(right, "constraints must be {quantity: bound}", constraints, WHERE, "e.g. {'peak_force': 100.0}")
     made = [(named(asked), bound) for asked, bound in constraints.items()]
     for one, bound in made:
         require(

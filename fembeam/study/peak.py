@@ -27,7 +27,7 @@ from fembeam.plot.axis_names import axis_name
 from fembeam.scene import Scene, called, path_of
 from fembeam.study.response_curve import ResponseCurve, Seen
 from fembeam.study.result import Result
-from fembeam.support import Part, counting, is_finite, require
+from fembeam.support import Part, counting, is_finite, numbers, require
 
 Vector = NDArray[np.float64]
 WHERE = "study.peak"
@@ -186,7 +186,7 @@ def check_peak(
     scene: Scene, parameter: str, over: str, values: ArrayLike, span: Any, where: str = WHERE, name: str = "values"
 ) -> Vector:
     """Values of p; ValueError for what `peak` refuses."""
-    p = np.atleast_1d(np.array(values, dtype=float))
+    p = np.atleast_1d(numbers(name, values, where, "give a row of them"))
     valid = p.ndim == 1 and p.size > 1 and bool(np.isfinite(p).all() and np.all(np.diff(p) > 0.0))
     require(valid, f"{name} must be finite and ascending, two or more", values, where, "e.g. np.geomspace(0.1, 10, 9)")
     paths = [path_of(scene, name) for name in (parameter, over)]

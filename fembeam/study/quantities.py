@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.model import Run, extremes_of, places
-from fembeam.model.sensitivity import of_top
+from fembeam.model.extremes import of_top
 from fembeam.scene import Place
 from fembeam.statistics import psd
 from fembeam.support import require

@@ -22,6 +22,7 @@ from solvers.sensitivities.stretches import Acting, after, rises
 
 GRAZING = 1e-9  # depth δ̇²/2|δ̈| of an entry without force, in units of the motion, below which it grazes
 _OFF = 1e-10  # relative distance from a knot at which a law is evaluated on one side of it
+_CORRECTIONS = 3  # by which a nearby law's border, 1e-4 away, is met to rounding
 _LEFT_BEHIND = 1e-6  # margin, in units of its terms, below which another event has crossed its border before
 
 
@@ -151,7 +152,8 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
     )
     margin_rate = by[0] * rate + by[1] * acceleration
     size = np.abs(by * np.concatenate((place[1:], acting.rows[s][list(law.memory)]))).sum()
-    left_behind = laws.margin(law, acting.rows[s], *place, acting.entry_rate[s]) < -_LEFT_BEHIND * size
+    margin = laws.margin(law, acting.rows[s], *place, acting.entry_rate[s])
+    left_behind = margin < -_LEFT_BEHIND * size
     if left_behind and last is not None:
         shift = last
     else:
@@ -160,7 +162,17 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
     latched = np.outer(maps[:, 0], d_delta + rate * shift) + np.outer(maps[:, 1], d_rate + acceleration * shift)
     latched += maps[:, 2:] @ known
     places = list(law.memory)
-    latched[:, flow.own] += flow.over_laws(s, acting, lambda one, own: laws.renewed(one, own, *place)[places])
+
+    def followed(one: Any, own: Array) -> Array:
+        """Numbers latched by a nearby law where it meets the border itself: they may have a corner there."""
+        delta = place[1]
+        for _ in range(_CORRECTIONS if by[0] else 0):
+            beyond = laws.margin(one, own, border, delta, place[2], acting.entry_rate[s]) - margin
+            delta -= beyond / by[0]
+        after = laws.renewed(one, own, border, delta, place[2])[places]
+        return np.asarray(after - maps[:, 0] * (delta - place[1]))
+
+    latched[:, flow.own] += flow.over_laws(s, acting, followed)
     flow.latched[s] = latched
     return shift
 

@@ -142,7 +142,7 @@ def sensitivities(
         system,
         _state(q0, q_dot0),
         duration,
-        np.atleast_1d(np.asarray(times, dtype=float)),
+        np.atleast_1d(np.asarray(times, dtype=float)).clip(max=duration),  # k dt may round to more
         replace(method, ledger=False) if isinstance(method, Exponential) else method,
         memory,
         Change(system, [unchanged(system) if one is None else one for one, _ in parameters], duration),
@@ -370,14 +370,10 @@ class _Walk:
         for row in self.events.get(t, ()):
             s = int(row[at.ELEMENT])
             ends, begins = row[at.FROM] > 0.0 and row[at.TO] == 0.0, row[at.FROM] == 0.0 and row[at.TO] > 0.0
-            if s in self.open and t > 0.0:
-                force, pace, change = self.flow.at_instant(t, s, self.acting)
-            else:
-                force, pace, change = -np.inf, 0.0, np.zeros(self.flow.columns)
+            known = self._at_instant(t) if t > 0.0 else {}
             before = self.flow.impulse[s].copy()
             self.acting, last = cross(self.flow, t, row, self.acting, float(self.asked.span[s]), last)
-            if s in self.open:
-                self.open[s].offer(force, (change + pace * last)[own])
+            self._offer(known, last)
             if ends and s in self.open:
                 one = self.open.pop(s)
                 one.exit, one.impulse = last[own], (self.flow.impulse[s] - one.before)[own]
@@ -385,9 +381,16 @@ class _Walk:
                 unknown = np.full(len(self.asked.by), np.nan)
                 self.open[s] = _Contact(s, last[own], before, unknown, unknown, unknown)
                 self.contacts.append(self.open[s])
-            if s in self.open and self.acting.segment[s]:
-                force, pace, change = self.flow.at_instant(t, s, self.acting)
-                self.open[s].offer(force, (change + pace * last)[own])
+            self._offer(self._at_instant(t), last)
+
+    def _at_instant(self, t: float) -> dict[int, tuple[float, float, Array]]:
+        """N, dN/dt and dN of all contacts: a peak may be met where another element begins to stick."""
+        return {s: self.flow.at_instant(t, s, self.acting) for s in self.open if self.acting.segment[s]}
+
+    def _offer(self, known: dict[int, tuple[float, float, Array]], shift: Array) -> None:
+        """Offer forces at an event whose time changes by a shift (m,)."""
+        for s, (force, pace, change) in known.items():
+            self.open[s].offer(force, (change + pace * shift)[self.flow.own])
 
     def _pass_stretch(self, stretch: Stretch) -> None:
         """Move over one stretch, by panels or in one flight."""

@@ -1,0 +1,120 @@
+"""Derivatives of runs of scenes against differences of runs, where elements turn together and numbers are zero."""
+
+import numpy as np
+import pytest
+
+import fembeam as fb
+from contacts import BoucWen, Coulomb, KelvinVoigt, PiecewiseLinear, Polynomial
+from fembeam.scene import value_of, with_value
+from solvers import Exponential
+
+BAR = fb.Section.rectangle(2.0e11, 7800.0, width=0.02, height=0.003)
+FINE = Exponential(1e-11)
+
+
+def rig(law=None, element=None, masses=(), **parts):
+    """A cantilever that is shaken onto a stop at its tip, perhaps with an element beside it."""
+    return fb.Scene(
+        fb.Beam(0.25, BAR),
+        [fb.Clamped(0.0)],
+        masses=masses or [fb.LumpedMass(0.25, mass=0.05)],
+        stops=[fb.Stop(0.25, law or Polynomial([2e4]), gap=1e-4)],
+        elements=[] if element is None else [fb.Element(0.2, element)],
+        damping=fb.ModalDamping(0.02),
+        base=fb.Harmonic(1e-3, 110.0),
+        **parts,
+    )
+
+
+def simulated(scene, modes=1, duration=0.12, dt=3e-3):
+    return scene.reduce(modes=modes).simulate(duration, dt, solver=FINE)
+
+
+def differences(scene, path, step, read, sides=(-2, -1, 1, 2), weights=(1 / 12, -2 / 3, 2 / 3, -1 / 12), **options):
+    """Derivative of what is read off a run by five-point differences."""
+    value = value_of(scene, path)
+    values = [read(simulated(with_value(scene, path, value + k * step), **options)) for k in sides]
+    return sum(weight * one for weight, one in zip(weights, values, strict=True)) / step
+
+
+@pytest.mark.parametrize("element", [Coulomb(0.3, 1e4), BoucWen(1e4, 0.2, 1.0, 2e3, 1e3)])
+def test_a_force_that_peaks_where_an_element_turns(element):
+    """One mode turns at once in the stop and in the element, so that the largest force lies on the element's event."""
+    scene, path = rig(element=element), "masses[0].mass"
+    found = simulated(scene, duration=0.15).sensitivity(path)
+    by_differences = differences(scene, path, 1e-6, lambda run: run.contacts.peak_force, duration=0.15)
+    np.testing.assert_allclose(found.peak_force, by_differences, rtol=3e-6)
+
+
+@pytest.mark.parametrize("name", ["A", "beta", "gamma", "stiffness", "alpha"])
+def test_numbers_of_smooth_hysteresis(name):
+    """Its displacement z passes zero in every cycle, where it is latched as zero."""
+    scene, path = rig(element=BoucWen(1e4, 0.2, 1.0, 2e3, 1e3)), f"elements[0].law.{name}"
+    found = simulated(scene).sensitivity(path).displacement(0.25)
+    by_differences = differences(scene, path, 1e-4 * value_of(scene, path), lambda run: run.displacement(0.25))
+    np.testing.assert_allclose(found, by_differences, rtol=0.0, atol=5e-7 * np.abs(by_differences).max())
+
+
+def test_a_knot_that_is_hardly_passed():
+    """Most times beyond the knot lie before nearby values of it, if these are not very near."""
+    options = {"duration": 0.06, "dt": 1e-3}
+    deepest = simulated(rig(PiecewiseLinear([1e4])), **options).contacts.peak_indentation[0]
+    scene, path = rig(PiecewiseLinear([1e4, 3e4], knots=[deepest * (1.0 - 1e-5)])), "stops[0].law.knots[0]"
+    found = simulated(scene, **options).sensitivity(path)
+    by_differences = differences(scene, path, 2e-7 * deepest, lambda run: run.contacts.impulse, **options)
+    np.testing.assert_allclose(found.impulse, by_differences, rtol=2e-2)
+
+
+def test_a_last_sample_that_rounds_beyond_the_end():
+    """50 × (duration/50) may be more than the duration by rounding."""
+    duration, count = next((t, k) for t in (0.011, 0.013, 0.017) for k in range(40, 400) if k * (t / k) > t)
+    run = simulated(rig(), duration=duration, dt=duration / count)
+    assert run.sensitivity("base.phase").q[-1].any()
+
+
+def test_a_clearance_about_its_centre():
+    """A hole narrower than the step that other zeros are differenced by."""
+    shaft = fb.Frame.straight(0.3, fb.Section.circle(2.1e11, 7850.0, 0.02), bending_only=True)
+    base = {"x": fb.Harmonic(1e-4, 300.0)}
+    hole = fb.AnnularStop("B", KelvinVoigt(1e6, 10.0), clearance=2e-5)
+    scene, path = (
+        fb.Scene(shaft, [fb.Clamped("A")], stops=[hole], damping=fb.ModalDamping(0.02), base=base),
+        "centre[0]",
+    )
+    options = {"modes": 2, "duration": 0.02, "dt": 1e-3}
+    found = simulated(scene, **options).sensitivity(path).displacement("B", "x")
+    by_differences = differences(scene, path, 1e-9, lambda run: run.displacement("B", "x"), **options)
+    np.testing.assert_allclose(found, by_differences, rtol=0.0, atol=1e-6 * np.abs(by_differences).max())
+
+
+@pytest.mark.parametrize("size", [1.0, 0.05])
+def test_an_inertia_and_an_axial_force_that_are_zero(size):
+    """Steps of both follow the size of the rig: some were refused as changing the modes abruptly."""
+    section = fb.Section.rectangle(2.0e11, 7800.0, width=0.02 * size, height=0.003 * size)
+    mass = fb.LumpedMass(0.2 * size, mass=0.05 * size**3)
+    model = fb.Scene(fb.Beam(0.25 * size, section), [fb.Pinned(0.0), fb.Pinned(0.25 * size)], [mass],
+                     damping=fb.ModalDamping(0.02), base=fb.Harmonic(1e-3, 110.0)).reduce(modes=1)  # fmt: skip
+    run = model.simulate(0.01, 1e-3)
+    buckling = model.scene.buckling_load()
+    for path, step in (("beam.axial_force", 1e-4 * buckling), ("masses[0].inertia", 1e-4 * mass.mass * size**2)):
+        found = run.sensitivity(path).models.derivative(lambda one: one.omega)
+        a, b, c = (with_value(model.scene, path, k * step).reduce(modes=1).omega for k in (0, 1, 2))
+        np.testing.assert_allclose(found, (4.0 * b - 3.0 * a - c) / (2.0 * step), rtol=1e-4)
+
+
+def test_what_is_no_number_is_refused_by_name():
+    """Text, complex numbers, ragged rows and lists of paths ended in the words of NumPy or of Python."""
+    run, law = simulated(rig(), duration=0.01, dt=1e-3), Polynomial([2e4])
+    for values in ("fast", [1j], [[1.0], [1.0, 2.0]]):
+        with pytest.raises(ValueError, match="start must be real numbers"):
+            run.sensitivity(start=values)
+        with pytest.raises(ValueError, match="amplitudes must be real numbers"):
+            fb.study.equivalent(law, values)
+        with pytest.raises(ValueError, match="levels must be real numbers"):
+            fb.study.backbone(run.model, values, (50.0, 200.0))
+        with pytest.raises(ValueError, match="spins must be real numbers"):
+            rig().campbell(values)
+    with pytest.raises(ValueError, match="parameter must be the path of one number"):
+        run.sensitivity(["stops[0].gap"])
+    with pytest.raises(ValueError, match="constraints must be"):
+        fb.study.minimise(rig(), {"stops[0].gap": (1e-4, 1e-3)}, "rms", [3.0], duration=0.01, dt=1e-3)
