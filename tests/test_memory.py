@@ -297,12 +297,13 @@ def test_to_and_fro_at_the_start_after_the_border_of_another_element(rtol):
     np.testing.assert_allclose(rows.t, [1e-7, v / swift**2, 2.0 * v / swift**2], rtol=1e-6)
 
 
-@pytest.mark.parametrize("seed", [50914, 51815, 51997, 50754, 50871, 51142, 100007, 920091])
+@pytest.mark.parametrize("seed", [50914, 51815, 51997, 50754, 50871, 51142, 100007, 920091, 38000793])
 def test_random_systems_against_the_reference(monkeypatch, seed):
     """Slips that begin against their force, that would have come back within a step, or did within a landing.
 
     In the two after a landing was wrong by what the stiffness of contacts does within it. Then sliders beside a
     yielding stop, whose losses were refused, and one whose dashpot turns its slip round within a small part of a step.
+    In the last a slip begins against its force by a thousandth of what the rate is later in the step.
     """
     monkeypatch.syspath_prepend(str(Path(__file__).parent / "bench"))
     from random_memory import judge
