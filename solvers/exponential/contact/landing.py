@@ -92,6 +92,7 @@ _ERROR_SHARE = 0.1  # part of the embedded difference that counts as the error
 _ERROR_SHARE_FOURTH_ROOT = 1e-2  # the same with u = δ^{1/4}: terms t² = u⁸, exact in the step, make up the difference
 _DERIVATIVE_SHARE, _MOST_FACTOR = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
 _ROUNDING = 1e-11  # rounding of a margin, in units of its largest
+_LEAST_RATE = 0.5  # δ̇ at the end of a landing, in units of that at its start, below which it is too long
 _LAST_STEP = 0.09  # indentation, in units of the deepest, below which a landing on δ = 0 is tried
 _LAST_STEP_ROOT, _MOST_ROOT = 0.2, 0.25  # the same with u = δ^{1/2}, over reach², and at most: errors grow like u⁹
 
@@ -404,6 +405,22 @@ def _error_share(problem, tables, state, scratch, variable, stop):
 
 
 @merged
+def _is_resolved(problem, tables, state, scratch, variable, stop):
+    """Whether the landing just taken in δ or δ^{1/κ} is within the tolerance, and the stop has not nearly turned back.
+
+    A stop that turns soon after it has left is near a pole of 1/δ̇. The embedded difference changes its sign there: it
+    may be zero where the step errs by 1e-3 of the rate.
+    """
+    before, after = scratch.start_motion[stop, 1], indentation_rate(problem, stop, scratch.stages[LANDED])
+    share = _error_share(problem, tables, state, scratch, variable, stop)
+    return (
+        _time_increases(scratch, state.x.size)
+        and before * after >= _LEAST_RATE * before * before
+        and _rate_error(problem, scratch, share) <= 1.0
+    )
+
+
+@merged
 def land(problem, tables, state, scratch, stop, direction, time_to_border):
     """Try to land on the border of ``stop`` in a direction, 1 up or -1 down, about ``time_to_border`` s ahead.
 
@@ -421,15 +438,11 @@ def land(problem, tables, state, scratch, stop, direction, time_to_border):
     variable = ROOT if leaving and kappa > 1.0 else INDENTATION
     span = -w[size + 1] if variable == ROOT else _knot(problem, state, stop, direction) - scratch.start_motion[stop, 0]
     _step(problem, tables, state, scratch, variable, stop, span)
-    landed, share = x[size], _error_share(problem, tables, state, scratch, variable, stop)
+    landed = x[size]
     time_rounding = surface_tolerance(problem, stop, state.x) / abs(rate)  # the distance may be rounding
     if not t <= landed <= t + min(4.0 * time_to_border, longest) + time_rounding:
         return -1
-    if not (
-        _time_increases(scratch, size)
-        and _rate_error(problem, scratch, share) <= 1.0
-        and direction * indentation_rate(problem, stop, x) >= 0.0  # it has not turned back
-    ):
+    if not _is_resolved(problem, tables, state, scratch, variable, stop):
         return -1
     other = before_landing(problem, tables, state, scratch, stop, np.bool_(0), w, x)
     if other == CLEAR and problem.parts[PASSED]:
@@ -515,8 +528,7 @@ def _within_tolerance(problem, tables, state, scratch, variable, stop, time):
     """Whether the error of the landing just taken, of length ``time`` s, is within the tolerance."""
     if variable != ROOT:
         return _error_in_time(problem, state, scratch, time) <= 1.0
-    share = _error_share(problem, tables, state, scratch, variable, stop)
-    return _time_increases(scratch, state.x.size) and _rate_error(problem, scratch, share) <= 1.0
+    return _is_resolved(problem, tables, state, scratch, variable, stop)
 
 
 @inlined
