@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import fembeam as fb
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic
 from solvers import (
     RK4,
@@ -578,3 +579,14 @@ def test_a_stick_before_an_opening_lasts_as_long_as_that_of_a_second_method(rtol
     later, same = found.t > 1e-3, other.t > 1e-3  # at first it slips for a nanosecond, or not
     assert found.event[later].tolist() == other.event[same].tolist()
     np.testing.assert_allclose(found.t[later], other.t[same], rtol=0.0, atol=10.0 * rtol)
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-11])
+def test_a_hole_hardly_touched_at_rest_takes_few_steps(rtol):
+    """2e-8 m deep at 9 mm, δ and the drawn spring have eight digits: shorter steps do not find more of the forces."""
+    start, depth, law = np.array([0.0087, -0.0031]), 2e-8, Hertz(3.2e6) + KelvinVoigt(8.6e4, 45.0)
+    away, K = start / np.hypot(*start), np.diag([41.0**2, 51.0**2])
+    load = K @ start + away * (3.2e6 * depth**1.5 + 8.6e4 * depth), fb.Harmonic(1.0, 0.0)
+    hole = Contact(np.eye(2), law, np.hypot(*start) - depth, map="annulus", friction=Friction(1.0, 2.5e6))
+    system = System(np.eye(2), np.diag([25.0, 32.0]), K, [hole], [load])
+    assert integrate(system, start, [0, 0], 0.1, method=Exponential(rtol)).cost.steps < 250

@@ -32,6 +32,7 @@ from numba import types
 
 from solvers.compiled.kernels import (
     REAL,
+    abs_dot,
     contact_forces,
     contact_gradient,
     copy,
@@ -75,7 +76,6 @@ from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 from solvers.problem.friction import STIFFNESS as FRICTION_STIFFNESS
 
 _END_ERROR, _INNER_ERROR = 1.5e-19, 2.7e-11  # of ẍ = -ω² x: at the end, over (ωh)^17; inside, over (ωh)^9; ωh < 6
-_NEAR_ROUNDING = 1e-5  # part of a force left out, relative, below which it may be rounding
 _TOO_MUCH, _LITTLE = 6.0, 0.03  # such a part, in force tolerances, by which steps get shorter, and a level longer
 _FADED, _MOST_RADIANS = 100.0, 1e5  # e^-100 counts as zero; more radians in a run take over 25 000 steps
 
@@ -227,8 +227,8 @@ def step_error(problem, tables, state, scratch, node_set, level):
             viscous = largest_size(scratch.slope[s, 1])
             if _slope_changes(scratch.slope[s, 0], stiffness) or _slope_changes(scratch.slope[s, 1], viscous):
                 worst = max(worst, error_of_work(problem, state, scratch, s, unresolved, largest, (stiffness, viscous)))
-        if _TOO_MUCH * scratch.force_tolerance[s] < unresolved < _NEAR_ROUNDING * largest and u == row_of(problem, s):
-            rounding = _force_rounding(problem, state, scratch, s, stiffness)
+        if unresolved > _TOO_MUCH * scratch.force_tolerance[s]:
+            rounding = _force_rounding(problem, state, scratch, s)
             unresolved = max(unresolved - rounding, _LITTLE * scratch.force_tolerance[s])
         ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
         damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # nothing damps motion across a radius
@@ -252,13 +252,23 @@ def step_error(problem, tables, state, scratch, node_set, level):
 
 
 @merged
-def _force_rounding(problem, state, scratch, s, stiffness):
+def _force_rounding(problem, state, scratch, s):
     """Rounding of a force, N, by that of δ and δ̇: no shorter step resolves more of it.
 
-    A stiff stop on a structure that has moved far has few digits of its δ.
+    A stiff stop on a structure that has moved far has few digits of its δ, and one at rest that is hardly touched none.
+    A spring of friction has those of ξ, which all rows of its contact make.
     """
-    by_rate = scratch.viscous[s] * rate_tolerance(problem, s, state.x)
-    return stiffness * surface_tolerance(problem, s, state.x) + by_rate
+    motion, slope, rounding = motion_of(problem, scratch, s), scratch.slope[s], surface_tolerance(problem, s, state.x)
+    least = rounding if problem.knots[s, 0] == 0.0 else -np.inf  # at δ = 0 a slope may be infinite
+    for i in range(S):
+        scratch.clipped[i] = max(motion[0, i], least)
+    contact_gradient(problem, s, scratch.clipped, motion[1], state.entry_rate[s], slope[0], slope[1], slope[2])
+    found = largest_size(slope[0]) * rounding + largest_size(slope[1]) * rate_tolerance(problem, s, state.x)
+    if rubs(problem, s):
+        for r in range(row_of(problem, s) + 1, row_of(problem, s + 1)):
+            rounding += 1e-15 * abs_dot(problem.read[r], state.x, 2 * problem.k.size)
+        found += slider_of(problem, s)[FRICTION_STIFFNESS] * rounding
+    return found
 
 
 @merged
