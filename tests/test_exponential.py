@@ -342,6 +342,21 @@ def test_cost_of_the_papers_scene_does_not_creep(n, steps, calls):
     assert cost.law_calls <= 1.3 * calls
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("zeta", [1e-5, 3e-4, 2e-3, 4e-3, 1e-2, 0.1, 0.5])
+def test_a_light_dashpot_does_not_pull_where_its_law_is_cut(zeta, rtol):
+    """The force is zero at tan ω_d t = -2ζ√(1-ζ²)/(1-2ζ²), a part 2ζ of the depth before δ = 0."""
+    omega, speed = 1e3, 0.5
+    stop = Contact([1.0], KelvinVoigt(omega**2, 2.0 * zeta * omega, clamp=True), 0.0)
+    log = integrate(
+        System([[1.0]], [[0.0]], [[0.0]], [stop]), [1e-6], [-speed], 5e-3, method=Exponential(rtol)
+    ).contacts
+    root = math.sqrt(1.0 - zeta**2)
+    angle = math.atan2(2.0 * zeta * root, -(1.0 - 2.0 * zeta**2))  # ω_d t at which k δ + c δ̇ = 0
+    slowed = math.exp(-zeta / root * angle) * (math.cos(angle) - zeta / root * math.sin(angle))
+    assert abs(log.speed_out[0] + speed * slowed) < 2.0 * rtol * speed  # it was 2ζ² below ζ = 0.003
+
+
 @pytest.mark.parametrize("exponent", [1.2, 4 / 3, 1.5])
 @pytest.mark.parametrize("rtol", [1e-7, 1e-9])
 def test_a_mass_leaves_as_fast_as_it_came_however_slow(exponent, rtol):
