@@ -77,6 +77,7 @@ from solvers.problem.friction import STIFFNESS as FRICTION_STIFFNESS
 
 _END_ERROR, _INNER_ERROR = 1.5e-19, 2.7e-11  # of ẍ = -ω² x: at the end, over (ωh)^17; inside, over (ωh)^9; ωh < 6
 _TOO_MUCH, _LITTLE = 6.0, 0.03  # such a part, in force tolerances, by which steps get shorter, and a level longer
+_OF_SURFACE, _FLOOR = 0.2, 1e-20  # rounding of δ at a node, in units of `surface_tolerance` without its floor, m
 _FADED, _MOST_RADIANS = 100.0, 1e5  # e^-100 counts as zero; more radians in a run take over 25 000 steps
 
 
@@ -258,15 +259,16 @@ def _force_rounding(problem, state, scratch, s):
     A stiff stop on a structure that has moved far has few digits of its δ, and one at rest that is hardly touched none.
     A spring of friction has those of ξ, which all rows of its contact make.
     """
-    motion, slope, rounding = motion_of(problem, scratch, s), scratch.slope[s], surface_tolerance(problem, s, state.x)
-    least = rounding if problem.knots[s, 0] == 0.0 else -np.inf  # at δ = 0 a slope may be infinite
+    motion, slope, least = motion_of(problem, scratch, s), scratch.slope[s], surface_tolerance(problem, s, state.x)
+    rounding = _OF_SURFACE * (least - _FLOOR)
+    least = least if problem.knots[s, 0] == 0.0 else -np.inf  # at δ = 0 a slope may be infinite
     for i in range(S):
         scratch.clipped[i] = max(motion[0, i], least)
     contact_gradient(problem, s, scratch.clipped, motion[1], state.entry_rate[s], slope[0], slope[1], slope[2])
     found = largest_size(slope[0]) * rounding + largest_size(slope[1]) * rate_tolerance(problem, s, state.x)
     if rubs(problem, s):
         for r in range(row_of(problem, s) + 1, row_of(problem, s + 1)):
-            rounding += 1e-15 * abs_dot(problem.read[r], state.x, 2 * problem.k.size)
+            rounding += _OF_SURFACE * 1e-15 * abs_dot(problem.read[r], state.x, 2 * problem.k.size)
         found += slider_of(problem, s)[FRICTION_STIFFNESS] * rounding
     return found
 
