@@ -46,6 +46,7 @@ from fembeam.study import (
     vary,
 )
 from fembeam.study.backbone import check_backbone
+from fembeam.study.campbell import check_modes
 from fembeam.study.measure import Plan
 from fembeam.study.minimum import box_of
 from fembeam.study.mode_count import ModeCount, checked_counts, mode_count
@@ -64,7 +65,7 @@ if TYPE_CHECKING:
     from fembeam.scene import Scene
     from fembeam.scene_file.reader import SceneFile
 
-NOT_IN_A_FILE = "scene", "start", "solver", "executor"  # arguments of studies that are Python objects
+NOT_IN_A_FILE = "scene", "start", "solver", "executor", "elements"  # Python objects; and what [reduce] says of the mesh
 MOST_SEEDS = 100_000
 
 
@@ -94,8 +95,13 @@ class ModeStudy:
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> ModeCount | SmallestModel:
         """The study; NotMetError when there is no such model."""
-        found: ModeCount | SmallestModel = self.study(file.scene, **{**self.arguments, "seeds": self.seeds})
+        found: ModeCount | SmallestModel = self.study(file.scene, **{**self.arguments, "seeds": self.seeds, **_mesh_of(file)})
         return found
+
+
+def _mesh_of(file: SceneFile) -> dict[str, Any]:
+    """What [reduce] says of the mesh; studies that choose modes themselves take it too."""
+    return {name: value for name, value in file.reduce.items() if name == "elements"}
 
 
 def _table_of(study: Callable[..., Any]) -> Callable[..., ModeStudy]:
@@ -146,7 +152,7 @@ class SpeedAccuracyTable:
         """The study."""
         methods: list[Any] = [solvers.Exponential(rtol) for rtol in self.rtols]
         methods += [solvers.DormandPrince(rtol) for rtol in self.rtols] + [solvers.RK4(step) for step in self.steps]
-        models = [file.scene.reduce(modes=n) for n in sorted(set(self.modes))]
+        models = [file.scene.reduce(modes=n, **_mesh_of(file)) for n in sorted(set(self.modes))]
         return speed_accuracy(models, methods, self.starts, self.duration, rounds=self.rounds, progress=progress)
 
 
@@ -453,11 +459,11 @@ class CampbellTable:
         low, high = self.spins
         require(low < high, "spins must be two values, ascending", self.spins, "[campbell]", "give [lowest, highest]")
         require(self.points > 1, "points must be at least 2", self.points, "[campbell]", "e.g. 41")
-        require(self.modes > 0, "modes must be at least 1", self.modes, "[campbell]", "e.g. 4")
+        check_modes(self.modes)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Campbell:
         """The diagram."""
-        return campbell(file.scene, np.linspace(*self.spins, self.points), self.modes)
+        return campbell(file.scene, np.linspace(*self.spins, self.points), self.modes, **_mesh_of(file))
 
 
 @dataclass(frozen=True)
