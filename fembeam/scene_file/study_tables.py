@@ -95,7 +95,9 @@ class ModeStudy:
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> ModeCount | SmallestModel:
         """The study; NotMetError when there is no such model."""
-        found: ModeCount | SmallestModel = self.study(file.scene, **{**self.arguments, "seeds": self.seeds, **_mesh_of(file)})
+        found: ModeCount | SmallestModel = self.study(
+            file.scene, **{**self.arguments, "seeds": self.seeds, **_mesh_of(file)}
+        )
         return found
 
 

@@ -198,7 +198,9 @@ def smallest_model(
     check_goal(tolerance, most)
     plan, kept = Plan(duration, dt, discard, tuple(seeds), start), named(quantity)
     plan.check(scene, kept)
-    return Search(scene, kept, plan, float(tolerance), int(most), kinds_of(scene, residual), executor, elements).answer()
+    return Search(
+        scene, kept, plan, float(tolerance), int(most), kinds_of(scene, residual), executor, elements
+    ).answer()
 
 
 def check_goal(tolerance: float, most: int) -> None:
