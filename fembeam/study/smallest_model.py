@@ -257,7 +257,7 @@ class Search:
         return [self.seen[choice] for choice in choices]
 
     @property
-    def _mesh(self) -> dict[str, int]:
+    def _mesh(self) -> dict[str, Any]:
         """The argument of `Scene.reduce` for a mesh that was asked for."""
         return {} if self.elements is None else {"elements": self.elements}
 
@@ -334,9 +334,10 @@ class Search:
             f"{_words(choice)}, rtol = {choice.rtol:.0e}; error {sum(bounds):.2e} = {bounds[0]:.2e} reduction + "
             f"{bounds[1]:.2e} integration; {checked:.2e} off twice the modes at rtol/100"
         )
+        model = self.scene.reduce(choice.modes, residual=choice.residual, **self._mesh)
         return SmallestModel(
             label(self.quantity), self.tolerance, verdict, tuple(self._errors()), tuple(lines), True, choice,
-            self.scene.reduce(choice.modes, residual=choice.residual, **self._mesh), line.measured.mean, *bounds, checked,
+            model, line.measured.mean, *bounds, checked,
         )  # fmt: skip
 
     def _failure(self, rejected: set[Choice]) -> SmallestModel:
