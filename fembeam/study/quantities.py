@@ -159,6 +159,7 @@ class Psd:
 
     def __call__(self, run: Run) -> Vector:
         """Value of a run."""
+        require(len(run.t) > 1, "the run must have samples", len(run.t), "Psd", "give dt")
         dt = float(run.t[1] - run.t[0])
         fits = self.band[1] * dt < np.pi
         require(fits, f"dt must be below {np.pi / self.band[1]:.3g} s for a band to {self.band[1]:g} rad/s", dt, "Psd",
@@ -196,8 +197,7 @@ class MeanEnergy:
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
-        assert run.model is not None
-        return mean_in_time(run, np.sum(run.q_dot**2 + (run.q * run.model.omega) ** 2, axis=1) / 2)
+        return mean_in_time(run, np.sum(run.q_dot**2 + (run.q * run.readout.omega) ** 2, axis=1) / 2)
 
     def derivative(self, change: Change) -> float:
         """By a parameter."""
