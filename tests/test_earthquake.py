@@ -157,3 +157,12 @@ def test_columns_are_two_numbers_from_0(tmp_path, columns):
         fb.Record.earthquake(tmp_path / "quake.csv", "g", columns=columns)
     with pytest.raises(ValueError, match="unit must be 'g' or"):
         fb.Record.earthquake(tmp_path / "quake.csv", ["g"])
+
+
+def test_switches_are_true_or_false(tmp_path):
+    """Text such as "no" counted as true."""
+    np.savetxt(tmp_path / "quake.csv", np.column_stack([T, QUAKE]))
+    with pytest.raises(ValueError, match="baseline must be True or False, got 'no'"):
+        fb.Record.earthquake(tmp_path / "quake.csv", "g", baseline="no")
+    with pytest.raises(ValueError, match="detrend must be True or False, got 'no'"):
+        fb.Record.from_csv(tmp_path / "quake.csv", detrend="no")

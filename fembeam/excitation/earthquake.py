@@ -78,6 +78,8 @@ def earthquake(
     >>> earthquake(path, baseline=False).derivative(2)(0.08) / 9.80665  # g
     np.float64(0.099957)
     """
+    if not isinstance(baseline, (bool, np.bool_)):
+        raise ValueError(f"baseline must be True or False, got {baseline!r} in earthquake")
     path = Path(path)
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     found = _peer(text, path) or _cosmos(text, path)
