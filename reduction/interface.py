@@ -26,6 +26,10 @@ COUPLING_TOLERANCE = 2e-8  # of φᵀ K r over the two frequencies: rounding, ep
 NOTHING_LEFT = 1e-12  # share of the static compliance below which a shape is rounding and adds none
 NOTHING_WITHOUT_ROOT = 1e-8  # same
 DEPENDENT = 1e-9  # smallest pivot of directions that counts
+SINGULAR = (
+    "K must not be singular but for the rigid-body modes of the basis, got rigid-body modes that are not in the basis, "
+    "or stiffnesses too far apart to tell; keep all rigid-body modes, or use less extreme stiffnesses"
+)
 BALANCED = 1e-6  # relative: strain energy and work of the loads agree, unless K is singular
 REFINEMENTS = 3  # of static solutions; on 5000 elements the third one changes nothing
 
@@ -187,7 +191,7 @@ def static_shapes(M: Matrix, K: Matrix, B: Vector, rigid: Vector, root: Matrix |
     try:
         factors = sparse_linalg.splu(bordered)
     except RuntimeError:
-        raise ValueError("K must not be singular, got rigid-body modes that are not in the basis; keep them") from None
+        raise ValueError(SINGULAR) from None
     load = B - inertia @ (rigid.T @ B)
     shapes = np.zeros_like(B)
     for _ in range(1 + REFINEMENTS):
@@ -196,7 +200,7 @@ def static_shapes(M: Matrix, K: Matrix, B: Vector, rigid: Vector, root: Matrix |
         shapes = _orthogonal(shapes, rigid, M)
     work = np.sum(load * shapes, axis=0)
     if not np.all(np.abs(np.diag(_strain(K, root, shapes)) - work) <= BALANCED * work):
-        raise ValueError("K must not be singular, got rigid-body modes that are not in the basis; keep them")
+        raise ValueError(SINGULAR)
     return shapes
 
 

@@ -224,7 +224,11 @@ def ritz(M: Matrix, K: Matrix, root: Matrix | None, vectors: Vector) -> tuple[Ve
 
 def _ritz(M: sparse.csc_matrix, R: sparse.csr_matrix, vectors: Vector) -> tuple[Vector, Vector]:
     """Best frequencies and shapes in the span of the vectors: singular values of R Φ, lowest first."""
-    factor = linalg.cholesky(vectors.T @ (M @ vectors), lower=True)
+    try:
+        factor = linalg.cholesky(vectors.T @ (M @ vectors), lower=True)
+    except linalg.LinAlgError:
+        raise AccuracyError("modes must be independent, got some that rounding made alike in modal_basis; "
+                            "use fewer elements or less extreme stiffnesses") from None  # fmt: skip
     vectors = linalg.solve_triangular(factor, vectors.T, lower=True).T
     strain = R @ vectors
     missing = max(0, strain.shape[1] - strain.shape[0])  # R of a free body may have fewer rows than modes

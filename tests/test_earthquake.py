@@ -135,3 +135,34 @@ def test_check_follows_a_record_to_its_end(tmp_path, recwarn):
     assert 20 * 2 * np.pi / model.omega[0] > T[-1]
     assert check(model).touched[0].contacts > 0
     assert not [str(w.message) for w in recwarn if "a trial" in str(w.message)]
+
+
+def test_a_peer_header_may_be_in_small_letters_and_needs_a_step(tmp_path):
+    path = tmp_path / "quake.AT2"
+    path.write_text(peer("npts=  803, dt= .0050 sec", "acceleration time series in units of g"))
+    np.testing.assert_allclose(fb.Record.earthquake(path, baseline=False).y, 9.80665 * QUAKE, rtol=1e-12)
+    for step, message in (
+        ("-", "its data are not numbers alone"),
+        (".0000", "DT of its header must be positive, got 0"),
+    ):
+        path.write_text(peer(f"NPTS=  803, DT= {step} SEC"))
+        with pytest.raises(ValueError, match=rf"quake\.AT2: {message}"):
+            fb.Record.earthquake(path)
+
+
+@pytest.mark.parametrize("columns", [0, None, (0, -1), (0,), (True, 1)])
+def test_columns_are_two_numbers_from_0(tmp_path, columns):
+    np.savetxt(tmp_path / "quake.csv", np.column_stack([T, QUAKE]))
+    with pytest.raises(ValueError, match="columns must be two whole numbers from 0"):
+        fb.Record.earthquake(tmp_path / "quake.csv", "g", columns=columns)
+    with pytest.raises(ValueError, match="unit must be 'g' or"):
+        fb.Record.earthquake(tmp_path / "quake.csv", ["g"])
+
+
+def test_switches_are_true_or_false(tmp_path):
+    """Text such as "no" counted as true."""
+    np.savetxt(tmp_path / "quake.csv", np.column_stack([T, QUAKE]))
+    with pytest.raises(ValueError, match="baseline must be True or False, got 'no'"):
+        fb.Record.earthquake(tmp_path / "quake.csv", "g", baseline="no")
+    with pytest.raises(ValueError, match="detrend must be True or False, got 'no'"):
+        fb.Record.from_csv(tmp_path / "quake.csv", detrend="no")

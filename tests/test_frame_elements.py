@@ -258,6 +258,8 @@ def test_shear_is_refused_where_it_is_not_meant():
         fb.Beam(1.0, DEEP)
     with pytest.raises(ValueError, match="one or two coefficients"):
         replace(STEEL, shear=(0.8, 0.0))
+    with pytest.raises(ValueError, match="shear must be one or two coefficients"):
+        replace(STEEL, shear=[[1], [1, 2]])
     with pytest.raises(ValueError, match="I12 must be 0 with shear"):
         replace(STEEL, shear=0.8, I12=1e-10)
 

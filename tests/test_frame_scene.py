@@ -7,6 +7,7 @@ import pytest
 from frames import portal, space_l, turned
 
 import fembeam as fb
+import reduction
 from contacts import Hysteretic, KelvinVoigt
 from fembeam.response import coordinates
 from fembeam.scene import with_value
@@ -218,6 +219,13 @@ def test_mechanisms():
     with pytest.raises(ValueError, match=r"must not be a mechanism; '[BC]' moves along 'x' .*, got \['B-C'\] in Scene"):
         fb.Scene(hinged, [fb.Pinned("A"), fb.Pinned("D")]).reduce(modes=2)
     assert fb.Scene(hinged, [fb.Clamped("A"), fb.Pinned("D")]).reduce(modes=2, elements=9).omega[0] > 1.0
+    for length, free in ((1e-8, False), (1e-6, True)):
+        points = {"A": (0, 0, 0), "B": (0, 0, 2), "C": (length, 0, 2), "D": (1.5, 0, 2)}
+        pipe = fb.Section.tube(2.1e11, 7850.0, 0.05, 0.04)
+        stub = fb.Scene(fb.Frame.polyline(points, pipe), [] if free else [fb.Clamped("A")])
+        said = "must settle|must be independent" if free else "the shortest member B-C of 1e-08 m.*nothing is released"
+        with pytest.raises((ValueError, reduction.AccuracyError), match=said):
+            stub.reduce(modes=8 if free else 1)
     free = fb.Scene(portal()).reduce(modes=4, elements=9)
     assert np.count_nonzero(free.omega == 0.0) == 3
     turning = fb.Scene(space_l(turned(3)), [fb.Pinned("A")]).reduce(modes=4, elements=4)

@@ -80,8 +80,12 @@ def test_power_of_each_element_and_of_all():
     assert apart.power().value == pytest.approx(2.0 * apart.power(1).value, rel=1e-12)
     assert apart.numbers()["element 1 power"].standard_error > 0.0
     assert "element 1 power" in str(apart)
-    with pytest.raises(ValueError, match="contact must be below 2"):
-        apart.power(2)
+    assert apart.power("element 1").value == apart.power(1).value
+    for wrong in (2, 0.5, True):
+        with pytest.raises(ValueError, match="contact must be below 2"):
+            apart.power(wrong)
+    with pytest.raises(ValueError, match="contact must be one of element 0, element 1, got 'x'"):
+        apart.power("x")
 
 
 def test_power_of_a_run_and_of_its_parts():

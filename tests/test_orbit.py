@@ -59,6 +59,11 @@ def test_branch_marks_the_flip_and_its_copy_from_a_file_is_the_same(model, tmp_p
     np.testing.assert_array_equal(again.parameter, branch.parameter)
     with pytest.raises(ValueError, match="belongs to another scene"):
         paper_scene(fb.Harmonic(2e-3, 195.0)).reduce(1).resume(tmp_path / "b.npz")
+    whole = (tmp_path / "b.npz").read_bytes()
+    for content in (b"", b"no archive" * 9, whole[: len(whole) // 2]):
+        (tmp_path / "damaged.npz").write_bytes(content)
+        with pytest.raises(ValueError, match=r"damaged\.npz is not a saved branch, or is damaged"):
+            model.resume(tmp_path / "damaged.npz")
     branch.to_csv(tmp_path / "b.csv")
     assert len((tmp_path / "b.csv").read_text().splitlines()) == 1 + len(branch.orbits)
     assert fb.plot.branch(branch).axes[0].get_xlabel() == "drive frequency ω / rad s⁻¹"

@@ -292,6 +292,8 @@ def test_scene_reduce_rejects(arguments, message, monkeypatch):
 def test_static_shapes_need_a_place():
     with pytest.raises(ValueError, match="static shapes need a stop, a force or a dashpot"):
         Scene(Beam(0.26, STEEL), [Clamped(0.0)]).reduce(residual=True)
+    with pytest.raises(ValueError, match=r"or an element, got none in .*leave out interface=True, or add one"):
+        Scene(Beam(0.26, STEEL), [Clamped(0.0)]).reduce(interface=True)
 
 
 # --- full against reduced --------------------------------------------------------------------------------

@@ -222,3 +222,21 @@ def test_hdf5_is_optional(run, tmp_path, monkeypatch):
     (tmp_path / "given.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
     with pytest.raises(ImportError, match="needs h5py"):
         fb.load(tmp_path / "given.h5")
+
+
+def test_quantities_of_a_run_are_those_of_its_file(tmp_path):
+    """All that need no Python object, the mean energy too, which asked for the model."""
+    from fembeam.study.quantities import QUANTITIES, Psd
+
+    noise = fb.BandNoise(1e-4, (0.0, 400.0), seed=1)
+    stop = fb.Stop(0.25, Hertz(1e7), gap=1e-4)
+    scene = fb.Scene(fb.Beam(0.25, STEEL), [fb.Clamped(0.0)], stops=[stop], damping=fb.ModalDamping(0.02), base=noise)
+    run = scene.reduce(modes=2).simulate(2.0, dt=1e-3)
+    back = fb.load(run.save(tmp_path / "run.npz"))
+    for name, kind in QUANTITIES.items():
+        if name != "wear_power":
+            quantity = Psd((10.0, 1000.0), 4) if name == "psd" else kind()
+            np.testing.assert_allclose(quantity(back), quantity(run), rtol=1e-14, err_msg=name)
+    bare = scene.reduce(modes=2).simulate(0.1)
+    with pytest.raises(ValueError, match="the run must have samples, got 1 in Psd; give dt"):
+        Psd()(bare)

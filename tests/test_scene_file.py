@@ -340,3 +340,48 @@ def test_files_that_are_none(tmp_path):
     missing = r"the key 'quantity' is missing \('displacement' or 'acceleration' or 'force'\); it needs path, quantity"
     with pytest.raises(SceneFileError, match=missing):
         read(tmp_path, SIMPLE + '[base]\nkind = "record"\npath = "nothing.csv"')
+
+
+DRIVEN = (
+    SIMPLE
+    + """
+[base]
+kind = "harmonic"
+amplitude = 1e-3
+omega = 30.0
+[[stops]]
+z = 1.0
+gap = 1e-3
+law = { kind = "hertz", stiffness = 1e7 }
+"""
+)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("[branch]\nspan = [20.0, 40.0]\nat = 50.0", "at must lie in the span of 20 to 40, got 50.0"),
+        ("[branch]\nspan = [20.0, 40.0]\nstep = nan", r"step must lie in \(0, 1\], got nan"),
+        ("[branch]\nspan = [20.0, 40.0]\nparameter = 'x'", "no such parameter"),
+        ("[basins]\nx_span = [1.0, 0.0]\ny_span = [0.0, 1.0]", r"x_span must be two finite values, ascending"),
+        ("[basins]\nx_span = [0.0, 1.0]\ny_span = [0.0, 1.0]\npoints = 1", "points must be one or two whole numbers"),
+        ("[basins]\nx_span = [0.0, 1.0]\ny_span = [0.0, 1.0]\nthreads = 0", "threads must be above 0, got 0"),
+        ("[peak]\nover = 'stops[0].gap'\nvalues = [1e-3, 2e-3]\nspan = [20.0, 40.0]\nz = 2.0", "must lie on the beam"),
+        ("[backbone]\nlevels = [1e-3, 2e-3]\nspan = [20.0, 40.0]\nz = 2.0", "must lie on the beam"),
+        (
+            "[ensemble]\nrealisations = 4\nduration = 9.0\ndt = 1e-3\nuntil = 2.0",
+            r"until must lie in \(0, 1\), got 2.0",
+        ),
+        ("[ensemble]\nrealisations = 4\nduration = 9.0\ndt = 1e-3\ndiscard = -1", "discard must be finite and not neg"),
+        ("[ensemble]\nrealisations = 4\nduration = 9.0\ndt = 1e-3\nsegment = 3", "segment must be at least 8 samples"),
+        (
+            "[minimise]\nparameters = { 'stops[0].gap' = [1e-3, 2e-3] }\nquantity = 'rms'\nduration = 1\ndt = 1e-3\n"
+            "tolerance = 0.5",
+            r"tolerance must lie in \(0, 0.1\), got 0.5",
+        ),
+    ],
+)
+def test_wrong_values_of_studies_are_said_before_anything_is_computed(tmp_path, table, message):
+    name = table[: table.index("]") + 1].replace("[", r"\[").replace("]", r"\]")
+    with pytest.raises(SceneFileError, match=f"{name}: .*{message}"):
+        read(tmp_path, DRIVEN + table)

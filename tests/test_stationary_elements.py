@@ -98,3 +98,21 @@ def test_damping_of_the_structure_counts_first():
     model, _, omega, _ = undamped(lambda k: KelvinVoigt(0.2 * k, 0.1 * k / 100.0))
     damped = replace(model.scene, damping=fb.ModalDamping(0.05)).reduce(modes=1)
     assert correlation_time(damped) == pytest.approx(1.0 / (0.05 * omega))
+
+
+@pytest.mark.parametrize(("wrong", "message"), [
+    ({"segment": "x"}, "segment must be a whole number of samples, at least 8, got 'x'"),
+    ({"segment": -5}, "segment must be .* got -5"),
+    ({"bins": {"rate": [3.0, 2.0, 1.0]}}, r"bins\['rate'\] must be two or more finite edges that rise"),
+    ({"levels": {"rate": "x"}}, r"levels\['rate'\] must be a number, got 'x'"),
+    ({"levels": 3}, "levels must be a mapping by names of signals, got 3"),
+    ({"watch": {"rate": 5}}, r"watch\['rate'\] must be a function of a run, got 5"),
+    ({"watch": {"rate": lambda run: 1.0}}, r"watch\['rate'\] must return a value for each of the \d+ samples"),
+    ({"watch": {"rate": lambda run: "x"}}, r"watch\['rate'\] must be real numbers, got 'x'"),
+])  # fmt: skip
+def test_wrong_options_of_a_stationary_response_are_named(wrong, message):
+    beam = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+    noise = fb.BandNoise(1e-5, (0.0, 400.0), seed=1)
+    model = fb.Scene(beam, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.05), base=noise).reduce(modes=1)
+    with pytest.raises(ValueError, match=message):
+        stationary(model, 5.0, 5e-3, **({"watch": {"rate": lambda run: run.q[:, 0]}} | wrong))

@@ -2,6 +2,7 @@
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -410,3 +411,96 @@ def test_a_part_of_a_run_reads_as_the_run():
     assert 0 < len(log) < len(whole)
     among = (whole.t >= 0.1234) & (whole.t < 0.2888)
     np.testing.assert_allclose(log.t + 0.1234, whole.t[among], rtol=1e-12)
+
+
+# --- spectra as a quantity -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("band", [(0.0, 200.0), (50.0, 250.0), (3.0, 290.0)])
+def test_levels_of_white_noise_are_alike_in_all_parts(band):
+    """Parts have four lines and a bit: counting whole ones made the first level from 0 on 11 % too high."""
+    dt, rng = np.pi / 100 / 3.2, np.random.default_rng(3)
+    u = rng.standard_normal(400_000)
+    white = SimpleNamespace(
+        t=dt * np.arange(u.size), stops=(), shapes=SimpleNamespace(nodes=[0.0, 1.0]),
+        displacement=lambda z: u, velocity=lambda z: u,
+    )  # fmt: skip
+    np.testing.assert_allclose(Psd(band, parts=4)(white), dt / np.pi, rtol=0.03)
+
+
+@pytest.mark.parametrize("wrong", [
+    {"band": 5}, {"band": ("a", "b")}, {"band": (1, 2, 3)}, {"band": (0, np.inf)}, {"parts": "x"}, {"parts": 2.5},
+])  # fmt: skip
+def test_psd_says_what_is_wrong(wrong):
+    with pytest.raises(ValueError, match=f"{next(iter(wrong))} must be .* in Psd; e.g."):
+        Psd(**wrong)
+
+
+# --- the mesh that [reduce] says -------------------------------------------------------------------------
+
+COARSE = """
+[beam]
+length = 1.0
+section = { E = 2.1e11, rho = 7800, A = 1e-4, I = 1e-9 }
+[[supports]]
+kind = "clamped"
+z = 0
+[base]
+kind = "harmonic"
+amplitude = 1e-3
+omega = 30.0
+[reduce]
+elements = 4
+[mode_count]
+counts = [1, 2]
+quantity = "amplitude"
+duration = 0.1
+dt = 1e-3
+[smallest_model]
+quantity = "amplitude"
+tolerance = 0.1
+duration = 0.1
+dt = 1e-3
+"""
+
+
+def test_studies_of_a_file_use_the_mesh_that_reduce_says(tmp_path):
+    path = tmp_path / "coarse.toml"
+    path.write_text(COARSE, encoding="utf-8")
+    file = scene_file.read(path)
+    run = {"quantity": "amplitude", "duration": 0.1, "dt": 1e-3}
+    value = Amplitude()(file.scene.reduce(1, elements=4).simulate(0.1, 1e-3, solver=solvers.Exponential(ledger=False)))
+    assert file.studies["mode_count"].run(file, tmp_path).row(1).value == pytest.approx(value, rel=1e-9)
+    assert mode_count(file.scene, [1, 2], elements=4, **run).row(1).value == pytest.approx(value, rel=1e-9)
+    assert mode_count(file.scene, [1, 2], **run).row(1).value != pytest.approx(value, rel=1e-5)
+    found = file.studies["smallest_model"].run(file, tmp_path)
+    assert found.model.matrices.elements == 4
+
+
+def test_a_campbell_diagram_of_a_file_uses_the_mesh_that_reduce_says(tmp_path):
+    path = tmp_path / "rotor.toml"
+    path.write_text(
+        """
+        [frame]
+        nodes = { A = [0, 0, 0], B = [0, 0, 0.5] }
+        [[frame.members]]
+        nodes = ["A", "B"]
+        section = { shape = "circle", E = 2.1e11, rho = 7850, diameter = 0.04 }
+        [[supports]]
+        kind = "clamped"
+        at = "A"
+        [reduce]
+        elements = 5
+        [campbell]
+        spins = [0.0, 300.0]
+        points = 2
+        modes = 2
+        """,
+        encoding="utf-8",
+    )
+    file = scene_file.read(path)
+    found = file.studies["campbell"].run(file, tmp_path).omega
+    np.testing.assert_array_equal(found, file.scene.campbell([0.0, 300.0], 2, elements=5).omega)
+    assert np.abs(found / file.scene.campbell([0.0, 300.0], 2).omega - 1).max() > 1e-7
+    with pytest.raises(scene_file.SceneFileError, match="modes must be at most 64, got 1000 in campbell"):
+        scene_file.read(path, ["campbell.modes=1000"])

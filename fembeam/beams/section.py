@@ -85,11 +85,12 @@ class Section:
         require_finite("nu", self.nu, "Section", "give Poisson's ratio", ", above -1 and at most 0.5",
                        is_finite(self.nu) and -1 < self.nu <= 0.5)  # fmt: skip
         if self.shear is not None:
-            both = tuple(np.broadcast_to(self.shear, 2).tolist()) if np.shape(self.shear) in ((), (2,)) else ()
-            right = len(both) == 2 and all(is_finite(k) and 0 < k <= 1.5 for k in both)
+            several = isinstance(self.shear, (tuple, list)) or np.ndim(self.shear) > 0
+            given = list(self.shear) if several else [np.asarray(self.shear).tolist()] * 2  # type: ignore[arg-type]
+            right = len(given) == 2 and all(is_finite(k) and 0 < k <= 1.5 for k in given)
             require(right, "shear must be one or two coefficients above 0, at most 1.5", self.shear, "Section",
                     "give 5/6 for a rectangle, 0.9 for a circle")  # fmt: skip
-            object.__setattr__(self, "shear", both)
+            object.__setattr__(self, "shear", tuple(map(float, given)))
             require(self.I12 == 0, "I12 must be 0 with shear", self.I12, "Section", "turn it to principal axes")
 
     @classmethod

@@ -77,7 +77,7 @@ def _check_checkpoints(job: Job, studies: list[str]) -> None:
     for name in studies:
         path = job.folder / f"{name}.npz"
         if path.exists():
-            raise ValueError(f"{path} holds results of [{name}]: add --resume to continue, delete it to started "
+            raise ValueError(f"{path} holds results of [{name}]: add --resume to continue, delete it to start "
                              "anew, or choose another folder")  # fmt: skip
 
 

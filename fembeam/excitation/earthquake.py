@@ -26,7 +26,7 @@ SPELLINGS: dict[str, Unit] = {
 PEER = re.compile(
     r"NPTS\s*=\s*(?P<count>\d+)[\s,]*DT\s*=\s*(?P<step>[\d.eE+-]+)[^\n]*\n"
     r"|^\s*(?P<old_count>\d+)\s+(?P<old_step>[\d.eE+-]+)\s+NPTS,\s*DT[^\n]*\n",
-    re.M,
+    re.M | re.I,
 )
 FORMAT = r"\s*,\s*Format\s*=\s*\(?\d*[EFG](\d+)[^\n]*\n"
 REAL_HEADER = re.compile(r"(\d+)\s+Real-header values follow on\s+\d+ lines" + FORMAT, re.I)
@@ -78,6 +78,8 @@ def earthquake(
     >>> earthquake(path, baseline=False).derivative(2)(0.08) / 9.80665  # g
     np.float64(0.099957)
     """
+    if not isinstance(baseline, (bool, np.bool_)):
+        raise ValueError(f"baseline must be True or False, got {baseline!r} in earthquake")
     path = Path(path)
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     found = _peer(text, path) or _cosmos(text, path)
@@ -128,7 +130,7 @@ def without_baseline(t: ArrayLike, acceleration: ArrayLike) -> Vector:
 
 def _check_unit(unit: str | None, path: Path) -> None:
     """Columns do not tell their unit."""
-    if unit not in FACTORS:
+    if unit not in list(FACTORS):  # a list: what is given need not be hashable
         _fail(path, f"unit must be {' or '.join(map(repr, FACTORS))} for a file of columns, got {unit!r}")
 
 
@@ -140,8 +142,11 @@ def _peer(text: str, path: Path) -> tuple[Vector, Vector, Unit] | None:
     if not re.search(r"UNITS OF\s+\(?G\b", text[: head.end()], re.I):
         _fail(path, "a PEER file must be an acceleration in units of g (AT2), its header says otherwise")
     count = int(head["count"] or head["old_count"])
+    step = _numbers([head["step"] or head["old_step"]], path)[0]
+    if not 0.0 < step < np.inf:
+        _fail(path, f"DT of its header must be positive, got {step:g} s")
     values = _numbers(text[head.end() :].split(), path)
-    return *_series(values, count, float(head["step"] or head["old_step"]), path), "g"
+    return *_series(values, count, float(step), path), "g"
 
 
 def _cosmos(text: str, path: Path) -> tuple[Vector, Vector, Unit] | None:

@@ -126,6 +126,8 @@ class Record:
             if getattr(self, name) not in choices:
                 said = " or ".join(map(repr, choices))
                 raise ValueError(f"Record {name} must be {said}, got {getattr(self, name)!r}")
+        if not isinstance(self.detrend, (bool, np.bool_)):
+            raise ValueError(f"Record detrend must be True or False, got {self.detrend!r}")
         if self.order and self.quantity == "force":
             raise ValueError("Record of a force has no derivatives, got quantity='force' as a motion; give "
                              "quantity='displacement' or 'acceleration'")  # fmt: skip

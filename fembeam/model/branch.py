@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
     from fembeam.model.model import Model
 
 Vector = NDArray[np.float64]
+RECORDED = {"name", "period", "scene", "modes", "span", "step", "status", "walks"}  # of a saved branch
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,13 +212,32 @@ def follow(
 
 def resumed(model: Model, path: str | Path) -> Branch:
     """A saved branch of this model, to be continued."""
-    with np.load(path, allow_pickle=False) as file:
-        require(
-            "branch" in file, f"{path} holds no branch", sorted(file), "Model.resume", "give what Branch.save wrote"
-        )
-        record = json.loads(str(file["branch"]))
+    record = _record_of(path)
     same = record["scene"] == repr(model.scene) and tuple(record["modes"]) == tuple(model.modes)
     require(same, f"{path} belongs to another scene or other modes", record["modes"], "Model.resume",
             f"use the model of {record['scene']}")  # fmt: skip
     family = Family(model, record["name"], record["period"])
     return Branch(family, restarted(family, tuple(record["span"]), record["walks"], record["status"], record["step"]))
+
+
+def _record_of(path: str | Path) -> dict[str, Any]:
+    """What a saved branch knows; ValueError for another file, or a damaged one."""
+    advice = "give what Branch.save wrote"
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            require("branch" in file, f"{path} holds no branch", sorted(file), "Model.resume", advice)
+            record = json.loads(str(file["branch"]))
+        missing = sorted(RECORDED - set(record))
+        require(
+            not missing,
+            f"{path} must hold all of a branch, {missing} are missing",
+            sorted(record),
+            "Model.resume",
+            advice,
+        )
+    except (ValueError, TypeError, EOFError, AttributeError, BadZipFile, zlib.error) as error:
+        said = str(error)
+        if said.startswith(str(path)):
+            raise
+        raise ValueError(f"{path} is not a saved branch, or is damaged: {said}; {advice}") from None
+    return dict(record)

@@ -275,8 +275,12 @@ def _check_static(scene: Scene, residual: bool, interface: bool) -> None:
             "keep one: either makes the model exact for slow loads at its places")  # fmt: skip
     known = [bool(loaded(scene, body)) for body in range(1 + len(scene.bodies))]
     met = all(known) if interface else any(known) or not residual
-    require(met, "static shapes need a stop, a force or a dashpot, or an element", known, "Scene.reduce",
-            "leave out residual and interface")  # fmt: skip
+    asked = "interface=True" if interface else "residual=True"
+    without = [f"bodies[{number - 1}]" for number, has in enumerate(known) if number and not has]
+    rule = "static shapes need a stop, a force or a dashpot, or an element" + ", on every body" * bool(without)
+    got = f"none on {', '.join(without)}" if without and known[0] else "none"
+    if not met:
+        raise ValueError(f"{rule}, got {got} in Scene.reduce; leave out {asked}, or add one")
 
 
 def _enough(scene: Scene, elements: int | None, omega_max: float | None, mass_share: float | None) -> int:

@@ -46,13 +46,16 @@ from fembeam.study import (
     vary,
 )
 from fembeam.study.backbone import check_backbone
+from fembeam.study.basins import checked_points
+from fembeam.study.campbell import check_modes
 from fembeam.study.measure import Plan
-from fembeam.study.minimum import box_of
+from fembeam.study.minimum import box_of, check_search
 from fembeam.study.mode_count import ModeCount, checked_counts, mode_count
 from fembeam.study.peak import check_peak
 from fembeam.study.quantities import Quantity, named
 from fembeam.study.result import Result, plain
 from fembeam.study.smallest_model import MOST, SmallestModel, check_goal, smallest_model
+from fembeam.study.stationary import FEWEST_IN_SEGMENT
 from fembeam.study.trial import Trial
 from fembeam.study.variation import points_of
 from fembeam.support import Part, require, require_non_negative, require_positive
@@ -64,7 +67,7 @@ if TYPE_CHECKING:
     from fembeam.scene import Scene
     from fembeam.scene_file.reader import SceneFile
 
-NOT_IN_A_FILE = "scene", "start", "solver", "executor"  # arguments of studies that are Python objects
+NOT_IN_A_FILE = "scene", "start", "solver", "executor", "elements"  # Python objects; and what [reduce] says of the mesh
 MOST_SEEDS = 100_000
 
 
@@ -94,8 +97,15 @@ class ModeStudy:
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> ModeCount | SmallestModel:
         """The study; NotMetError when there is no such model."""
-        found: ModeCount | SmallestModel = self.study(file.scene, **{**self.arguments, "seeds": self.seeds})
+        found: ModeCount | SmallestModel = self.study(
+            file.scene, **{**self.arguments, "seeds": self.seeds, **_mesh_of(file)}
+        )
         return found
+
+
+def _mesh_of(file: SceneFile) -> dict[str, Any]:
+    """What [reduce] says of the mesh; studies that choose modes themselves take it too."""
+    return {name: value for name, value in file.reduce.items() if name == "elements"}
 
 
 def _table_of(study: Callable[..., Any]) -> Callable[..., ModeStudy]:
@@ -146,7 +156,7 @@ class SpeedAccuracyTable:
         """The study."""
         methods: list[Any] = [solvers.Exponential(rtol) for rtol in self.rtols]
         methods += [solvers.DormandPrince(rtol) for rtol in self.rtols] + [solvers.RK4(step) for step in self.steps]
-        models = [file.scene.reduce(modes=n) for n in sorted(set(self.modes))]
+        models = [file.scene.reduce(modes=n, **_mesh_of(file)) for n in sorted(set(self.modes))]
         return speed_accuracy(models, methods, self.starts, self.duration, rounds=self.rounds, progress=progress)
 
 
@@ -180,6 +190,13 @@ class EnsembleTable:
         for name, least in (("realisations", 2), ("workers", 1)):
             if getattr(self, name) < least:
                 raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
+        if self.until is not None:
+            require(0.0 < self.until < 1.0, "until must lie in (0, 1)", self.until, "[ensemble]", "e.g. 0.05")
+        if self.discard is not None:
+            require_non_negative("discard", self.discard, "[ensemble]", "give s")
+        right = self.segment is None or self.segment >= FEWEST_IN_SEGMENT
+        require(right, f"segment must be at least {FEWEST_IN_SEGMENT} samples", self.segment, "[ensemble]",
+                "or leave it out")  # fmt: skip
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Ensemble:
         """The ensemble, with its checkpoint ``ensemble.npz`` in the folder."""
@@ -271,6 +288,17 @@ def check_named(body: Any, places: Sequence[Any] | None, quantities: Sequence[st
         )
 
 
+def _check_place(scene: Scene, z: Place | None) -> None:
+    """Raise ValueError for a `z` that the scene does not have: said at once, not after minutes."""
+    if z is None:
+        return
+    asked = scene.at([z], "z")
+    if scene.named:
+        check_named(scene.beam, asked, ())
+    else:
+        on_beam(np.array(asked, dtype=float), scene.beam, "z")
+
+
 @dataclass(frozen=True)
 class OrbitTable:
     """The table [orbit]: one periodic motion by shooting; `Model.orbit` explains more.
@@ -356,7 +384,14 @@ class BranchTable:
     def __post_init__(self) -> None:
         low, high = self.span
         require(low < high, "span must be two values, ascending", self.span, "[branch]", "give [lowest, highest]")
+        within = self.at is None or low <= self.at <= high
+        require(within, f"at must lie in the span of {low:g} to {high:g}", self.at, "[branch]", "or leave it out")
+        require(0.0 < self.step <= 1.0, "step must lie in (0, 1]", self.step, "[branch]", "e.g. 0.04")
         _check_period(self.period, "[branch]")
+
+    def check(self, scene: Scene) -> None:
+        """Raise ValueError for a parameter that the scene does not have."""
+        path_of(scene, self.parameter)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> FoundBranch:
         """The branch, saved as ``branch.npz`` in the folder; continues where an interrupted one left that.
@@ -430,6 +465,18 @@ class BasinsTable:
     longest: int = 8
     threads: int = 1
 
+    def __post_init__(self) -> None:
+        for name, span in (("x_span", self.x_span), ("y_span", self.y_span)):
+            right = len(span) == 2 and -np.inf < span[0] < span[1] < np.inf
+            require(right, f"{name} must be two finite values, ascending", span, "[basins]", "give [lowest, highest]")
+        for name in ("settle", "longest", "threads"):
+            require(getattr(self, name) > 0, f"{name} must be above 0", getattr(self, name), "[basins]", "give a count")
+
+    def check(self, scene: Scene) -> None:
+        """Raise ValueError for points that make no grid, and a place that the scene does not have."""
+        checked_points(self.points)
+        _check_place(scene, self.z)
+
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Basins:
         """The basins, with their checkpoint ``basins.npz`` in the folder."""
         keys = {field.name: getattr(self, field.name) for field in fields(self)}
@@ -453,11 +500,11 @@ class CampbellTable:
         low, high = self.spins
         require(low < high, "spins must be two values, ascending", self.spins, "[campbell]", "give [lowest, highest]")
         require(self.points > 1, "points must be at least 2", self.points, "[campbell]", "e.g. 41")
-        require(self.modes > 0, "modes must be at least 1", self.modes, "[campbell]", "e.g. 4")
+        check_modes(self.modes)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Campbell:
         """The diagram."""
-        return campbell(file.scene, np.linspace(*self.spins, self.points), self.modes)
+        return campbell(file.scene, np.linspace(*self.spins, self.points), self.modes, **_mesh_of(file))
 
 
 @dataclass(frozen=True)
@@ -535,6 +582,7 @@ class PeakTable:
     def check(self, scene: Scene) -> None:
         """Raise ValueError for numbers that the scene does not have, or values that do not ascend."""
         check_peak(scene, self.parameter, self.over, self.values, self.span)
+        _check_place(scene, self.z)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Peak:
         """The study."""
@@ -568,6 +616,7 @@ class FoldTable:
     def check(self, scene: Scene) -> None:
         """Raise ValueError for numbers that the scene does not have, or values that do not ascend."""
         check_peak(scene, self.parameter, self.over, self.values, self.span, "[fold]")
+        _check_place(scene, self.z)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Fold:
         """The study."""
@@ -595,6 +644,7 @@ class BackboneTable:
     def check(self, scene: Scene) -> None:
         """Raise ValueError for numbers that the scene does not have, or levels that do not ascend."""
         check_backbone(scene, self.levels, self.span, self.level, self.parameter)
+        _check_place(scene, self.z)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Backbone:
         """The study."""
@@ -669,6 +719,7 @@ class MinimiseTable:
     def check(self, scene: Scene) -> None:
         """Raise ValueError when the scene cannot be varied like this."""
         ends = box_of(self.parameters).T
+        check_search(self.tolerance, self.most, len(self.parameters))
         _check_trials(self, scene, list(self.parameters), [self.quantity, *(self.constraints or {})], ends)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Minimum:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.statistics.scales import LINEAR, Scale
+from fembeam.support import is_finite
 
 MOST = 64  # batches kept; beyond it neighbours are merged, so that memory stays constant
 
@@ -110,7 +111,7 @@ class Estimate:
         ----------
         M.H. Quenouille, Biometrika 43 (1956) 353 (bias).
         """
-        if not 0.0 < confidence < 1.0:
+        if not (is_finite(confidence) and 0.0 < confidence < 1.0):
             raise ValueError(f"confidence must lie between 0 and 1, got {confidence!r}")
         from scipy.special import stdtrit
 

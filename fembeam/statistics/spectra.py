@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.statistics.batches import Estimate
 from fembeam.statistics.densities import checked_samples
-from fembeam.support import is_whole, number
+from fembeam.support import is_number, is_whole, number
 
 DEFAULT_SEGMENTS = 32  # with half overlap about 63 segments: the standard error of a level is near 13 %
 SHORTEST_DEFAULT = 256  # samples per segment that a short signal still gets
@@ -68,7 +68,7 @@ class Spectrum:
 
     def variance_in(self, lo: float, hi: float) -> float:
         """Part of the variance carried by the bins with lo <= ω <= hi (rad/s)."""
-        if not lo < hi:
+        if not (is_number(lo) and is_number(hi) and lo < hi):
             raise ValueError(f"variance_in needs lo < hi in rad/s, got ({lo!r}, {hi!r})")
         inside = (self.omega >= lo) & (self.omega <= hi)
         return float(self.density[inside].sum() * self.omega[1])

@@ -203,9 +203,14 @@ class FrameMatrices(Assembled):
         shift = np.array([name in COMPONENTS[:3] for _, name in self.labels])
         moving = motion * shift if np.any(motion[shift] > MECHANISM * motion.max()) else motion
         place, name = self.labels[int(np.argmax(moving > 0.999 * moving.max()))]  # nodes come first
+        released = [one.name for one in self.mesh.frame.members if one.release]
+        advice = (
+            "release less, or support it there"
+            if released
+            else "nothing is released, so members differ too much in stiffness, as very short ones do: join their ends"
+        )
         require(rigid, f"the frame must not be a mechanism; {place!r} moves along {name!r} without resistance",
-                [one.name for one in self.mesh.frame.members if one.release], where,
-                "release less, or support it there")  # fmt: skip
+                released or _shortest(self.mesh.frame), where, advice)  # fmt: skip
 
     def section_forces(self, vectors: Vector, inertia: Vector, stresses: Vector | None = None) -> FrameForces:
         """Section forces of displacements (N, n) and of the inertia (N, n) that their stiffness balances."""
@@ -377,3 +382,9 @@ def _with_parabolas(
         labels += [(middles[i], name) for i in mine]
     rows, columns, values = (np.concatenate(one) for one in zip(*entries, strict=True))
     return labels, sparse.csr_matrix((values, (rows, columns)), shape=(row + len(PARABOLAS) * count, len(labels)))
+
+
+def _shortest(frame: Frame) -> str:
+    """The shortest member, for messages."""
+    at = int(np.argmin(frame.lengths))
+    return f"the shortest member {frame.members[at].name} of {frame.lengths[at]:.3g} m"

@@ -26,6 +26,7 @@ Vector = NDArray[np.float64]
 WHERE = "campbell"
 SPARE = 12  # modes at standstill besides twice those shown that the mesh has to know
 BASIS = 48  # modes of that mesh besides twice those shown: a heavy disk that spins fast turns the shaft sharply
+MOST = 64  # modes shown; twice as many take minutes
 ACROSS = 1e-12  # of the largest motion across the shaft, squared: less is twist or stretch, which spin does not excite
 STILL = 1e-9  # of |G|: a rigid motion that does not turn the shaft's axis, such as its own rotation
 SENSES = {1: "forward", -1: "backward", 0: "straight"}
@@ -85,7 +86,7 @@ def campbell(scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | Non
     ----------
     scene : with a straight `Frame` in space, whatever its own spin; its disks, masses, springs and supports count.
     spins : (k,) rad/s, ascending.
-    modes : how many frequencies of each spin.
+    modes : how many frequencies of each spin, 1 to 64.
     elements : of the mesh; None: as few as make the frequencies right to 1e-6.
 
     Returns
@@ -94,7 +95,7 @@ def campbell(scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | Non
 
     Raises
     ------
-    ValueError : a body that is no shaft, spins that are not ascending numbers, modes that is no count.
+    ValueError : a body that is no shaft, spins that are not ascending numbers, modes that is no such count.
 
     References
     ----------
@@ -112,7 +113,7 @@ def campbell(scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | Non
     speeds = np.atleast_1d(numbers("spins", spins, WHERE, "give rad/s, such as np.linspace(0, 600)"))
     valid = speeds.ndim == 1 and speeds.size > 0 and bool(np.isfinite(speeds).all() and np.all(np.diff(speeds) > 0))
     require(valid, "spins must be finite and ascending, (k,)", spins, WHERE, "give rad/s, such as np.linspace(0, 600)")
-    require(is_whole(modes) and modes > 0, "modes must be a whole number above 0", modes, WHERE, "give a count")
+    check_modes(modes)
     basis, G, across = _at_unit_spin(scene, int(modes), elements)
     found = [reduction.whirl(basis, spin * G, *across) for spin in speeds]
     met = reduction.critical_speeds(basis, G, *across)
@@ -123,6 +124,12 @@ def campbell(scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | Non
         np.array([one.turning[:modes] for one in found]),
         critical[np.abs(critical) <= np.abs(speeds).max()],
     )
+
+
+def check_modes(modes: Any) -> None:
+    """Raise ValueError unless modes is a count that takes seconds: time grows with its third power."""
+    require(is_whole(modes) and modes > 0, "modes must be a whole number above 0", modes, WHERE, "give a count")
+    require(modes <= MOST, f"modes must be at most {MOST}", modes, WHERE, "ask for fewer, e.g. 8")
 
 
 def _bends(found: reduction.Whirl, across: tuple[Any, Any]) -> NDArray[np.bool_]:

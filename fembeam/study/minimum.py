@@ -181,9 +181,8 @@ def minimise(
     ('damping.zeta[0]',)
     """
     box, limits = box_of(parameters), _limits(constraints or {})
-    require(0.0 < number("tolerance", tolerance) < 0.1, "tolerance must lie in (0, 0.1)", tolerance, WHERE, "e.g. 1e-4")
+    check_search(tolerance, most, len(box))
     looks = LOOKS * len(box)
-    require(is_whole(most) and most > looks, f"most must be above the {looks} first points", most, WHERE, "e.g. 200")
     plan = Plan(duration, dt, discard, tuple(seeds), start, solver)
     asked = [quantity, *(one for one, _ in limits)]
     known = gradients is None or isinstance(gradients, (bool, np.bool_))
@@ -197,6 +196,13 @@ def minimise(
     search.look(first, executor, WHERE if progress else None)
     converged = search.descend(tolerance, most, gradients)
     return _found(search, tolerance, converged)
+
+
+def check_search(tolerance: float, most: int, count: int) -> None:
+    """Raise ValueError unless so many parameters can be searched by at most so many points, to this tolerance."""
+    require(0.0 < number("tolerance", tolerance) < 0.1, "tolerance must lie in (0, 0.1)", tolerance, WHERE, "e.g. 1e-4")
+    looks = LOOKS * count
+    require(is_whole(most) and most > looks, f"most must be above the {looks} first points", most, WHERE, "e.g. 200")
 
 
 def box_of(parameters: Mapping[str, Any]) -> Vector:

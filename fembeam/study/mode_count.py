@@ -173,6 +173,7 @@ def mode_count(
     start: Start | None = None,
     solver: Any = None,
     executor: Executor | None = None,
+    elements: int | None = None,
 ) -> ModeCount:
     """How a quantity converges with the number of modes.
 
@@ -190,6 +191,7 @@ def mode_count(
     start : function of a model that gives its initial state, such as ``lambda m: m.state(velocity=…)``; None: rest.
     solver : one of `solvers`; None: `Exponential(1e-8)` without energy balance.
     executor : any `concurrent.futures.Executor`; counts are spread over it.
+    elements : of the mesh of all counts; None: for each as few as make its frequencies right to 1e-6.
 
     Returns
     -------
@@ -224,15 +226,15 @@ def mode_count(
     plan = Plan(duration, dt, discard, tuple(seeds), start, solver)
     plan.check(scene, kept)
     kinds = kinds_of(scene, residual)
-    arguments: list[dict[str, Any]] = [{"modes": n, "residual": kind} for kind in kinds for n in chosen]
+    mesh = {} if elements is None else {"elements": elements}
+    arguments: list[dict[str, Any]] = [{"modes": n, "residual": kind, **mesh} for kind in kinds for n in chosen]
     if reference == "full":
-        elements = scene.matrices(modes=max(chosen)).elements
-        arguments.append({"modes": "all", "elements": elements})
+        arguments.append({"modes": "all", "elements": scene.matrices(elements, max(chosen)).elements})
     elif reference is not None:
         chosen = checked_counts([*chosen, reference])
-        arguments.append({"modes": reference, "residual": kinds[-1]})
+        arguments.append({"modes": reference, "residual": kinds[-1], **mesh})
     arguments = [a for i, a in enumerate(arguments) if a not in arguments[:i]]
-    finest = arguments[-1] if reference is not None else {"modes": max(chosen), "residual": kinds[-1]}
+    finest = arguments[-1] if reference is not None else {"modes": max(chosen), "residual": kinds[-1], **mesh}
     method = solvers.Exponential(ledger=False) if solver is None else solver
     items = [
         Case(scene, tuple(a.items()), plan, kept, (method, *(_looser(method, plan) if a == finest else ())))

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -20,7 +19,7 @@ from fembeam.model import Run, extremes_of, places
 from fembeam.model.extremes import of_top
 from fembeam.scene import Place
 from fembeam.statistics import psd
-from fembeam.support import require
+from fembeam.support import is_finite, is_whole, require
 
 if TYPE_CHECKING:
     from fembeam.study.gradients import Change
@@ -152,12 +151,15 @@ class Psd:
     sampled: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        lo, hi = self.band
-        require(0 <= lo < hi, "band must be (lo, hi) in rad/s, 0 ≤ lo < hi", self.band, "Psd", "e.g. (1, 1200)")
-        require(self.parts >= 1, "parts must be at least 1", self.parts, "Psd", "e.g. 12")
+        two = isinstance(self.band, (tuple, list)) and len(self.band) == 2 and all(map(is_finite, self.band))
+        right = two and 0 <= self.band[0] < self.band[1]
+        require(right, "band must be (lo, hi) in rad/s, 0 ≤ lo < hi", self.band, "Psd", "e.g. (1, 1200)")
+        right = is_whole(self.parts) and self.parts >= 1
+        require(right, "parts must be a whole number of at least 1", self.parts, "Psd", "e.g. 12")
 
     def __call__(self, run: Run) -> Vector:
         """Value of a run."""
+        require(len(run.t) > 1, "the run must have samples", len(run.t), "Psd", "give dt")
         dt = float(run.t[1] - run.t[0])
         fits = self.band[1] * dt < np.pi
         require(fits, f"dt must be below {np.pi / self.band[1]:.3g} s for a band to {self.band[1]:g} rad/s", dt, "Psd",
@@ -168,8 +170,12 @@ class Psd:
         require(fewest, f"the run must last {8 * segment * dt:.3g} s for parts of {width:g} rad/s", float(run.t[-1]),
                 "Psd", "run longer, or use fewer parts")  # fmt: skip
         spectrum = psd(signal(run, self.stop, self.z)[0], dt, max(8, segment))
+        # a line stands for half a step to both sides: whole lines would make parts of four now and then five
+        step = spectrum.omega[1]
+        borders = np.concatenate(([0.0], spectrum.omega + step / 2))
+        below = np.concatenate(([0.0], np.cumsum(spectrum.density) * step))
         edges = np.linspace(*self.band, self.parts + 1)
-        return np.array([spectrum.variance_in(lo, hi) for lo, hi in pairwise(edges)]) / width
+        return np.asarray(np.diff(np.interp(edges, borders, below)) / width)
 
 
 class Density(OfSignal):
@@ -191,8 +197,7 @@ class MeanEnergy:
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
-        assert run.model is not None
-        return mean_in_time(run, np.sum(run.q_dot**2 + (run.q * run.model.omega) ** 2, axis=1) / 2)
+        return mean_in_time(run, np.sum(run.q_dot**2 + (run.q * run.readout.omega) ** 2, axis=1) / 2)
 
     def derivative(self, change: Change) -> float:
         """By a parameter."""

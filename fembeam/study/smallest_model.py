@@ -161,12 +161,13 @@ def smallest_model(
     most: int = MOST,
     start: Start | None = None,
     executor: Executor | None = None,
+    elements: int | None = None,
 ) -> SmallestModel:
     """The fewest coordinates and the loosest rtol that give a quantity to a relative tolerance.
 
     Parameters
     ----------
-    scene, quantity, duration, dt, discard, seeds, residual, start, executor : as for `mode_count`.
+    scene, quantity, duration, dt, discard, seeds, residual, start, executor, elements : as for `mode_count`.
     tolerance : relative, in (0, 1); of the norm if the quantity is an array.
     most : modes that an answer may have, 1 to 64.
 
@@ -197,7 +198,9 @@ def smallest_model(
     check_goal(tolerance, most)
     plan, kept = Plan(duration, dt, discard, tuple(seeds), start), named(quantity)
     plan.check(scene, kept)
-    return Search(scene, kept, plan, float(tolerance), int(most), kinds_of(scene, residual), executor).answer()
+    return Search(
+        scene, kept, plan, float(tolerance), int(most), kinds_of(scene, residual), executor, elements
+    ).answer()
 
 
 def check_goal(tolerance: float, most: int) -> None:
@@ -219,6 +222,7 @@ class Search:
     most: int
     kinds: tuple[bool, ...]
     executor: Executor | None
+    elements: int | None = None
     seen: dict[Choice, Measured] = field(default_factory=dict)
 
     def answer(self) -> SmallestModel:
@@ -242,7 +246,7 @@ class Search:
         models = dict.fromkeys(choice[:2] for choice in new)  # one reduction serves all tolerances
         groups = [[choice for choice in new if choice[:2] == model] for model in models]
         items = [
-            Case(self.scene, (("modes", n), ("residual", kind)), self.plan, self.quantity,
+            Case(self.scene, (("modes", n), ("residual", kind), *self._mesh.items()), self.plan, self.quantity,
                  tuple(solvers.Exponential(choice.rtol, ledger=False) for choice in group))
             for (n, kind), group in zip(models, groups, strict=True)
         ]  # fmt: skip
@@ -251,6 +255,11 @@ class Search:
             for group, measured in zip(groups, found, strict=True):
                 self.seen.update(zip(group, measured, strict=True))
         return [self.seen[choice] for choice in choices]
+
+    @property
+    def _mesh(self) -> dict[str, Any]:
+        """The argument of `Scene.reduce` for a mesh that was asked for."""
+        return {} if self.elements is None else {"elements": self.elements}
 
     def _reference(self) -> Choice:
         """The finest model measured so far."""
@@ -325,9 +334,10 @@ class Search:
             f"{_words(choice)}, rtol = {choice.rtol:.0e}; error {sum(bounds):.2e} = {bounds[0]:.2e} reduction + "
             f"{bounds[1]:.2e} integration; {checked:.2e} off twice the modes at rtol/100"
         )
+        model = self.scene.reduce(choice.modes, residual=choice.residual, **self._mesh)
         return SmallestModel(
             label(self.quantity), self.tolerance, verdict, tuple(self._errors()), tuple(lines), True, choice,
-            self.scene.reduce(modes=choice.modes, residual=choice.residual), line.measured.mean, *bounds, checked,
+            model, line.measured.mean, *bounds, checked,
         )  # fmt: skip
 
     def _failure(self, rejected: set[Choice]) -> SmallestModel:

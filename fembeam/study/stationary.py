@@ -33,7 +33,7 @@ from fembeam.statistics.initial_transient import Settling, settling
 from fembeam.statistics.spectra import FINEST_RESOLUTION
 from fembeam.study.result import Result
 from fembeam.study.segments import Segment, Segments
-from fembeam.support import Part, bar, note, number
+from fembeam.support import Part, bar, is_whole, note, number, numbers, require
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 Watch = Callable[[Run], Any]
 FEWEST_BATCHES = 16  # before `until` is asked
+FEWEST_IN_SEGMENT = 8  # samples, as of `statistics.psd`
 TRIES = 4  # segments dropped while the transient lasts
 
 
@@ -95,15 +96,15 @@ class Response(Result):
         """Probability densities of the signals against the Gaussian."""
         return plot.random_densities(self.signals)
 
-    def power(self, contact: int | None = None) -> Estimate:
-        """Mean power (W) that a stop or element takes, numbered as in a `Run`; None: all of them together.
+    def power(self, contact: int | str | None = None) -> Estimate:
+        """Mean power (W) that a stop or element takes, numbered or named as in a `Run`; None: all of them together.
 
         From the work done on it, and its loss by friction; the change of the energy stored averages to zero.
         """
         mine, count = self._numbered(contact), len(self.names)
         return self.work.estimate(lambda sums: sum(sums[1 + i] + sums[1 + count + i] for i in mine) / sums[0])
 
-    def wear(self, contact: int | None = None) -> Estimate:
+    def wear(self, contact: int | str | None = None) -> Estimate:
         """Mean work rate by friction (W) of a stop, μN|v| in slip, which wear goes by; None: of all of them together.
 
         0 of stops without friction. What impacts take is `power` less this.
@@ -111,10 +112,14 @@ class Response(Result):
         mine, count = self._numbered(contact), len(self.names)
         return self.work.estimate(lambda sums: sum(sums[1 + count + i] for i in mine) / sums[0])
 
-    def _numbered(self, contact: int | None) -> list[int]:
+    def _numbered(self, contact: int | str | None) -> list[int]:
         """The numbers of a stop or element, or of all; ValueError for one that is none."""
         count = len(self.names)
-        if contact is not None and not -count <= contact < count:
+        if isinstance(contact, str):
+            require(contact in self.names, f"contact must be one of {', '.join(self.names)}", contact, "Response",
+                    "give its name or number")  # fmt: skip
+            contact = self.names.index(contact)
+        if contact is not None and not (is_whole(contact) and -count <= contact < count):
             raise ValueError(f"contact must be below {count}, the number of stops and elements, got {contact!r}")
         return list(range(count)) if contact is None else [contact % count]
 
@@ -194,6 +199,7 @@ def stationary(
     True
     """
     check(model, duration, dt, until, discard)
+    _check_options(watch, segment, bins, levels)
     segment = segment or default_segment(dt)
     solver = solver or solvers.Exponential(1e-8, ledger=False)
     plan = Segments.of(model, duration, dt, discard, start, solver, segment)
@@ -203,7 +209,7 @@ def stationary(
     with bar(duration, progress) as report:
         for whole in plan.pieces():
             piece: Segment | None = whole
-            seen = {name: _samples(look(whole.run)) for name, look in watched.items()}
+            seen = {name: _looked(name, look, whole.run) for name, look in watched.items()}
             if settled is None and discard is None:
                 settled, piece = _after_transient(whole, [x for x, _ in seen.values()], plan)
             if piece is None:
@@ -301,11 +307,34 @@ def _warn_of_a_short_run(plan: Segments, settled: Settling | None) -> None:
                       f"simulate at least {2 * plan.shortest:.3g} s", UserWarning, stacklevel=3)  # fmt: skip
 
 
-def _samples(seen: Any) -> tuple[Vector, Vector | None]:
-    """Samples and rates from what a watch returned."""
-    if isinstance(seen, tuple):
-        return seen
-    return np.asarray(seen, dtype=np.float64), None
+def _looked(name: str, look: Watch, run: Run) -> tuple[Vector, Vector | None]:
+    """Samples and rates of a watched signal, one for every sample of the run."""
+    seen = look(run)
+    both = seen if isinstance(seen, tuple) else (seen,)
+    found = [numbers(f"watch[{name!r}]", one, "stationary", "return samples, or (samples, rates)") for one in both]
+    right = len(found) in (1, 2) and all(one.shape == run.t.shape for one in found)
+    require(right, f"watch[{name!r}] must return a value for each of the {len(run.t)} samples, or (samples, rates)",
+            [one.shape for one in found], "stationary", "e.g. run.q[:, 0]")  # fmt: skip
+    return found[0], found[1] if len(found) == 2 else None
+
+
+def _check_options(watch: Any, segment: Any, bins: Any, levels: Any) -> None:
+    """Bad options, before any computing."""
+    where = "stationary"
+    for name, given in (("watch", watch), ("bins", bins), ("levels", levels)):
+        require(given is None or isinstance(given, Mapping), f"{name} must be a mapping by names of signals", given,
+                where, 'such as {"δ": …}')  # fmt: skip
+    for name, look in (watch or {}).items():
+        require(callable(look), f"watch[{name!r}] must be a function of a run", look, where, "lambda run: run.q[:, 0]")
+    right = segment is None or (is_whole(segment) and segment >= FEWEST_IN_SEGMENT)
+    require(right, f"segment must be a whole number of samples, at least {FEWEST_IN_SEGMENT}", segment, where,
+            "or leave it out")  # fmt: skip
+    for name, given in (bins or {}).items():
+        edges = numbers(f"bins[{name!r}]", given, where, "give rising edges")
+        rising = edges.ndim == 1 and edges.size > 1 and np.isfinite(edges).all() and bool(np.all(np.diff(edges) > 0))
+        require(bool(rising), f"bins[{name!r}] must be two or more finite edges that rise", given, where, "sort them")
+    for name, given in (levels or {}).items():
+        number(f"levels[{name!r}]", given)
 
 
 def default_segment(dt: float) -> int:

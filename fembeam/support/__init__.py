@@ -8,6 +8,7 @@ from fembeam.support.checks import (
     in_mm,
     is_finite,
     is_name,
+    is_number,
     is_whole,
     number,
     numbers,
