@@ -76,7 +76,7 @@ from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 from solvers.problem.friction import STIFFNESS as FRICTION_STIFFNESS
 
 _END_ERROR, _INNER_ERROR = 1.5e-19, 2.7e-11  # of ẍ = -ω² x: at the end, over (ωh)^17; inside, over (ωh)^9; ωh < 6
-_TOO_MUCH, _LITTLE = 6.0, 0.03  # such a part, in force tolerances, by which steps get shorter, and a level longer
+_TOO_MUCH, _LITTLE = 6.0, 0.03  # part of a force left out, in its tolerances: what may be rounding, and what is kept
 _OF_SURFACE, _FLOOR = 0.2, 1e-20  # rounding of δ at a node, in units of `surface_tolerance` without its floor, m
 _FADED, _MOST_RADIANS = 100.0, 1e5  # e^-100 counts as zero; more radians in a run take over 25 000 steps
 

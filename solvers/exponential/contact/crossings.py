@@ -302,7 +302,7 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
         if not bends and tables.bend[s] == FORCE:
             if _pulls_inside(scratch.stages, size + 3 + 2 * s, width):
                 return TOO_LONG
-            if scratch.side[s] > 0.0 and side_at(problem, tables, state, s, x, scratch.trial) < 0.0:
+            if s == stop and scratch.side[s] > 0.0 and side_at(problem, tables, state, s, x, scratch.trial) < 0.0:
                 return TOO_LONG  # behind the last stage, where the force of a light dashpot turns
         if force_turns(scratch.stages, size + 3 + 2 * s, width, state.active[s, PEAK_FORCE], 1.0):
             return TOO_LONG
