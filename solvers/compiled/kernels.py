@@ -400,13 +400,23 @@ def slider_of(problem, s):
     return problem.parameters[s, problem.friction[s, 0] :]
 
 
+@reordered
+def plane_motion(problem, r, x):
+    """Motion u, u̇, w, ẇ of row r and of the next one; in one loop, as four sums by themselves take twice as long."""
+    u, u_dot, w, w_dot = -problem.gap[r], 0.0, -problem.gap[r + 1], 0.0
+    for i in range(2 * problem.k.size):
+        u += problem.read[r, i] * x[i]
+        u_dot += problem.read_rate[r, i] * x[i]
+        w += problem.read[r + 1, i] * x[i]
+        w_dot += problem.read_rate[r + 1, i] * x[i]
+    return u, u_dot, w, w_dot
+
+
 @inner
 def rows_at(problem, s, x):
     """Motion of the rows of an element with friction: u, u̇, w, ẇ, and of a third row with its sign changed, else 0."""
     first, size, turned, turning = row_of(problem, s), 2 * problem.k.size, 0.0, 0.0
-    u, u_dot = dot(problem.read[first], x, size) - problem.gap[first], dot(problem.read_rate[first], x, size)
-    w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
-    w_dot = dot(problem.read_rate[first + 1], x, size)
+    u, u_dot, w, w_dot = plane_motion(problem, first, x)
     if first + 2 < row_of(problem, s + 1):
         turned, turning = -dot(problem.read[first + 2], x, size), -dot(problem.read_rate[first + 2], x, size)
     return u, u_dot, w, w_dot, turned, turning
@@ -535,12 +545,8 @@ def indentation_and_rate(problem, s, x):
 @part(RADIAL_MOTION, types.UniTuple(REAL, 2), types.int64, VECTOR)
 def radial_motion(problem, s, x):
     """(δ, m, δ̇, m/s) of a circular clearance; at the centre δ̇ is that of going outward."""
-    square, product, speed, size = 0.0, 0.0, 0.0, 2 * problem.k.size
-    for r in range(row_of(problem, s), row_of(problem, s) + 2):
-        u = dot(problem.read[r], x, size) - problem.gap[r]
-        v = dot(problem.read_rate[r], x, size)
-        square, product, speed = square + u * u, product + u * v, speed + v * v
-    return radial(square, product, speed, problem.radius[s])
+    u, u_dot, w, w_dot = plane_motion(problem, row_of(problem, s), x)
+    return radial(u * u + w * w, u * u_dot + w * w_dot, u_dot * u_dot + w_dot * w_dot, problem.radius[s])
 
 
 @inlined
@@ -565,13 +571,10 @@ def radial_acceleration(radius, u, u_dot, u_twice, w, w_dot, w_twice):
 @part(RADIAL_ACCELERATION, REAL, types.int64, VECTOR, VECTOR)
 def _radial_acceleration(problem, s, x, rate):
     """δ̈ = ±(u̇·u̇ + u·ü - ṙ²)/r of a circular clearance."""
-    square, product, along, size = 0.0, 0.0, 0.0, 2 * problem.k.size
-    for r in range(row_of(problem, s), row_of(problem, s) + 2):
-        u, v = dot(problem.read[r], x, size) - problem.gap[r], dot(problem.read_rate[r], x, size)
-        square, product = square + u * u, product + u * v
-        along += v * v + u * dot(problem.read_rate[r], rate, size)
-    found = (along - product * product / square) / math.sqrt(square)
-    return found if problem.radius[s] > 0.0 else -found
+    first, size = row_of(problem, s), 2 * problem.k.size
+    u, u_dot, w, w_dot = plane_motion(problem, first, x)
+    u_twice, w_twice = dot(problem.read_rate[first], rate, size), dot(problem.read_rate[first + 1], rate, size)
+    return radial_acceleration(problem.radius[s], u, u_dot, u_twice, w, w_dot, w_twice)
 
 
 @part(RADIAL_PUSH, types.void, types.int64, REAL, VECTOR, VECTOR)

@@ -21,7 +21,6 @@ from solvers.compiled.friction import (
     friction_force,
     spring_stretch,
     xi_acceleration_of,
-    xi_and_rate_of,
     xi_of,
     xi_rate_of,
 )
@@ -33,7 +32,6 @@ from solvers.compiled.kernels import (
     delta_of,
     force_at,
     indentation,
-    indentation_and_rate,
     indentation_rate,
     inlined,
     inner,
@@ -70,26 +68,25 @@ _JUST_INSIDE = 1e-200  # m: there forces like δ^{1/4} have an unbounded slope, 
 
 @inner
 def point_of(problem, s, t, x, rate, point):
-    """Write the point of an element with friction in a state x with the rate x'."""
-    radius, slider, rows = radius_of(problem, s), slider_of(problem, s), rows_at(problem, s, x)
-    u, u_dot, w, w_dot, turned, turning = rows
+    """Write the point of an element with friction in a state x with the rate x'; ξ only of a slider that sticks."""
+    u, u_dot, w, w_dot, _, _ = motion_without_accelerations(problem, s, t, x, point)
     u_twice, w_twice, turning_rate = accelerations_at(problem, s, rate)
-    point[DELTA], point[RATE] = delta_of(radius, rows)
+    radius, slider = radius_of(problem, s), slider_of(problem, s)
     point[ACCELERATION] = radial_acceleration(radius, u, u_dot, u_twice, w, w_dot, w_twice)
-    point[XI], point[XI_RATE] = xi_and_rate_of(radius, slider, t, u, u_dot, w, w_dot, turned, turning)
     args = u, u_dot, u_twice, w, w_dot, w_twice, turning_rate
     point[XI_ACCELERATION] = xi_acceleration_of(radius, slider, *args)
 
 
 @inner
 def motion_without_accelerations(problem, s, t, x, point):
-    """The same without accelerations, and with ξ only of a slider that sticks: enough for most margins."""
+    """The same without accelerations, which is enough for most margins; returns the motion of the rows."""
     radius, slider, rows = radius_of(problem, s), slider_of(problem, s), rows_at(problem, s, x)
     u, u_dot, w, w_dot, turned, turning = rows
     point[DELTA], point[RATE] = delta_of(radius, rows)
     point[XI] = xi_of(radius, slider, t, u, w, turned) if slider[CODE] == 0.0 else 0.0
     point[XI_RATE] = xi_rate_of(radius, slider, u, u_dot, w, w_dot, turning)
     point[ACCELERATION] = point[XI_ACCELERATION] = 0.0
+    return rows
 
 
 @inlined
@@ -159,8 +156,10 @@ def slider_force(problem, s, segment, entry_rate, t, x):
     """F_t, N, of a stop with friction in a state, 0 while it is open."""
     if segment == 0:
         return 0.0
-    normal = normal_force(problem, s, segment, entry_rate, *indentation_and_rate(problem, s, x))
-    return friction_force(radius_of(problem, s), slider_of(problem, s), xi_and_rate_at(problem, s, t, x)[0], normal)
+    radius, slider, rows = radius_of(problem, s), slider_of(problem, s), rows_at(problem, s, x)
+    u, _, w, _, turned, _ = rows
+    xi = xi_of(radius, slider, t, u, w, turned) if slider[CODE] == 0.0 else 0.0
+    return friction_force(radius, slider, xi, normal_force(problem, s, segment, entry_rate, *delta_of(radius, rows)))
 
 
 @inner

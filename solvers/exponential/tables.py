@@ -72,6 +72,7 @@ class Tables(NamedTuple):
     work: Annotated[Any, "f, S, S"]  # ∫ F dδ = Σ F_i (Σ work_ij (δ_j - δ₀) + work_end_i (δ - δ₀ at the end)), plain F
     work_end: Annotated[Any, "f, S"]
     summary: Annotated[Any, "f, S, 8"]  # from node values: last four Jacobi coefficients, ends' values, slopes
+    node_slopes: Annotated[Any, "f, S, S"]  # h δ̈ at the nodes from δ̇ there less that at the start
     lagrange: Annotated[Any, "f, 2, S"]  # 1/Π (σ_j - σ_i) of the nodes' polynomials, and the same over σ_j^λ
     tail: Annotated[Any, "f, S, 8"]  # from node values of a signal, its Legendre coefficients in σ, the last four first
     local_interpolation: Annotated[Any, "f, S, 2*S+2, 2*S"]  # δ, h δ̇ around a node from those at all and the start

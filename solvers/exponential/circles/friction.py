@@ -50,6 +50,18 @@ def count_of(problem, s):
 
 
 @inlined
+def _angle_between(product, along):
+    """Angle, rad, between two vectors from their products, the crossed one and the scalar one."""
+    tangent = product / along
+    if not (along > 0.0 and abs(tangent) <= _SMALL):
+        return math.atan2(product, along)
+    square, total = tangent * tangent, 0.0
+    for odd in (15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0):  # as `_small_arctangents`
+        total = square * (1.0 / odd - total)
+    return tangent - tangent * total
+
+
+@inlined
 def surface_part(slider, t, turned):
     """Part of ξ by the rotation of the surface, which is known and may be whole turns within a step."""
     return math.copysign(1.0, slider[ARM]) * turned + slider[ARM] * slider[SPIN] * t
@@ -67,14 +79,15 @@ def nearest_turn(xi, known, radius):
 @inner
 def xi_continued(problem, scratch, s, t, x, i):
     """ξ in the state x at time t, at the turn that continues ξ at node i."""
-    slider, radius, first = slider_of(problem, s), radius_of(problem, s), row_of(problem, s)
+    slider, first = slider_of(problem, s), row_of(problem, s)
     u, _, w, _, turned, _ = rows_at(problem, s, x)
+    if not is_circle(problem, s):
+        return -w
+    u_i, w_i = scratch.motion[first, 0, i], scratch.motion[first + 1, 0, i]
     turned_at_node = -scratch.motion[first + 2, 0, i] if count_of(problem, s) > 2 else 0.0
-    rotation, known = (
-        surface_part(slider, t, turned),
-        scratch.slid[s, NODE_XI, i] - surface_part(slider, scratch.node_time[i], turned_at_node),
-    )
-    return rotation + nearest_turn(xi_of(radius, slider, t, u, w, turned) - rotation, known, radius)
+    rotation = surface_part(slider, t, turned) - surface_part(slider, scratch.node_time[i], turned_at_node)
+    angle = _angle_between(u_i * w - w_i * u, u_i * u + w_i * w)
+    return scratch.slid[s, NODE_XI, i] + abs(radius_of(problem, s)) * angle + rotation
 
 
 @inner

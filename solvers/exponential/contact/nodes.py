@@ -114,6 +114,7 @@ class NodeSets(NamedTuple):
     work: Any
     work_end: Any
     summary: Any
+    node_slopes: Any
     tail: Any
     local_interpolation: Any
     local_interval: Any
@@ -158,6 +159,7 @@ def node_sets_of(series: tuple[tuple[float, float], ...]) -> NodeSets:
         work=each(lambda f: _work_weights(f.nodes)[:, :S]),
         work_end=each(lambda f: _work_weights(f.nodes)[:, S]),
         summary=each(_summary),
+        node_slopes=each(_node_slopes),
         tail=each(lambda f: _tail(f.nodes)),
         local_interpolation=each(lambda f: [_interpolate_locally(f, *bracket) for bracket in _brackets(f)]),
         local_interval=each(_brackets),
@@ -176,6 +178,12 @@ def _summary(node_set: _NodeSet) -> Any:
     if node_set.weight_exponent:
         rows[4], rows[5] = 0.0, rows[5] * node_set.nodes ** (-node_set.weight_exponent)
     return rows.T
+
+
+def _node_slopes(node_set: _NodeSet) -> Any:
+    """(S, S) slopes h dF/dt at the nodes of the polynomial through values there, taken from that at σ = 0."""
+    pace = node_set.time_exponent * node_set.nodes ** (node_set.time_exponent - 1.0)
+    return (_differentiation(np.append(node_set.nodes, 0.0))[:S, :S] / pace[:, None]).T
 
 
 def _plain_weights(node_set: _NodeSet) -> Any:

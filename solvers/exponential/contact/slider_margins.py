@@ -25,7 +25,7 @@ from solvers.compiled.kernels import (
     xi_and_rate_at,
 )
 from solvers.compiled.parts import RUB_AROUND, RUB_IN, RUB_MARGINS, RUB_PEAK, part
-from solvers.compiled.simd import largest8, load8, size8
+from solvers.compiled.simd import largest8, load8, size8, splat8, store8
 from solvers.compiled.sliding import (
     ACCELERATION,
     POINT,
@@ -101,21 +101,12 @@ def slider_margins_in(problem, state, scratch, s, t, x, later, out):
     slider_margins(problem, s, state.segment[s], state.entry_rate[s], moved, out)
 
 
-@merged
+@inlined
 def _node_accelerations(tables, scratch, node_set, h, s, rates, out):
     """δ̈ at the nodes: slopes of the polynomial through δ̇ there and at the start."""
-    nodes, weights, start = tables.nodes[node_set], tables.lagrange[node_set, 0], scratch.start_motion[s, 1]
-    own = 1.0
-    for i in range(S):
-        own /= -nodes[i]
-    for i in range(S):
-        weight, total = weights[i] / nodes[i], 0.0
-        for j in range(S):
-            if j != i:
-                total += weights[j] / nodes[j] / (weight * (nodes[i] - nodes[j])) * (rates[j] - rates[i])
-        total += own / (weight * nodes[i]) * (start - rates[i])
-        kappa = tables.time_exponent[node_set]
-        out[i] = total / (h * kappa * nodes[i] ** (kappa - 1.0))
+    store8(scratch.trial, 0, load8(rates, 0) - splat8(scratch.start_motion[s, 1]))
+    combine(tables.node_slopes[node_set], scratch.trial, S, None, out)
+    store8(out, 0, load8(out, 0) / splat8(h))
 
 
 @inlined
