@@ -197,13 +197,18 @@ class Model(Printed, ModalEquations):
             the log, but has no sample), or the output times themselves, increasing; None keeps the final state and
             the contact log only, no histories.
         start : (2n,) as made by `rest`, `state` or `equilibrium`; None is rest. Or the (2n + l,) of `Run.end`, with
-            what the laws have latched, from which the run goes on.
+            what the laws have latched, from which the run goes on, of signals that begin anew at t = 0.
         solver : one of the methods in `solvers`; None is the library's best.
         progress : show a bar (on terminals and in notebooks only).
 
         Returns
         -------
         Run : after Ctrl-C partial, and its status says so.
+
+        Warns
+        -----
+        UserWarning : a stop whose law goes by the rate of entry moves in contact at the given start, which holds no
+            such rate.
 
         Raises
         ------
@@ -215,6 +220,8 @@ class Model(Printed, ModalEquations):
         if dt is not None:
             numbers("dt", dt, "Model.simulate", "give the output sampling in s, or output times")
         q, q_dot, memory = initial_states.split_start(self, self.rest() if start is None else start)
+        if start is not None:
+            initial_states.warn_of_entries(self, q, q_dot)
         model = self.for_duration(duration)
         with bar(duration, progress) as report:
             solution = solvers.integrate(
