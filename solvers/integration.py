@@ -328,7 +328,8 @@ class _Run:
 
     def _held(self, s: int) -> tuple[float, float, float]:
         """Energy in the spring of a slider as the run began and now, J, and how far it is drawn now if in slip, m."""
-        problem, state, law = self.engine.problem, self.state, self.system.contacts[s].law
+        problem, state = self.engine.problem, self.state
+        law: Any = self.system.contacts[s].law
         own, k_t = problem.parameters[s, law.place :], law.friction.stiffness
         force = slider_force(problem, s, state.segment[s], state.entry_rate[s], state.now[T], state.x)
         slips = state.segment[s] > 0 and abs(own[CODE]) == 1.0
