@@ -539,3 +539,6 @@ def test_a_run_that_goes_on_within_a_contact_warns_of_its_rate_of_entry(run):
         elastic.simulate(1e-4, start=elastic.simulate(within).end)
         pressed = replace(run.model.scene, stops=[replace(run.model.scene.stops[0], gap=-1e-4)], base=None).reduce(2)
         pressed.simulate(1e-4, start=pressed.equilibrium())
+        noisy = replace(pressed.scene, base=fb.BandNoise(2e-4, (0.0, 900.0), seed=1)).reduce(2)
+        warnings.filterwarnings("ignore", message=".* one realisation")
+        fb.study.stationary(noisy, 2.0, 1e-3, discard=0.1)  # whose segments go on wherever the one before has come to

@@ -71,10 +71,11 @@ def split_start(model: Model, start: ArrayLike) -> tuple[Vector, Vector, tuple[V
     return x[:n], x[n : 2 * n], tuple(latched)
 
 
-def warn_of_entries(model: Model, q: Vector, q_dot: Vector) -> None:
+def warn_of_entries(model: Model, start: ArrayLike) -> None:
     """Warn of stops that move in contact at a start, and whose laws go by the rate of entry, which no start holds."""
     from solvers.orbits import latching_stops
 
+    q, q_dot, _ = split_start(model, start)
     closed = [s for s, one in enumerate(model.system.contacts) if not one.always and one.indentation(q) > 0.0]
     for s in set(closed) & set(latching_stops(model.system)) if closed else ():
         with np.errstate(divide="ignore", invalid="ignore"):  # at the centre of a post, which is refused

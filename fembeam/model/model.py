@@ -214,14 +214,25 @@ class Model(Printed, ModalEquations):
         ------
         ValueError for bad input before computing; solvers.SolverError when the method fails.
         """
+        if start is not None:
+            initial_states.warn_of_entries(self, start)
+        return self.go_on(duration, dt, start, solver, progress)
+
+    def go_on(
+        self,
+        duration: float,
+        dt: float | ArrayLike | None,
+        start: ArrayLike | None,
+        solver: Any = None,
+        progress: bool = False,
+    ) -> Run:
+        """The same as `simulate`, from a start in the middle of a contact without a warning."""
         from fembeam.model.run import Made, Run
 
         require_positive("duration", duration, "Model.simulate", "give s")
         if dt is not None:
             numbers("dt", dt, "Model.simulate", "give the output sampling in s, or output times")
         q, q_dot, memory = initial_states.split_start(self, self.rest() if start is None else start)
-        if start is not None:
-            initial_states.warn_of_entries(self, q, q_dot)
         model = self.for_duration(duration)
         with bar(duration, progress) as report:
             solution = solvers.integrate(
