@@ -321,13 +321,19 @@ class _Run:
         found = np.zeros((len(contacts), 3))
         for s in np.flatnonzero(problem.friction[:, 0]).tolist():
             law: Any = contacts[s].law
-            own, k_t = problem.parameters[s, law.place :], law.friction.stiffness
-            force = slider_force(problem, s, state.segment[s], state.entry_rate[s], state.now[T], state.x)
             work, impulse, way = state.x[problem.friction[s, 1] :][:ACCOUNTS]
-            slips = state.segment[s] > 0 and abs(own[CODE]) == 1.0
-            stored = 0.5 * (force**2 - own[BEGUN] ** 2) / k_t
-            found[s] = work - stored, law.arm * law.spin * impulse, way - (abs(force) / k_t if slips else 0.0)
+            begun, stored, drawn = self._held(s)
+            found[s] = work - (stored - begun), law.arm * law.spin * impulse, way - drawn
         return found
+
+    def _held(self, s: int) -> tuple[float, float, float]:
+        """Energy in the spring of a slider as the run began and now, J, and how far it is drawn now if in slip, m."""
+        problem, state = self.engine.problem, self.state
+        law: Any = self.system.contacts[s].law
+        own, k_t = problem.parameters[s, law.place :], law.friction.stiffness
+        force = slider_force(problem, s, state.segment[s], state.entry_rate[s], state.now[T], state.x)
+        slips = state.segment[s] > 0 and abs(own[CODE]) == 1.0
+        return 0.5 * own[BEGUN] ** 2 / k_t, 0.5 * force**2 / k_t, abs(force) / k_t if slips else 0.0
 
     def _balances(self, record: Record) -> bool:
         """Whether the energy balance closes, where it is kept and has not been watched along."""
@@ -358,6 +364,7 @@ class _Run:
         """The event list; contacts under way end last, at no time."""
         state = self.engine.state
         logged, segments = state.log[: state.count[LOGGED]].copy(), state.segment.tolist()
+        self._count_held(logged)
         if not any(segments):
             return logged
         under_way = [s for s, segment in enumerate(segments) if segment > 0]
@@ -369,7 +376,15 @@ class _Run:
         for s, row in zip(rubbing, more, strict=True):
             slider_row(self.engine.problem, state, s, self.time, row)
             row[[at.TIME, at.CLIPPED]] = math.nan, 0.0
+            row[[at.WORK, at.FORCE]] -= self._held(s)[1:]
         return np.concatenate((logged, rows, more))
+
+    def _count_held(self, logged: Array) -> None:
+        """Count what springs of sliders held as the run began as brought into the contacts under way then."""
+        begun = (logged[:, at.GUARD] == at.FRICTION) & (logged[:, at.CLIPPED] == 1.0) & (logged[:, at.TIME] == 0.0)
+        for i in np.flatnonzero(begun).tolist():
+            logged[i, at.WORK] -= self._held(int(logged[i, at.ELEMENT]))[0]
+            logged[i, at.FORCE] = 0.0  # the slider's way, which began with what its spring was drawn
 
 
 _NEARLY = 0.95  # of half a turn

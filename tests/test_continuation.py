@@ -13,7 +13,7 @@ import solvers.branches.count_changes
 import solvers.branches.walk
 from contacts import law
 from solvers import Contact, Exponential, OrbitError, System, branch, integrate, orbit
-from solvers.branches import BranchStatus
+from solvers.branches import BranchStatus, restarted
 
 DAMPED = Bilinear(1.1, zeta=0.05)  # doubles its period between 0.83 and 0.93 rad/s
 GAPPED = Bilinear(0.8, zeta=0.05, gap=2.0)
@@ -229,6 +229,25 @@ def test_an_interrupted_iteration_resumes():
     assert sorted(found.parameter for found in interrupted) == sorted(whole)
     assert [found.parameter for found in interrupted.orbits] == whole
     assert len(list(interrupted)) == len(whole)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_branch_restarted_before_its_second_direction_began_follows_both(count):
+    """From its records alone: the first orbit of each direction tells no way, and both went the same."""
+    start = DAMPED.orbit(DAMPED.settled(60))[0]
+    interrupted = branch(over(DAMPED), (1.0, 1.2), start, at=1.1, step=0.5)
+    list(itertools.islice(interrupted, count))
+    walks = [
+        [
+            {"parameter": one.parameter, "state": one.whole.tolist(), "phase": one.phase, "mark": one.mark}
+            | {"iterations": one.iterations}
+            for one in walk.orbits
+        ]
+        for walk in interrupted.walks
+    ]
+    again = restarted(over(DAMPED), (1.0, 1.2), walks, [one.name for one in interrupted.status], 0.5).run()
+    assert {again.orbits[0].parameter, again.orbits[-1].parameter} == {1.0, 1.2}
+    assert again.status == (BranchStatus.END, BranchStatus.END)
 
 
 def test_a_branch_goes_on_from_a_branch(damped):

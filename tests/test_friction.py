@@ -273,6 +273,23 @@ def test_a_run_goes_on_from_the_middle_of_a_stick(method):
 
 
 @every_method
+@pytest.mark.parametrize("cut", [0.0014, 0.0017, 0.002])
+def test_the_log_of_a_contact_cut_in_slip_or_stick(method, cut):
+    """Loss and slip of both parts add up to those of the whole contact: what the spring holds belongs to neither."""
+    system, start = wall(), ([-1e-3, 0.0], [0.8, 0.6])
+    whole = integrate(system, *start, 0.004, method=method)
+    first = integrate(system, *start, cut, method=method)
+    rest = integrate(system, first.q[-1], first.q_dot[-1], 0.004 - cut, method=method, memory=first.memory)
+    assert np.isnan(first.friction.t_out[0])
+    for name, size in (("energy_loss", 0.02), ("slip", 1e-4), ("impulse", 0.01)):
+        total = sum(getattr(part.friction, name)[0] for part in (first, rest))
+        assert total == pytest.approx(getattr(whole.friction, name)[0], abs=1e-8 * size), name
+    for part in (first, rest):
+        assert part.friction.energy_loss[0] == pytest.approx(part.losses.friction[0], abs=1e-10)
+        assert part.friction.slip[0] == pytest.approx(part.losses.slip[0], abs=1e-12)
+
+
+@every_method
 def test_a_slip_from_the_entry_sticks_within_the_first_step(method):
     """N = 0 at the entry, and Ṅ begins below what slip needs and grows; times are of `DormandPrince`."""
     run = bounce(wall(Polynomial([4e5, 0.0, 4e12])), 0.27, method)

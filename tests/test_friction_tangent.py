@@ -47,6 +47,18 @@ def test_the_tangent_is_that_of_differences(name):
     assert abs(run.tangent - expected).max() < 2e-5 * abs(expected).max()
 
 
+@pytest.mark.parametrize("law", [Hertz(1e5) + KelvinVoigt(2e4, 20.0), Hertz(1e5) + PiecewiseLinear([3e5])])
+@pytest.mark.parametrize("outer", [False, True])
+def test_the_tangent_of_a_spinning_disc_that_sticks_at_an_entry_under_a_broken_power(law, outer):
+    """The first step is linearised in a frame that moves with the entry, in which the way of the spin moves too."""
+    system = disc(law, mu=5.0, spin=6.0, springs=20.0, outer=outer)
+    q, q_dot = ([-1.5, 0.3, 0.0], [4.0, 0.9, -3.0]) if outer else ([0.5, 0.1, 0.0], [4.5, 1.8, -1.5])
+    run = integrate(system, q, q_dot, 0.3, method=FINE, tangent=True)
+    assert len(run.contacts) == 1
+    expected = by_differences(system, q, q_dot, 0.3)
+    assert abs(run.tangent - expected).max() < 2e-5 * abs(expected).max()
+
+
 @pytest.mark.parametrize("clamp", [False, True])
 @pytest.mark.parametrize("v_t", [0.1, 1.5])
 def test_the_tangent_where_a_law_pulls_as_it_opens(clamp, v_t):

@@ -3,6 +3,7 @@
 import math
 import os
 import pickle
+import warnings
 from dataclasses import fields, replace
 
 import numpy as np
@@ -523,3 +524,21 @@ def test_model_survives_pickling(model):
 def test_bad_arguments_are_refused_in_words(run, ask, message):
     with pytest.raises(ValueError, match=message):
         ask(run)
+
+
+def test_a_run_that_goes_on_within_a_contact_warns_of_its_rate_of_entry(run):
+    """Hysteretic's, not KelvinVoigt's; at rest in contact it is the floor, as ever."""
+    log = run.contacts
+    within, open_again = 0.5 * (log.t_in[0] + log.t_out[0]), log.t_out[0] + 1e-4
+    with pytest.warns(UserWarning, match="is in contact at the start, and its law goes by the rate"):
+        run.model.simulate(1e-4, start=run.model.simulate(within).end)
+    elastic = replace(run.model.scene, stops=[replace(run.model.scene.stops[0], law=KelvinVoigt(1e5, 2.0))]).reduce(2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run.model.simulate(1e-4, start=run.model.simulate(open_again).end)
+        elastic.simulate(1e-4, start=elastic.simulate(within).end)
+        pressed = replace(run.model.scene, stops=[replace(run.model.scene.stops[0], gap=-1e-4)], base=None).reduce(2)
+        pressed.simulate(1e-4, start=pressed.equilibrium())
+        noisy = replace(pressed.scene, base=fb.BandNoise(2e-4, (0.0, 900.0), seed=1)).reduce(2)
+        warnings.filterwarnings("ignore", message=".* one realisation")
+        fb.study.stationary(noisy, 2.0, 1e-3, discard=0.1)  # whose segments go on wherever the one before has come to

@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -160,6 +161,47 @@ def test_laws_with_memory():
     np.testing.assert_allclose(found.end, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
     other = integrate(slider(limit), q, v, duration, method=FINE, tangent=True).memory_tangent
     np.testing.assert_allclose(found.matrix, other, rtol=0, atol=1e-9 * np.abs(other).max())
+
+
+# --- sampled loads ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("length", [1e-3, 1e-4])
+def test_a_pulse_that_hides_within_a_panel(length):
+    """One slow mode in flight: motion grows with the pulse's peak, and moves with its beginning."""
+    knock, times = fb.Pulse(100.0, length, 0.0103), np.linspace(0.02, 0.4, 7)
+
+    def by(name):
+        def make(value):
+            return System.modal([110.0], [0.02], loads=[([1.0], replace(knock, **{name: value}))])
+
+        value = getattr(knock, name)
+        nearby = Nearby.of(make, value, 1e-6 * value)
+        return sensitivity(make(value), [0.0], [0.0], 0.4, times, nearby, method=FINE)
+
+    by_peak, by_begin = by("peak"), by("at")
+    run = integrate(System.modal([110.0], [0.02], loads=[([1.0], knock)]), [0.0], [0.0], 0.4, times, FINE)
+    size = np.abs(run.q).max()
+    np.testing.assert_allclose(100.0 * by_peak.states[:, :1], run.q, rtol=0, atol=1e-6 * size)
+    np.testing.assert_allclose(-by_begin.states[:, :1], run.q_dot, rtol=0, atol=1e-6 * np.abs(run.q_dot).max())
+
+
+def test_the_peak_under_a_load_with_kinks():
+    """Straight lines between samples, ten of them in a contact: the top of the force is met between two kinks."""
+    load = np.random.default_rng(3).standard_normal(41)
+    record = fb.Record(1e-3 * np.arange(41), 200.0 * load, quantity="force", interpolation="linear")
+
+    def make(gap):
+        return System.modal([150.0], [0.01], [Contact([-1.0], PiecewiseLinear([1e5]), gap)], [([1.0], record)])
+
+    gap, duration = 1e-3, 0.04
+    found = sensitivity(make(gap), [0.0], [0.3], duration, nearby=Nearby.of(make, gap, 1e-6), method=FINE)
+
+    def peaks(step):
+        return integrate(make(gap + step), [0.0], [0.3], duration, method=Exponential(1e-12)).contacts.peak_force
+
+    expected = five_points(peaks, 1e-6)
+    np.testing.assert_allclose(found.peak_force, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 
 # --- invariants ------------------------------------------------------------------------------------------------------

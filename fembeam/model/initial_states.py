@@ -71,6 +71,25 @@ def split_start(model: Model, start: ArrayLike) -> tuple[Vector, Vector, tuple[V
     return x[:n], x[n : 2 * n], tuple(latched)
 
 
+def warn_of_entries(model: Model, start: ArrayLike) -> None:
+    """Warn of stops that move in contact at a start, and whose laws go by the rate of entry, which no start holds."""
+    from solvers.orbits import latching_stops
+
+    q, q_dot, _ = split_start(model, start)
+    closed = [s for s, one in enumerate(model.system.contacts) if not one.always and one.indentation(q) > 0.0]
+    for s in set(closed) & set(latching_stops(model.system)) if closed else ():
+        with np.errstate(divide="ignore", invalid="ignore"):  # at the centre of a post, which is refused
+            rate = abs(model.system.contacts[s].motion(q, q_dot)[1])
+        if rate > 0.0:
+            warnings.warn(
+                f"{model.contact_rows[s].name} is in contact at the start, and its law goes by the rate at which the "
+                f"contact was entered, which a start does not hold: it is taken as that of now, {rate:.3g} m/s; of a "
+                "run that goes on from another one, end that one where this stop is open",
+                UserWarning,
+                stacklevel=3,
+            )
+
+
 def missed(model: Model, field: Field | Sequence[Field]) -> float:
     """‖u - Φq‖/‖u‖ in the mass norm."""
     return _missed(model, _nodal(model, field))

@@ -197,7 +197,7 @@ class Model(Printed, ModalEquations):
             the log, but has no sample), or the output times themselves, increasing; None keeps the final state and
             the contact log only, no histories.
         start : (2n,) as made by `rest`, `state` or `equilibrium`; None is rest. Or the (2n + l,) of `Run.end`, with
-            what the laws have latched, from which the run goes on.
+            what the laws have latched, from which the run goes on, of signals that begin anew at t = 0.
         solver : one of the methods in `solvers`; None is the library's best.
         progress : show a bar (on terminals and in notebooks only).
 
@@ -205,10 +205,28 @@ class Model(Printed, ModalEquations):
         -------
         Run : after Ctrl-C partial, and its status says so.
 
+        Warns
+        -----
+        UserWarning : a stop whose law goes by the rate of entry moves in contact at the given start, which holds no
+            such rate.
+
         Raises
         ------
         ValueError for bad input before computing; solvers.SolverError when the method fails.
         """
+        if start is not None:
+            initial_states.warn_of_entries(self, start)
+        return self.go_on(duration, dt, start, solver, progress)
+
+    def go_on(
+        self,
+        duration: float,
+        dt: float | ArrayLike | None,
+        start: ArrayLike | None,
+        solver: Any = None,
+        progress: bool = False,
+    ) -> Run:
+        """The same as `simulate`, from a start in the middle of a contact without a warning."""
         from fembeam.model.run import Made, Run
 
         require_positive("duration", duration, "Model.simulate", "give s")

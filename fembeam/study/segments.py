@@ -107,7 +107,7 @@ class Segments:
         model, later = self.model, partial(continued, time=self.time, duration=duration)
         if self.repeats:  # all changes at once: each makes another scene and system
             model = renewed(model, lambda _, seed: child(seed, i), later)
-        run = model.simulate(duration, self.dt, self.state, self.solver)
+        run = model.go_on(duration, self.dt, self.state, self.solver)
         if not run.complete:
             raise KeyboardInterrupt
         self.seconds += run.cost.seconds
@@ -150,7 +150,7 @@ class Segments:
 
 def _pilot(model: Model, duration: float, dt: float, state: Vector, solver: Any) -> Run:
     """A run by which the level of the motion is seen."""
-    run = model.simulate(math.ceil(duration / dt - 1e-9) * dt, dt, state, solver)
+    run = model.go_on(math.ceil(duration / dt - 1e-9) * dt, dt, state, solver)
     if not run.complete:
         raise KeyboardInterrupt
     return run

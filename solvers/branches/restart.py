@@ -27,18 +27,25 @@ def restarted(
 
     A record has parameter, state (as `Orbit.whole`), phase, mark, iterations.
     """
+    upwards = [walks[0][0]["parameter"] < span[1], False]  # of one direction alone only one has room
     return Branch(
         [
-            _restarted_walk(make_system, span, records, BranchStatus[name], step, method)
-            for records, name in zip(walks, status, strict=True)
+            _restarted_walk(make_system, span, records, BranchStatus[name], step, method, up)
+            for records, name, up in zip(walks, status, upwards, strict=False)
         ]
     )
 
 
 def _restarted_walk(
-    make: Any, span: tuple[float, float], records: list[dict[str, Any]], status: BranchStatus, step: float, method: Any
+    make: Any,
+    span: tuple[float, float],
+    records: list[dict[str, Any]],
+    status: BranchStatus,
+    step: float,
+    method: Any,
+    up: bool,
 ) -> Walk:
-    """One direction; orbits are integrated again, their states are not changed."""
+    """One direction, up or down from its first orbit; orbits are integrated again, their states are not changed."""
     points: list[Point] = []
     system, period = make(records[0]["parameter"])
     method, width = checked(system, period, method, 1), span[1] - span[0]
@@ -48,9 +55,9 @@ def _restarted_walk(
         problem = PeriodicProblem(make, method, (record["phase"] / period,), 1e-6 * width)
         chain, error, _ = newton(problem, x, record["parameter"], slope=True)
         metric = points[0].metric if points else metric_of(problem, chain, width)
-        moved = np.append(x.ravel(), record["parameter"])
+        moved = np.append(np.zeros(x.size), 1.0 if up else -1.0)
         if points:
-            moved = moved - points[-1].unknowns
+            moved = np.append(x.ravel(), record["parameter"]) - points[-1].unknowns
             moved[:-1] *= problem.fractions == points[-1].problem.fractions
         point = point_of(problem, chain, error, record["iterations"], metric, moved)
         points.append(replace(point, orbit=replace(point.orbit, mark=record["mark"])))
@@ -60,4 +67,5 @@ def _restarted_walk(
         first = replace(first, tangent=first.tangent * np.sign(ahead))
     walk = Walk(first, span, step)
     walk.point, walk.orbits, walk.status = points[-1], [point.orbit for point in points], status
+    walk.passed, walk.values = [first, *points[1:]], [point.chain.parameter for point in points]
     return walk

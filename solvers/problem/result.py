@@ -170,7 +170,8 @@ class ContactLog(Columns):
 class FrictionLog(Columns):
     """What friction did in the contacts that have it, in order of their end, one array entry each.
 
-    A contact still open at the end has t_out = NaN, angle_out and speed_out as then.
+    A contact still open at the end has t_out = NaN, angle_out and speed_out as then. What its spring holds then, or
+    held as the run began, is no loss and no slip.
 
     Attributes
     ----------

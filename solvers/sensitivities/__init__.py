@@ -2,9 +2,9 @@
 
 `nearby` differences the data of a system, `laws` calls compiled laws and their derivatives, `elements` has the forces
 of stops on lines, of circular clearances and of friction, `panels` integrates linear modes under forces given at nodes,
-`stretches` divides a run at its events, `events` has the jumps there, `flow` solves the variational equation in
-between, `variation` follows a run and collects the results. Imports: `integration` and what it imports. Begin with
-`variation.sensitivity`.
+`stretches` divides a run at its events, `sampled` where loads are quick, `events` has the jumps there, `flow` solves
+the variational equation in between, `variation` follows a run and collects the results. Imports: `integration` and what
+it imports. Begin with `variation.sensitivity`.
 """
 
 from solvers.sensitivities.events import NoDerivativeError

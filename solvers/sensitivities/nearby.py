@@ -18,7 +18,8 @@ _STENCILS = {  # offsets in steps, weights per step with errors of fourth order,
     -1: ((0, -1, -2, -3, -4), (25 / 12, -4.0, 3.0, -4 / 3, 1 / 4), (3 / 2, -2.0, 1 / 2, 0.0, 0.0)),
 }
 _ROUNDING = 1e-9  # of data, relative; well above that of the modes of a fine mesh
-_PROBES = np.linspace(0.0, 1.0, 37)  # times, in units of the run, at which a signal is compared
+_PROBES = np.linspace(0.0, 1.0, 37)  # times, in units of the run, at which tones are compared
+_COARSE = 1e-6  # rtol of node tables that tell whether signals are the same
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,9 +208,16 @@ def _signal(nearby: Nearby, system: System, i: int, duration: float) -> Callable
         return None
     if all(hasattr(signal, "tones") for signal in signals):
         slope = _of_tones(nearby, own.tones(), [signal.tones() for signal in signals])
-    else:
-        slope = partial(_of_values, nearby, signals)
-    return slope if np.any(slope(duration * _PROBES)) else None
+        return slope if np.any(slope(duration * _PROBES)) else None
+    return None if _same_tables(signals, duration) else partial(_of_values, nearby, signals)
+
+
+def _same_tables(signals: list[Any], duration: float) -> bool:
+    """Whether signals have one node table, which tells of pulses too that hide between any probes."""
+    if not all(hasattr(signal, "nodes") for signal in signals):
+        return False
+    (dt, rows), *others = [signal.nodes(duration, _COARSE) for signal in signals]
+    return all(h == dt and np.array_equal(table, rows) for h, table in others)
 
 
 def _of_values(nearby: Nearby, signals: list[Any], t: Array) -> Array:

@@ -27,13 +27,13 @@ X, W = 0.5 * (_X + 1.0), 0.5 * _W  # on [0, 1]
 _LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_X, S - 1))  # values at nodes -> coefficients
 
 
-def _lagrange(at: Array) -> Array:
+def lagrange(at: Array) -> Array:
     """Values (..., S) at points of [0, 1] of the polynomials that are 1 at one node and 0 at the others."""
     return np.asarray(np.polynomial.legendre.legvander(2.0 * at - 1.0, S - 1) @ _LEGENDRE)
 
 
-_WITHIN = _lagrange(X[:, None] * X)  # (i, q, j): ℓ_j at node q of the interval before node i
-_FINE, _NEWTON = _lagrange(np.linspace(0.0, 1.0, 4 * S + 1)), 4  # where a maximum is looked for, and steps from there
+_WITHIN = lagrange(X[:, None] * X)  # (i, q, j): ℓ_j at node q of the interval before node i
+_FINE, _NEWTON = lagrange(np.linspace(0.0, 1.0, 4 * S + 1)), 4  # where a maximum is looked for, and steps from there
 
 
 @dataclass(frozen=True)
@@ -206,7 +206,7 @@ class Panels:
         """States (q, 2n, m) at times t (q,) of the polynomials through states (2n, P, S, m) at the nodes."""
         sigma = self.clock.place(t)
         panel = np.clip(np.searchsorted(self.edges, sigma, side="right") - 1, 0, len(self) - 1)
-        values = _lagrange((sigma - self.edges[panel]) / self.widths[panel])
+        values = lagrange((sigma - self.edges[panel]) / self.widths[panel])
         return np.einsum("qs,bqsm->qbm", values, states[:, panel])
 
 

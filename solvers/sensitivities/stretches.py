@@ -17,6 +17,7 @@ from solvers.problem import event_list as at
 from solvers.sensitivities import laws
 from solvers.sensitivities.elements import ElementMotion, Slider, motion_of
 from solvers.sensitivities.panels import Clock, Panels
+from solvers.sensitivities.sampled import SampledLoads
 
 _RADIANS = 1.5  # of the fastest motion in one panel
 _FEWEST = 2  # panels between two events while elements act
@@ -124,10 +125,10 @@ def grouped(rows: Array) -> list[tuple[float, list[Array]]]:
 
 
 class Division:
-    """Divides a run into stretches, with panels fine enough for its modes and its laws."""
+    """Divides a run into stretches, with panels fine enough for its modes, its laws and its loads."""
 
-    def __init__(self, system: System, forced: bool, depth: Array, bends: Array) -> None:
-        self.system, self.forced, self.bends = system, forced, bends
+    def __init__(self, system: System, forced: bool, depth: Array, bends: Array, sampled: SampledLoads) -> None:
+        self.system, self.forced, self.bends, self.sampled = system, forced, bends, sampled
         self.k, self.c = system.blocks.k, system.blocks.c
         tones = [signal.tones()[0] for _, signal in system.loads if hasattr(signal, "tones")] if forced else []
         speeds = np.sqrt(np.abs(self.k)), np.abs(self.c), *(np.abs(np.asarray(tone, float)) for tone in tones)
@@ -164,14 +165,17 @@ class Division:
         clock = Clock(start, end, max([1, *(_power(self.system.contacts[s]) for s in acting.elements)]))
         speed = max([self.fastest, *(self.stiffest[s] for s in acting.elements)])
         count = refinement * (_FEWEST + math.ceil((end - start) * speed / _RADIANS))
+        bends = self.bends[(self.bends > start) & (self.bends < end)]
+        marks = np.concatenate((bends, self.sampled.edges(start, end)))
+        count, own = count + marks.size, count
         if count * len(self.k) > _MOST_NODES:
             raise ValueError(
                 f"a sensitivity over {end - start:g} s with motion of {speed:.3g} rad/s takes {count} panels; "
                 "keep fewer modes, or shorten the run"
             )
-        edges, bends = np.linspace(0.0, 1.0, count + 1), self.bends[(self.bends > start) & (self.bends < end)]
-        if bends.size:
-            edges = np.unique(np.concatenate((edges, clock.place(bends))))
+        edges = np.linspace(0.0, 1.0, own + 1)
+        if marks.size:
+            edges = np.unique(np.concatenate((edges, clock.place(marks))))
         return Stretch(start, end, acting, Panels(self.k, self.c, clock, edges))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from solvers.sensitivities.events import GRAZING, NoDerivativeError, called, cro
 from solvers.sensitivities.flow import Flow, latched_columns
 from solvers.sensitivities.nearby import Change, Nearby, unchanged
 from solvers.sensitivities.panels import Panels, S, coefficients, interpolated, largest, zeros
+from solvers.sensitivities.sampled import SampledLoads
 from solvers.sensitivities.stretches import (
     Acting,
     Division,
@@ -198,6 +200,11 @@ class _Request:
     span: Array = field(default_factory=lambda: np.zeros(0))  # (E,) size of each element's displacement
     depth: Array = field(default_factory=lambda: np.zeros(0))  # (E,) largest indentation, m
 
+    @cached_property
+    def sampled(self) -> SampledLoads:
+        """Loads that are no tones, as the run takes them."""
+        return SampledLoads(self.system, self.duration, min(max(self.method.rtol, 1e-12), 1e-6))
+
     def dense_times(self) -> Array:
         """Times dense enough to see how near each stop comes."""
         fastest = float(np.sqrt(np.abs(self.system.blocks.k)).max(initial=0.0))
@@ -292,7 +299,7 @@ class _Walk:
         system, by = asked.system, asked.by
         self.asked, self.rows, self.events = asked, rows, dict(grouped(rows))
         self.acting = acting_at_start(system, asked.x, rows, asked.memory)
-        division = Division(system, by.forced, asked.depth, bends)
+        division = Division(system, by.forced, asked.depth, bends, asked.sampled)
         self.stretches = list(division.stretches(self.acting, rows, asked.duration, refinement))
         wanted = [np.array([0.0, asked.duration]), asked.times, *(t for one in self.stretches for t in one.times)]
         times = np.unique(np.clip(np.concatenate(wanted), 0.0, asked.duration))

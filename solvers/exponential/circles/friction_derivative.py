@@ -47,7 +47,7 @@ from solvers.exponential.circles.friction import (
     xi_and_rate_at_nodes,
 )
 from solvers.exponential.contact.nodes import S
-from solvers.problem.friction import CODE, FREE, SLIDER, STIFFNESS
+from solvers.problem.friction import ARM, CODE, FREE, SLIDER, SPIN, STIFFNESS
 
 _OF_SLIDER = 1  # index of s among the latched numbers of an element
 
@@ -213,7 +213,8 @@ def rubbing_by_parameter(problem, ahead, behind, tables, past, scratch, derivati
 def rubbing_residual(problem, tables, scratch, derivatives, variation, node_set, level, begin, c, s, shift, place, at):
     """Right-hand sides for the changes of the forces on the rows at the nodes, in column c, into ``scratch.residual``.
 
-    ``scratch.motion`` holds the change of motion of the rows without that of the forces.
+    ``scratch.motion`` holds the change of motion of the rows without that of the forces. In a frame that moves with an
+    entry the clock of the spin is moved, too.
     """
     first, m, slider, slopes = (
         row_of(problem, s),
@@ -222,6 +223,7 @@ def rubbing_residual(problem, tables, scratch, derivatives, variation, node_set,
         scratch.row_slopes[9 * s :],
     )
     parameter, latched = is_parameter(variation, derivatives, c), derivatives.latched[c, _latched_place(problem, s)]
+    latched -= slider[ARM] * slider[SPIN] * shift
     for i in range(S):
         t = begin + tables.contact_step[level] * tables.times[node_set, i]
         d_normal = derivatives.entry[c, s] * scratch.slope[s, 2, i]
