@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fembeam.scene import At, BodyMatrices, LocalCoordinate, at_parts, is_pair, said, split, told
 from fembeam.structures import COMPONENTS, direction_of, named, nearest, require_components, turns
-from fembeam.support import is_whole, require
+from fembeam.support import is_whole, require, tuples
 
 Vector = NDArray[np.float64]
 USUAL = 6  # places that tables and figures show unasked
@@ -138,11 +138,6 @@ class PlacedShapes:
         require_components(along, self.components, f"the place {told(place)}", "phi")
         part = np.array([along[COMPONENTS.index(component)] for component in self.components])
         return np.asarray(part @ self.motion_with_supports(place))
-
-
-def tuples(value: Any) -> Any:
-    """Lists of JSON as tuples."""
-    return tuple(tuples(one) for one in value) if isinstance(value, list) else value
 
 
 def _motion_at(body: BodyMatrices, vectors: Vector, place: Any) -> Vector:

@@ -10,7 +10,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fembeam.beams import SAME_PLACE, Section
 from fembeam.structures.assembled import COMPONENTS
@@ -352,9 +352,3 @@ def _require_name(what: str, name: str, names: list[str], where: str, advice: st
     """Raise ValueError, with the nearest name, unless a place is one of these."""
     close = "" if name in names else nearest(name, names)
     require(name in names, f"a place must {what} of the frame; {close}", name, where, advice)
-
-
-def total_mass(frame: Frame) -> float:
-    """Σ ρA L in kg."""
-    masses: ArrayLike = [one.section.line_mass for one in frame.members]
-    return float(np.dot(masses, frame.lengths))

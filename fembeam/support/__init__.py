@@ -17,6 +17,7 @@ from fembeam.support.checks import (
     require_non_negative,
     require_place,
     require_positive,
+    tuples,
 )
 from fembeam.support.files import write_rows, written_whole
 from fembeam.support.notes import note

@@ -115,6 +115,17 @@ def numbers(name: str, values: Any, where: str, advice: str) -> NDArray[np.float
     return given.astype(np.float64)
 
 
+def tuples(value: Any) -> Any:
+    """Tuples for lists, as files have them: of places, directions, pairs of these.
+
+    Examples
+    --------
+    >>> tuples("lever"), tuples(["A-B", 0.4]), tuples([["A-B", 0.4], "x"])
+    ('lever', ('A-B', 0.4), (('A-B', 0.4), 'x'))
+    """
+    return tuple(tuples(one) for one in value) if isinstance(value, list) else value
+
+
 def frozen(values: ArrayLike) -> NDArray[np.float64]:
     """A read-only copy, so that neither side can change the other's numbers."""
     result = np.array(values, dtype=np.float64)
