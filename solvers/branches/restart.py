@@ -21,27 +21,22 @@ def restarted(
     walks: list[list[dict[str, Any]]],
     status: list[str],
     step: float,
-    method: Any = None,
 ) -> Branch:
     """A branch restored from records of its orbits per direction.
 
     A record has parameter, state (as `Orbit.whole`), phase, mark, iterations.
     """
-    return Branch(
-        [
-            _restarted_walk(make_system, span, records, BranchStatus[name], step, method)
-            for records, name in zip(walks, status, strict=True)
-        ]
-    )
+    both = zip(walks, status, strict=True)
+    return Branch([_restarted_walk(make_system, span, records, BranchStatus[name], step) for records, name in both])
 
 
 def _restarted_walk(
-    make: Any, span: tuple[float, float], records: list[dict[str, Any]], status: BranchStatus, step: float, method: Any
+    make: Any, span: tuple[float, float], records: list[dict[str, Any]], status: BranchStatus, step: float
 ) -> Walk:
     """One direction; orbits are integrated again, their states are not changed."""
     points: list[Point] = []
     system, period = make(records[0]["parameter"])
-    method, width = checked(system, period, method, 1), span[1] - span[0]
+    method, width = checked(system, period, None, 1), span[1] - span[0]
     for record in records:
         _, period = make(record["parameter"])
         x = np.array([record["state"]])
