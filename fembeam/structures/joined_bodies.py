@@ -19,7 +19,7 @@ from fembeam.structures.directions import nearest
 from fembeam.structures.frame_forces import FrameForces
 from fembeam.structures.frame_mesh import FrameMatrices
 from fembeam.structures.joints import Joint, joined_fields, joining, shared_dofs, translations_of
-from fembeam.support import is_whole, require
+from fembeam.support import is_numbered, require
 
 Vector = NDArray[np.float64]
 APART = 1e-6  # of the size of the bodies: two places that a joint makes one
@@ -358,7 +358,7 @@ def located_among(bodies: Mapping[int, Any], place: Any, where: str) -> tuple[in
 
     ValueError for one that does not exist, or that several bodies have and not number 0.
     """
-    if isinstance(place, (tuple, list)) and len(place) == 2 and is_whole(place[0]):
+    if is_numbered(place):
         number, own = int(place[0]), place[1]
         listed = ", ".join(map(str, bodies))
         require(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 
 from fembeam.structures.assembled import COMPONENTS, Assembled
-from fembeam.support import is_whole, require, require_place, tuples
+from fembeam.support import is_numbered, is_whole, require, require_place, tuples
 
 Vector = NDArray[np.float64]
 
@@ -63,7 +63,7 @@ class Joint:
     body: int = 0
 
     def __post_init__(self) -> None:
-        paired = isinstance(self.to, (tuple, list)) and len(self.to) == 2 and is_whole(self.to[0])
+        paired = is_numbered(self.to)
         require(paired, "to must be (number of a body, its place)", self.to, "Joint", "write to=(1, 'flange')")
         for number in (self.body, self.to[0]):
             require(is_whole(number) and number >= 0, "bodies must be counted from 0, the first", number, "Joint",

@@ -9,6 +9,8 @@ from fembeam.support.checks import (
     is_finite,
     is_name,
     is_number,
+    is_numbered,
+    is_pair,
     is_whole,
     number,
     numbers,

@@ -77,14 +77,21 @@ def is_name(value: object) -> TypeGuard[str]:
     return False
 
 
+def is_pair(value: Any) -> bool:
+    """Whether a value is two things in a row."""
+    return isinstance(value, (tuple, list)) and len(value) == 2
+
+
+def is_numbered(place: Any) -> bool:
+    """Whether a place is (number of a body, its place)."""
+    return is_pair(place) and is_whole(place[0])
+
+
 def require_place(z: Any, part: object) -> None:
     """Raise ValueError unless z is a place for a part of a scene: a coordinate along a beam, or a name."""
-    if isinstance(z, (tuple, list)) and len(z) == 2:
-        if is_name(z[0]) and is_finite(z[1]):
-            return
-        if is_whole(z[0]) and z[0] >= 0:  # (number of a joined body, its place)
-            return require_place(z[1], part)
-    if is_name(z):
+    if is_numbered(z) and z[0] >= 0:
+        return require_place(z[1], part)
+    if is_name(z) or (is_pair(z) and is_name(z[0]) and is_finite(z[1])):
         return
     require_finite("z", z, type(part).__name__, "give the coordinate along the beam in m")
 
