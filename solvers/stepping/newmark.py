@@ -213,8 +213,23 @@ def _reply(problem, h, s, work):
 def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
     """`newmark` on decoupled modes."""
     return newmark(
-        *(rhs, _flight, _solve, _reply, problem, t, h, x, rate, segment, entry_rate),
-        *(x_new, rate_new, dense, work, rtol, atol),
+        rhs,
+        _flight,
+        _solve,
+        _reply,
+        problem,
+        t,
+        h,
+        x,
+        rate,
+        segment,
+        entry_rate,
+        x_new,
+        rate_new,
+        dense,
+        work,
+        rtol,
+        atol,
     )
 
 
