@@ -53,7 +53,7 @@ def test_a_frame_shows_the_bodies_where_they_are(run):
 def test_no_force_is_lost_between_pictures(run):
     log = run.contacts
     for frames in (2, 7, 40):
-        stage = animation._Stage(run, animation._samples(run, None, frames), None)
+        stage = animation._stage(run, animation._samples(run, None, frames), None)
         for stop, shown in enumerate(stage.forces):
             mine = log.peak_force[log.stop == stop]
             assert shown.max() == pytest.approx(mine.max(initial=0.0))
@@ -66,7 +66,7 @@ def test_a_contact_between_two_samples_shows_in_the_nearest_picture(run):
     columns = {name: column[[number]] for name, column in run.contacts.arrays().items()}
     log = replace(run.contacts, **columns | {"t_out": np.array([entry + 1e-6])})
     short = replace(run, contacts=log, kept={"forces": np.zeros((len(run.stops), len(run.t)))})
-    stage = animation._Stage(short, animation._samples(short, None, 30), 25.0)
+    stage = animation._stage(short, animation._samples(short, None, 30), 25.0)
     (picture,) = np.flatnonzero(stage.forces[log.stop[0]])
     assert picture == np.argmin(np.abs(run.t[stage.samples] - entry))
     assert stage.forces[log.stop[0]][picture] == log.peak_force[0]
@@ -77,7 +77,7 @@ PACES = {25.0: "66.7 times slower than real time", 5e3: "3 times faster than rea
 
 @pytest.mark.parametrize("fps", PACES)
 def test_the_title_says_how_fast_the_film_is(run, fps):
-    stage = animation._Stage(run, animation._samples(run, None, 34), fps)  # 0.6 ms from picture to picture
+    stage = animation._stage(run, animation._samples(run, None, 34), fps)  # 0.6 ms from picture to picture
     stage.show(3)
     assert stage.title.get_text().endswith(f" s, {PACES[fps]}")
 

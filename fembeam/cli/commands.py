@@ -149,10 +149,10 @@ def _place(text: str) -> Any:
     """A place as a scene file writes it; a name needs no quotes."""
     import tomllib
 
-    from fembeam.scene_file.structures import place
+    from fembeam.support import tuples
 
     try:
-        return place(tomllib.loads(f"x = {text}")["x"])
+        return tuples(tomllib.loads(f"x = {text}")["x"])
     except tomllib.TOMLDecodeError:
         return text
 

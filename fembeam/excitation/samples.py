@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.support import frozen, is_whole, numbers
+from fembeam.support import frozen, is_pair, is_whole, numbers
 
 Vector = NDArray[np.float64]
 FEWEST_SAMPLES = 8
@@ -75,8 +75,7 @@ def _cells(text: str) -> list[str]:
 
 def read_rows(path: Path, columns: tuple[int, int]) -> Vector:
     """The two columns of a text file, header skipped, shape (n, 2)."""
-    two = isinstance(columns, (tuple, list)) and len(columns) == 2
-    if not two or not all(is_whole(column) and column >= 0 for column in columns):
+    if not is_pair(columns) or not all(is_whole(column) and column >= 0 for column in columns):
         raise ValueError(f"columns must be two whole numbers from 0 (time, motion), got {columns!r}")
     rows: list[tuple[float, float]] = []
     with path.open(encoding="utf-8-sig", errors="replace") as file:

@@ -48,14 +48,10 @@ class Family:
     def __call__(self, parameter: float) -> tuple[solvers.System, float]:
         """The system and its period, s; the latest are kept, because Newton's method asks for them again."""
         if parameter not in self.kept:
-            scene = replaced(self.model.scene, self.name, parameter)
-            if changes_structure(self.name):
-                system = self.model.again(scene).system
-            else:
-                system = self.model.system_like(scene)
+            model = self.at(parameter)
             while len(self.kept) >= 8:
                 self.kept.pop(next(iter(self.kept)))
-            self.kept[parameter] = system, self.period * load_period(scene)
+            self.kept[parameter] = model.system, self.period * load_period(model.scene)
         return self.kept[parameter]
 
 

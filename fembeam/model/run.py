@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -16,8 +16,7 @@ import solvers
 from fembeam.response import Histories, PlacedLog
 from fembeam.scene import ON, Source
 from fembeam.support import Part, Printed, is_finite
-from solvers.problem import FrictionLog, Losses, counted
-from solvers.problem.event_list import NO_EVENTS
+from solvers.problem import counted
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
@@ -36,7 +35,7 @@ class Made(NamedTuple):
     solver: Any
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Run(Histories, Printed):
     """A simulated motion of a reduced model.
 
@@ -53,38 +52,13 @@ class Run(Histories, Printed):
     names : what every contact is called: as its part was named, else such as "stop at 3 m, below".
     """
 
-    t: Vector
-    q: Vector
-    q_dot: Vector
-    contacts: PlacedLog
     ledger: Callable[[], solvers.Energy] = field(repr=False)
     status: str
     cost: solvers.Cost
-    shapes: Any  # Shapes, of a body with places by name PlacedShapes
-    stops: Vector  # (m, 3): z (NaN of a place by name), push, gap of every contact
-    directions: Vector  # (r, n), rows of contacts: δ = -directions·q - gap; two of a circular clearance: d + centre
-    impactor_masses: Vector  # (i,) of the impactors, whose coordinates √m x are the last ones
     scene: str
-    borders: Callable[[], Any] = field(repr=False)  # what `transitions` are made by
-    lost: Callable[[], Losses] = field(repr=False)  # and `losses`
-    model: Model | None = None
-    kept: Mapping[str, Any] = field(default_factory=dict, repr=False)  # of a run read from a file, see `Readout`
-    others: tuple[Any, ...] = ()  # of the further beams
     source: Source | None = None  # of a run made from a scene file
     versions: dict[str, str] = field(default_factory=dict)  # that made a run read from a file
-    began: tuple[Vector, ...] = ()  # what the laws had latched at the start, a row per contact, where it was given
-    end: Vector | None = None  # (2n + l,) [q, q̇] and what the laws have latched, at the time reached
-    on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
-    kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
-    names: tuple[str, ...] = ()  # (m,) what every contact is called
-    given: tuple[bool, ...] = ()  # (m,) whether it was given that name, or it was made
-    acting: tuple[Any, ...] = ()  # (m,) of each contact z, or (place, direction); both directions of an annular stop
-    circles: Vector = field(default_factory=lambda: np.zeros((0, 3)))  # (m, 3): radius, < 0 outer; centre; else zeros
-    rubs: Vector = field(default_factory=lambda: np.zeros((0, 4)))  # (m, 4): μ, k_t, R (< 0 outer), Ω; else zeros
-    rubbing: Callable[[], FrictionLog] | None = field(default=None, repr=False)  # makes `friction_log`
-    reached: float = 0.0  # s, the time of `end`
     made: Made | None = None  # start, duration and solver; None of a run read from a file
-    sampled: bool = True  # else t, q, q_dot are the final state alone, and no history
 
     def __repr__(self) -> str:
         reached = f"to t = {self.t[-1]:g} s" if len(self.t) else "without samples"
@@ -99,35 +73,6 @@ class Run(Histories, Printed):
     def energy(self) -> solvers.Energy:
         """The energy balance."""
         return self.ledger()
-
-    @cached_property
-    def transitions(self) -> Any:
-        """Borders that laws with memory passed, see `solvers.problem.Transitions`."""
-        return self.borders()
-
-    @cached_property
-    def losses(self) -> Losses:
-        """Energy that each stop and element dissipated, see `solvers.problem.Losses`."""
-        return self.lost()
-
-    @cached_property
-    def friction_log(self) -> FrictionLog:
-        """What friction did in every contact that has it, see `solvers.problem.FrictionLog`.
-
-        Speeds and angles of entry and exit, largest |F_t|, impulse, way of slip, loss; stick and slip between are in
-        `transitions`.
-        """
-        return FrictionLog.of_events(NO_EVENTS) if self.rubbing is None else self.rubbing()
-
-    @cached_property
-    def friction_loss(self) -> Vector:
-        """(k, m) J lost by friction at each stop up to the samples, 0 without; its slope is the work rate of wear.
-
-        Exact at every sample outside of a contact; within one the samples tell how it grows.
-        """
-        from fembeam.response import losses_by_friction
-
-        return self._at_samples(losses_by_friction(self))
 
     @property
     def scene_file(self) -> SceneFile:

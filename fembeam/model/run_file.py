@@ -15,9 +15,9 @@ import numpy as np
 import solvers
 from fembeam.model import saved_arrays
 from fembeam.model.run import Run
-from fembeam.response import READOUT_UNITS, PlacedLog, PlacedShapes, Shapes, Site, packed, site, tuples, unpacked
+from fembeam.response import READOUT_UNITS, PlacedLog, PlacedShapes, Shapes, Site, packed, site, unpacked
 from fembeam.scene import Source
-from fembeam.support import versions, written_whole
+from fembeam.support import tuples, versions, written_whole
 from solvers.problem import FrictionLog, Losses, Transitions, columns_of, optional
 
 FORMAT = 5

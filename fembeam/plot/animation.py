@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fembeam.model import PlacedShapes
 from fembeam.plot.bodies import BodyStage
+from fembeam.plot.run_signals import samples_in
 from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled
 from fembeam.scene import ON
 from fembeam.support import require
@@ -100,21 +101,20 @@ def frame(run: Run, t: float, window: tuple[float, float] | None = None) -> Figu
 
 def _stage(run: Run, samples: NDArray[np.int64], fps: float | None) -> _Stage | BodyStage:
     """What is shown: a beam with its contacts, or the lines of another body."""
+    pace = "" if fps is None else _pace(fps * float(np.median(np.diff(run.t[samples]))))
     if not isinstance(run.shapes, PlacedShapes):
         straight = not any(isinstance(shapes, PlacedShapes) for shapes in run.others)
         require(straight, "moving pictures of a Beam must be of Beams alone", run.others, "animate",
                 "draw plot.time_history or plot.mode_shapes")  # fmt: skip
-        return _Stage(run, samples, fps)
-    return BodyStage(run, samples, "" if fps is None else _pace(fps * float(np.median(np.diff(run.t[samples])))))
+        return _Stage(run, samples, pace)
+    return BodyStage(run, samples, pace)
 
 
 def _samples(run: Run, window: tuple[float, float] | None, frames: int) -> NDArray[np.int64]:
     """Numbers of the samples to show."""
     whole = isinstance(frames, (int, np.integer)) and 2 <= frames <= MOST_FRAMES
     require(whole, f"frames must be 2 to {MOST_FRAMES}", frames, "animate", "give a count")
-    lo, hi = window or (float(run.t[0]), float(run.t[-1]))
-    inside = np.flatnonzero((run.t >= lo) & (run.t <= hi))
-    require(len(inside) >= 2, "the window must hold at least 2 samples", (lo, hi), "animate", "widen it, or lower dt")
+    inside = samples_in(run, window, "animate", "widen it, or lower dt")
     return inside[np.unique(np.linspace(0, len(inside) - 1, frames).round().astype(int))]
 
 
@@ -184,8 +184,8 @@ class _Stage:
 
     figure: Figure
 
-    def __init__(self, run: Run, samples: NDArray[np.int64], fps: float | None) -> None:
-        self.run, self.samples, self.contact_rows = run, samples, _contacts(run)
+    def __init__(self, run: Run, samples: NDArray[np.int64], pace: str) -> None:
+        self.run, self.samples, self.pace, self.contact_rows = run, samples, pace, _contacts(run)
         self.beams, self.impactor_places = run.readout.heights, run.readout.impactor_places
         self.forces = [
             run.force(i)[samples] if one.always else _peaks(run, i, samples) for i, one in enumerate(self.contact_rows)
@@ -193,7 +193,6 @@ class _Stage:
         pushes = [f for f, one in zip(self.forces, self.contact_rows, strict=True) if not one.rotation]
         self.largest = max([float(np.abs(force).max()) for force in pushes], default=0.0)
         self.lines = self._displaced()
-        self.speed = "" if fps is None else _pace(fps * float(np.median(np.diff(run.t[samples]))))
         self._build()
 
     def _displaced(self) -> list[tuple[Vector, Vector]]:
@@ -225,8 +224,7 @@ class _Stage:
         for i, force in enumerate(self.forces):
             self.force_axis.step(self.run.t[self.samples], force, color=f"C{i}", where="mid", label=self.run.name(i))
         self.cursor = self.force_axis.axvline(self.run.t[self.samples[0]], color=ORANGE)
-        self.force_axis.set_xlabel("time / s")
-        self.force_axis.set_ylabel(f"peak contact\nforce / {self.run.unit('force')}")
+        self.force_axis.set(xlabel="time / s", ylabel=f"peak contact\nforce / {self.run.unit('force')}")
         self.force_axis.set_xlim(*self.run.t[self.samples[[0, -1]]])
         if len(self.forces) > 1:
             self.figure.legend(*self.force_axis.get_legend_handles_labels(), loc="outside lower center", ncols=4)
@@ -241,11 +239,9 @@ class _Stage:
         low = 1e3 * min(*(float(row.min()) for row in rows), *stops, 0.0)
         high = 1e3 * max(*(float(row.max()) for row in rows), *stops, 0.0)
         spread = max(high - low, 1e-9)
-        axis.set_ylim(low - 0.25 * spread, high + 0.25 * spread)
         length = max(float(z[-1]) for z, _ in self.lines)
-        axis.set_xlim(-30 * length, 1030 * length)
-        axis.set_xlabel("z / mm")
-        axis.set_ylabel("displacement / mm")
+        axis.set(xlim=(-30 * length, 1030 * length), ylim=(low - 0.25 * spread, high + 0.25 * spread))
+        axis.set(xlabel="z / mm", ylabel="displacement / mm")
         return 1.5 * spread
 
     def _sides(self) -> list[float]:
@@ -288,7 +284,7 @@ class _Stage:
         self._point(number)
         now = float(self.run.t[self.samples[number]])
         self.cursor.set_xdata([now, now])
-        self.title.set_text(f"t = {now:.4f} s{self.speed}")
+        self.title.set_text(f"t = {now:.4f} s{self.pace}")
         return [*self.curves, *self.balls, self.arrows, self.cursor]
 
     def _point(self, number: int) -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from fembeam.plot.clearance import Whirl
 from fembeam.plot.figure import heading
-from fembeam.plot.style import BLUE, GREY, RED
+from fembeam.plot.style import BLUE, GREY, RED, round_factor
 from fembeam.support import is_finite, require
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def deflected_figure(run: Run, t: float | None, scale: float | None, axes: Axes 
     largest = float(np.linalg.norm(moved, axis=1).max())
     require(scale is None or (is_finite(scale) and scale > 0), "scale must be above 0", scale, "deflected",
             "leave it out for one that shows well")  # fmt: skip
-    factor = scale if scale is not None else _round(SHOWN * size_of(shapes) / largest) if largest > 0 else 1.0
+    factor = scale if scale is not None else round_factor(SHOWN * size_of(shapes) / largest) if largest > 0 else 1.0
     axis: Any = panels(shapes, 1)[1][0] if axes is None else axes
     draw(axis, shapes, None, GREY, 0.8)
     draw(axis, shapes, factor * moved, RED, 1.8)
@@ -144,7 +144,7 @@ class BodyStage:
         self.run, self.samples, self.pace, shapes = run, samples, pace, run.shapes
         self.q, size = run.with_supports(run.q, shapes.moving)[samples], size_of(shapes)
         largest = max(float(np.linalg.norm(displacements(shapes, q), axis=1).max()) for q in self.q)
-        self.factor = _round(SHOWN * size / largest) if largest > 0 else 1.0
+        self.factor = round_factor(SHOWN * size / largest) if largest > 0 else 1.0
         circles = np.flatnonzero(run.circles[:, 0])[:MOST_CIRCLES].tolist()
         columns = 1 + len(circles)
         self.figure = Figure(figsize=(5.0 + 3.0 * len(circles), 3.6), layout="constrained")
@@ -180,9 +180,3 @@ def _sample(run: Run, t: float | None) -> int:
     for place in range(len(shapes.known)):
         squares = np.maximum(squares, sum((q @ row[place]) ** 2 for row in rows))
     return int(np.argmax(squares))
-
-
-def _round(factor: float) -> float:
-    """The next 1, 2 or 5 times a power of ten below."""
-    power = 10.0 ** np.floor(np.log10(factor))
-    return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= factor * (1 + 1e-9)))

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fembeam.plot.bodies import SHOWN, mode_figure
+from fembeam.plot.bodies import SHOWN, displacements, mode_figure
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.style import BLUE, GREY, Vector
-from fembeam.structures import COMPONENTS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,10 +57,7 @@ def _view(points: Vector) -> Vector:
 
 def _deflected(axis: Axes, shapes: Any, mode: int, view: Vector) -> None:
     """Lines at rest in grey, deflected in blue."""
-    at, moved = shapes.positions, np.zeros_like(shapes.positions)
-    for column, component in enumerate(shapes.components):
-        if component in COMPONENTS[:3]:
-            moved[:, COMPONENTS.index(component)] = shapes.values[:, column, mode]
+    at, moved = shapes.positions, displacements(shapes, np.eye(shapes.values.shape[2])[mode])
     used = np.unique(shapes.lines)
     size = float(np.linalg.norm(np.ptp(at[used], axis=0)))
     largest = float(np.linalg.norm(moved[used], axis=1).max()) or 1.0

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.rig_words import length
-from fembeam.plot.run_signals import sampling_of
+from fembeam.plot.run_signals import samples_in, sampling_of
 from fembeam.plot.style import BLUE, GREEN, GREY, RED, Vector, styled
 from fembeam.response import states
 from fembeam.structures import direction_of, named
@@ -58,10 +58,7 @@ def orbit_in_clearance(
     sampling_of(run)
     number = run._stop(stop)
     radius, *centre = run.circles[number].tolist()
-    lo, hi = (float(run.t[0]), float(run.t[-1])) if window is None else window
-    d = run.place_in_clearance(number)
-    kept = np.flatnonzero((run.t >= lo) & (run.t <= hi))
-    require(len(kept) > 1, "the window must hold at least 2 samples", (lo, hi), "orbit_in_clearance", "widen it")
+    d, kept = run.place_in_clearance(number), samples_in(run, window, "orbit_in_clearance")
     t, rates = run.t[kept], run.q_dot[kept] @ run.directions[run._rows[number]][:2].T
     fine = np.linspace(t[0], t[-1], FINER * (len(t) - 1) + 1)
     path = 1e3 * CubicHermiteSpline(t, d[kept], rates)(fine)
@@ -123,10 +120,7 @@ def forces_in_clearance(
 
     sampling_of(run)
     number = run._stop(stop)
-    lo, hi = (float(run.t[0]), float(run.t[-1])) if window is None else window
-    d, kept = run.place_in_clearance(number), (run.t >= lo) & (run.t <= hi)
-    require(int(np.count_nonzero(kept)) > 1, "the window must hold at least 2 samples", (lo, hi), "forces_in_clearance",
-            "widen it")  # fmt: skip
+    d, kept = run.place_in_clearance(number), samples_in(run, window, "forces_in_clearance")
     polar = axes is None or axes.name == "polar"
     require(polar, "axes must be polar", axes, "forces_in_clearance", "make them with projection='polar'")
     figure, found = sheet(1, 1, (5.0, 5.2), axes, subplot_kw={"projection": "polar"})
@@ -134,7 +128,7 @@ def forces_in_clearance(
     angle, normal = np.arctan2(d[:, 1], d[:, 0]), run._normal_force(number)
     drawn = {"N": (RED, normal)} | ({"$|F_t|$": (GREEN, np.abs(run.friction(number)))} if run.rubs[number, 1] else {})
     for label, (colour, force) in drawn.items():
-        shown = kept & (normal > 0.0)
+        shown = kept[normal[kept] > 0.0]
         axis.plot(angle[shown], force[shown], ".", color=colour, markersize=2.5, label=label)
     x, y = (_way(direction) for direction in run.acting[number][1])
     axis.set_xticks(0.5 * np.pi * np.arange(4), [x, y, f"-{x}", f"-{y}"])

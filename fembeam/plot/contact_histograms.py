@@ -67,8 +67,7 @@ def _histogram(axis: Axes, values: Vector, name: str, unit: str) -> None:
     axis.axvline(values.mean(), color=RED, linestyle="--")
     of = "" if " or " in unit else f" {unit}"  # a mixed one is on the axis alone
     axis.set_title(f"mean {values.mean():.4g}{of} (dashed), largest {values.max():.4g}{of}", fontsize=8)
-    axis.set_xlabel(f"{name} / {unit}" + ", without the top 1 %" * cut)
-    axis.set_ylabel("contacts")
+    axis.set(xlabel=f"{name} / {unit}" + ", without the top 1 %" * cut, ylabel="contacts")
     axis.yaxis.set_major_locator(MaxNLocator(integer=True))
 
 
@@ -99,6 +98,5 @@ def _restitutions(axis: Axes, speed_in: Vector, speed_out: Vector, unit: str) ->
     if high > 10 * low:
         axis.set_xscale("log")
         plain_decades(axis.xaxis, low, high)
-    axis.set_xlim(low, high)
-    axis.set_xlabel(f"entry speed / {unit}" + ", top 99.5 %" * bool(slow))
-    axis.set_ylabel("exit / entry speed")
+    slowest = ", top 99.5 %" * bool(slow)
+    axis.set(xlim=(low, high), xlabel=f"entry speed / {unit}{slowest}", ylabel="exit / entry speed")

@@ -48,8 +48,7 @@ def mode_count(study: ModeCount, axes: Sequence[Axes] | None = None) -> Figure:
     left.set_ylabel("relative error")
     left.legend()
     right.set_ylim(bottom=0.0)
-    right.set_ylabel("integration / s")
-    right.set_title("time of all runs of a model")
+    right.set(ylabel="integration / s", title="time of all runs of a model")
     against = f"against {reference.measured.coordinates} coordinates; hollow: within noise"
     left.set_title(against if axes is None else f"{study.quantity} {against}")
     if axes is None:
@@ -69,9 +68,8 @@ def smallest_model(result: SmallestModel, axes: Axes | Sequence[Axes] | None = N
     if reached:
         _integration(drawn[1], result)
     for axis in drawn:
-        axis.set_yscale("log")
+        axis.set(yscale="log", ylabel="relative error")
         axis.axhline(result.tolerance, color=GREY, linestyle="--", label=f"tolerance {result.tolerance:g}")
-        axis.set_ylabel("relative error")
     drawn[0].legend()
     state = "Smallest model" if result.met else "NOT MET: smallest model"
     heading(drawn, f"{state} for {result.quantity}", axes is None)
@@ -100,9 +98,7 @@ def _integration(axis: Axes, result: SmallestModel) -> None:
     spread = np.array([line.uncertainty for line in result.integration])
     axis.errorbar(x, y, _bars(y, spread), fmt="o-", color=BLUE, markersize=4, capsize=2)
     axis.plot(x[x == result.rtol], y[x == result.rtol], "o", **RING)
-    axis.set_xscale("log")
-    axis.set_xlabel("rtol")
-    axis.set_title("integration, of the chosen model")
+    axis.set(xscale="log", xlabel="rtol", title="integration, of the chosen model")
 
 
 def _errors(axis: Axes, rows: Sequence[Any], colour: str, mark: str, name: str) -> None:

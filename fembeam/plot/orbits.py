@@ -78,8 +78,7 @@ def branch(
     if axes is None and len(linear):
         _widen(axis, linear)
     name = several[0].family.name
-    axis.set_xlabel(axis_name(name, model.scene))
-    axis.set_ylabel(f"max |{displacement_name(place)}| / mm")
+    axis.set(xlabel=axis_name(name, model.scene), ylabel=f"max |{displacement_name(place)}| / mm")
     handles, words = _entries(axis, several)
     legend(axis, axes is None, "outside right upper", handles=handles, labels=words, fontsize=8)
     return figure
@@ -289,12 +288,10 @@ def orbit(one: Orbit, z: Any = None, axes: Sequence[Axes] | None = None) -> Figu
     left.plot(1e3 * t, u)
     for t_in, t_out in zip(one.contacts.t_in, one.contacts.t_out, strict=True):
         left.axvspan(1e3 * t_in, 1e3 * (t_out if np.isfinite(t_out) else t[-1]), color=ORANGE, alpha=0.4, linewidth=0.8)
-    left.set_xlabel("t / ms")
-    left.set_ylabel(f"{displacement_name(place)} / mm")
+    left.set(xlabel="t / ms", ylabel=f"{displacement_name(place)} / mm")
     right.plot(u, v)
     right.plot(u[:1], v[:1], "o", color=RED, markersize=3)
-    right.set_xlabel("u / mm")
-    right.set_ylabel("velocity / m/s")
+    right.set(xlabel="u / mm", ylabel="velocity / m/s")
     kind = "stable" if one.stable else "unstable"
     at = "" if np.isnan(one.parameter) else f" at {one.parameter:.6g}"
     title = f"Period {one.period}, {counted(len(one.contacts), 'contact')}, {kind}{at}"

@@ -89,9 +89,8 @@ def time_history(
         _draw_forces(drawn[1], run, lo, hi, FEW * step)
         seen = np.isin(run.contacts.stop, stops) & _within(run, lo, hi)
         title += f", contacts of {_listed(stops, run)} shaded" if seen.any() else ""
-    drawn[-1].set_xlabel("time / s")
     beside = 0.0 if window else 0.01 * (hi - lo)  # so that a contact at the first instant is seen
-    drawn[-1].set_xlim(lo - beside, hi + beside)
+    drawn[-1].set(xlabel="time / s", xlim=(lo - beside, hi + beside))
     heading(drawn, title, axes is None, run=run)
     return figure
 
@@ -129,11 +128,9 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
         label = f"mode {model.names[i]}: {model.omega[i]:.{0 if model.omega[i] >= 1e3 else 1}f} rad/s"
         axis.plot(unit * z, shapes[:, i] / scale[i], label=f"{label}, ζ = {model.zeta[i]:.3g}")
     _mark_features(axis, model, unit)
-    axis.set_xlabel("z / mm" if unit > 1.0 else "z / m")
-    axis.set_ylabel("φ / max |φ|")
+    axis.set(xlabel="z / mm" if unit > 1.0 else "z / m", ylabel="φ / max |φ|", yticks=[-1.0, -0.5, 0.0, 0.5, 1.0])
     rows = -(-len(axis.get_legend_handles_labels()[1]) // LEGEND_COLUMNS)
     axis.set_ylim(-1.15, 1.2 + LEGEND_ROW * rows)  # the legend has space of its own above the curves
-    axis.set_yticks([-1.0, -0.5, 0.0, 0.5, 1.0])
     axis.legend(loc="upper center", ncols=LEGEND_COLUMNS, fontsize=8)
     heading([axis], "Mode shapes of the linear beam", axes is None)
     return figure

@@ -7,7 +7,6 @@ them.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -22,7 +21,7 @@ from fembeam.plot.rig_bodies import rig_of_bodies
 from fembeam.plot.rig_labels import SIZE, Placed, extent, rows_of, spread
 from fembeam.plot.rig_symbols import COLOURS, Pen
 from fembeam.plot.rig_words import gap_words, label, law_words, length, signal_words
-from fembeam.plot.style import GREY, styled
+from fembeam.plot.style import GREY, round_factor, styled
 from fembeam.scene import Guided, Pinned, PointMoment
 
 if TYPE_CHECKING:
@@ -175,7 +174,7 @@ class _View:
         gaps = [gap for gap in _gaps(scene) if gap > 1e-9 * self.high]
         self.enlarged, self.factor = (
             bool(gaps),
-            _round_factor(GAP * self.per_inch / max(gaps, default=GAP * self.per_inch)),
+            round_factor(GAP * self.per_inch / max(gaps, default=GAP * self.per_inch)),
         )
         self.heights = _heights(self.beams)
         self.heads = [*([f"base motion: {signal_words(scene.base, 'm')}".replace("\n", " ")] if scene.base else [])]
@@ -244,8 +243,7 @@ class _View:
 
     def frame(self, axis: Axes, low: float, top: float) -> None:
         """The axis along z, and no other."""
-        axis.set_xlim(self.z(0.0), self.z(self.width))
-        axis.set_ylim(low, top)
+        axis.set(xlim=(self.z(0.0), self.z(self.width)), ylim=(low, top))
         for side in ("left", "right", "top"):
             axis.spines[side].set_visible(False)
         axis.set_yticks([])
@@ -253,8 +251,7 @@ class _View:
         ticks = [
             tick for tick in axis.get_xticks() if self.unit * self.low <= tick <= self.unit * self.high * (1 + 1e-9)
         ]
-        axis.set_xticks(ticks)
-        axis.set_xlabel("z / mm" if self.unit > 1.0 else "z / m")
+        axis.set(xticks=ticks, xlabel="z / mm" if self.unit > 1.0 else "z / m")
 
     def pen(self, axis: Axes, lane: Lane, x: float, side: int, name: str = "") -> Pen:
         """A pen on the surface of a beam, outwards."""
@@ -371,18 +368,6 @@ def _gaps(scene: Scene) -> list[float]:
         found += [stop.gap for stop in part.stops if not stop.coordinate.rotation]
         found += [impactor.gap for impactor in part.impactors]
     return found
-
-
-def _round_factor(factor: float) -> float:
-    """The next smaller of …, 1, 2, 5, 10, 20, 50, ….
-
-    Examples
-    --------
-    >>> _round_factor(73.0), _round_factor(0.7), _round_factor(1000.0)
-    (50.0, 0.5, 1000.0)
-    """
-    power = 10.0 ** math.floor(math.log10(factor) + 1e-9)
-    return next(m * power for m in (5.0, 2.0, 1.0) if m * power <= factor * (1 + 1e-9))
 
 
 def _heights(beams: list[Beam]) -> list[Callable[[Any], Vector]]:

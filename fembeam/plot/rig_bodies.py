@@ -253,8 +253,7 @@ class _Panel:
             axis.set_aspect("equal", adjustable="datalim")
             axis.set_axis_off()
             return
-        axis.set_xlabel("z / m" if beam else "x / m")
-        axis.set_ylabel("y / m")
+        axis.set(xlabel="z / m" if beam else "x / m", ylabel="y / m")
         axis.locator_params(nbins=5)
         if self.space:
             limits = np.array([axis.get_xlim(), axis.get_ylim(), axis.get_zlim()])

@@ -70,6 +70,14 @@ def sampling_of(run: Run) -> float:
     return float(run.t[1] - run.t[0])
 
 
+def samples_in(run: Run, window: tuple[float, float] | None, where: str, advice: str = "widen it") -> Any:
+    """Numbers of the samples in a window (s), all without one; ValueError below two."""
+    lo, hi = window or (float(run.t[0]), float(run.t[-1]))
+    inside = np.flatnonzero((run.t >= lo) & (run.t <= hi))
+    require(len(inside) >= 2, "the window must hold at least 2 samples", (lo, hi), where, advice)
+    return inside
+
+
 def stationary(run: Run, discard: float = 0.0) -> bool:
     """Whether a run may settle to a motion that lasts: tones and noise drive it, or it neither grows nor dies away.
 

@@ -71,8 +71,7 @@ def spectrum(
         fit_levels(axis, [spectra[name] for name in names if name != "base y"], top, behind)
     _mark_peaks(upper, spectra[main], top)
     _mark_frequencies((upper, lower), run, top)
-    lower.set_xlabel("ω / rad s⁻¹")
-    lower.set_xlim(0, top)
+    lower.set(xlabel="ω / rad s⁻¹", xlim=(0, top))
     heading([upper], _about(run, discard, spectra[main]), axes is None, run=run)
     return figure
 

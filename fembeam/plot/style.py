@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import wraps
 from inspect import signature
@@ -80,6 +81,18 @@ def displacement_name(z: Any) -> str:
     ('u(0.25 m)', 'u(lever, x)')
     """
     return f"u({said(z) if isinstance(z, tuple) else f'{z:.4g} m'})"
+
+
+def round_factor(factor: float) -> float:
+    """The next smaller of …, 1, 2, 5, 10, 20, 50, ….
+
+    Examples
+    --------
+    >>> round_factor(73.0), round_factor(0.7), round_factor(1000.0)
+    (50.0, 0.5, 1000.0)
+    """
+    power = 10.0 ** math.floor(math.log10(factor) + 1e-9)
+    return next(m * power for m in (5.0, 2.0, 1.0) if m * power <= factor * (1 + 1e-9))
 
 
 def drawable(line: Spectrum, top: float) -> tuple[Vector, Vector]:

@@ -13,7 +13,7 @@ from fembeam.response.contact_log import PlacedLog, Site, site
 from fembeam.response.friction import losses_by_friction, read_back, sliding, states
 from fembeam.response.histories import Histories, coordinates, directed, frame_motion
 from fembeam.response.mean_force import mean_force
-from fembeam.response.placed_shapes import PlacedShapes, placed_shapes, tuples
+from fembeam.response.placed_shapes import PlacedShapes, placed_shapes
 from fembeam.response.readout import READOUT_FINITE, READOUT_UNITS, Readout, expected_readout, packed, unpacked
 from fembeam.response.section_forces import Extremes, SectionForces, extremes, frame_forces_of, rows_of, section_forces
 from fembeam.response.shapes import Shapes

@@ -19,7 +19,7 @@ import reduction
 from fembeam.structures import COMPONENTS
 
 if TYPE_CHECKING:
-    from fembeam.scene import BodyMatrices, Scene
+    from fembeam.scene import BodyMatrices, Matrices, Scene
 
 Vector = NDArray[np.float64]
 REFINED = 2  # times
@@ -83,9 +83,9 @@ class BodyHeld:
         return np.asarray(-np.sqrt(part.stiffness) * self.stresses[number])
 
 
-def rigid_shapes(matrices: BodyMatrices) -> Vector:
+def rigid_shapes(matrices: Matrices, most: int = MOST_RIGID) -> Vector:
     """Rigid-body modes (N, r) on the free dofs."""
-    count = min(MOST_RIGID, matrices.M.shape[0])
+    count = min(most, matrices.M.shape[0])
     lowest = reduction.modal_basis(matrices.M, matrices.K, count, root=matrices.root)
     return np.asarray(lowest.vectors[:, lowest.omega == 0.0])
 

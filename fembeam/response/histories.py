@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
 from itertools import pairwise
@@ -11,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.response.contact_force import forces
+from fembeam.response.contact_log import PlacedLog
 from fembeam.response.mean_force import mean_force
 from fembeam.response.placed_shapes import PlacedShapes
 from fembeam.response.readout import Readout
@@ -18,13 +21,12 @@ from fembeam.response.section_forces import extremes, frame_forces_of, rows_of
 from fembeam.scene import split, unit_of
 from fembeam.structures import COMPONENTS, UP, Six
 from fembeam.support import is_whole, numbers, require
+from solvers.problem import FrictionLog, Losses
+from solvers.problem.event_list import NO_EVENTS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from fembeam.model import Model
     from fembeam.response.section_forces import Extremes
-    from solvers.problem import ContactLog, FrictionLog, Losses, Transitions
 
 Vector = NDArray[np.float64]
 
@@ -36,43 +38,64 @@ def directed(z: Any, direction: Any) -> Any:
     return z if direction is None else (z, direction)
 
 
+@dataclass(frozen=True, eq=False)
 class Histories:
-    """Histories of the beams, contacts and impactors: a `Run` is one, and has these fields."""
+    """What a run has recorded, and the histories of its beams, contacts and impactors: a `Run` is one."""
 
     t: Vector
     q: Vector
     q_dot: Vector
-    stops: Vector
-    directions: Vector
-    circles: Vector
-    rubs: Vector
-    impactor_masses: Vector
-    kinds: NDArray[np.bool_]
+    contacts: PlacedLog
     shapes: Any  # Shapes, of a body with places by name PlacedShapes
-    others: tuple[Any, ...]
-    names: tuple[str, ...]
-    given: tuple[bool, ...]
-    sampled: bool
-    contacts: ContactLog
-    began: tuple[Vector, ...]
-    model: Model | None
-    kept: Mapping[str, Any]
-    end: Vector | None
-    reached: float
+    stops: Vector  # (m, 3): z (NaN of a place by name), push, gap of every contact
+    directions: Vector  # (r, n), rows of contacts: δ = -directions·q - gap; two of a circular clearance: d + centre
+    impactor_masses: Vector  # (i,) of the impactors, whose coordinates √m x are the last ones
+    borders: Callable[[], Any] = field(repr=False)  # what `transitions` are made by
+    lost: Callable[[], Losses] = field(repr=False)  # and `losses`
+    model: Model | None = None
+    kept: Mapping[str, Any] = field(default_factory=dict, repr=False)  # of a run read from a file, see `Readout`
+    others: tuple[Any, ...] = ()  # of the further beams
+    began: tuple[Vector, ...] = ()  # what the laws had latched at the start, a row per contact, where it was given
+    end: Vector | None = None  # (2n + l,) [q, q̇] and what the laws have latched, at the time reached
+    on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
+    kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
+    names: tuple[str, ...] = ()  # (m,) what every contact is called
+    given: tuple[bool, ...] = ()  # (m,) whether it was given that name, or it was made
+    acting: tuple[Any, ...] = ()  # (m,) of each contact z, or (place, direction); both directions of an annular stop
+    circles: Vector = field(default_factory=lambda: np.zeros((0, 3)))  # (m, 3): radius, < 0 outer; centre; else zeros
+    rubs: Vector = field(default_factory=lambda: np.zeros((0, 4)))  # (m, 4): μ, k_t, R (< 0 outer), Ω; else zeros
+    rubbing: Callable[[], FrictionLog] | None = field(default=None, repr=False)  # makes `friction_log`
+    reached: float = 0.0  # s, the time of `end`
+    sampled: bool = True  # else t, q, q_dot are the final state alone, and no history
 
-    if TYPE_CHECKING:  # made by the run when first read
+    @cached_property
+    def transitions(self) -> Any:
+        """Borders that laws with memory passed, see `solvers.problem.Transitions`."""
+        return self.borders()
 
-        @property
-        def friction_log(self) -> FrictionLog:
-            """What friction did in every contact."""
+    @cached_property
+    def losses(self) -> Losses:
+        """Energy that each stop and element dissipated, see `solvers.problem.Losses`."""
+        return self.lost()
 
-        @property
-        def transitions(self) -> Transitions:
-            """Borders that laws with memory passed."""
+    @cached_property
+    def friction_log(self) -> FrictionLog:
+        """What friction did in every contact that has it, see `solvers.problem.FrictionLog`.
 
-        @property
-        def losses(self) -> Losses:
-            """Energy that each stop and element dissipated."""
+        Speeds and angles of entry and exit, largest |F_t|, impulse, way of slip, loss; stick and slip between are in
+        `transitions`.
+        """
+        return FrictionLog.of_events(NO_EVENTS) if self.rubbing is None else self.rubbing()
+
+    @cached_property
+    def friction_loss(self) -> Vector:
+        """(k, m) J lost by friction at each stop up to the samples, 0 without; its slope is the work rate of wear.
+
+        Exact at every sample outside of a contact; within one the samples tell how it grows.
+        """
+        from fembeam.response.friction import losses_by_friction
+
+        return self._at_samples(losses_by_friction(self))
 
     @cached_property
     def readout(self) -> Readout:

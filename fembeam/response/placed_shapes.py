@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.scene import At, BodyMatrices, LocalCoordinate, at_parts, is_pair, said, split, told
+from fembeam.scene import At, BodyMatrices, LocalCoordinate, at_parts, said, split, told
 from fembeam.structures import COMPONENTS, direction_of, named, nearest, require_components, turns
-from fembeam.support import is_whole, require
+from fembeam.support import is_numbered, is_pair, require, tuples
 
 Vector = NDArray[np.float64]
 USUAL = 6  # places that tables and figures show unasked
@@ -94,7 +94,7 @@ class PlacedShapes:
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of places, and of members."""
-        own = [one[1] if is_pair(one) and is_whole(one[0]) else one for one in self.known]
+        own = [one[1] if is_numbered(one) else one for one in self.known]
         first = (one[0] if is_pair(one) else one for one in own)
         return tuple(dict.fromkeys(name for name in first if isinstance(name, str)))
 
@@ -109,7 +109,7 @@ class PlacedShapes:
             return np.asarray(self.whole[self.known.index(place)])
         if self.more is not None:
             return self.more(place)
-        of_others = [one for one in self.known if is_pair(one) and is_whole(one[0]) and one[1] == place]
+        of_others = [one for one in self.known if is_numbered(one) and one[1] == place]
         if len(of_others) == 1:  # of joined bodies the one that has this name
             return self.motion_with_supports(of_others[0])
         require(
@@ -138,11 +138,6 @@ class PlacedShapes:
         require_components(along, self.components, f"the place {told(place)}", "phi")
         part = np.array([along[COMPONENTS.index(component)] for component in self.components])
         return np.asarray(part @ self.motion_with_supports(place))
-
-
-def tuples(value: Any) -> Any:
-    """Lists of JSON as tuples."""
-    return tuple(tuples(one) for one in value) if isinstance(value, list) else value
 
 
 def _motion_at(body: BodyMatrices, vectors: Vector, place: Any) -> Vector:

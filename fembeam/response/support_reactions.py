@@ -17,11 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse import linalg as sparse_linalg
 
-import reduction
 from fembeam.beams import bending_root, hermite_rows
-from fembeam.response.body_reactions import BodyHeld
+from fembeam.response.body_reactions import BodyHeld, rigid_shapes, static_solver
 from fembeam.response.histories import coordinates
 from fembeam.scene import BodyMatrices, Spring, contact_rows, loads, support_loads, told, unsupported
 from fembeam.structures import COMPONENTS
@@ -74,18 +72,22 @@ class Reaction:
 
     def extremes(self, quantity: str = "force") -> tuple[tuple[float, float], tuple[float, float]]:
         """((least, its time), (greatest, its time)) over the samples of the "force" or the "moment"."""
-        require(quantity in ("force", "moment"), "quantity must be 'force' or 'moment'", quantity, "Reaction.extremes",
-                "choose one")  # fmt: skip
-        values = getattr(self, quantity)
+        values = self._history(quantity)
         low, high = int(np.argmin(values)), int(np.argmax(values))
         return (float(values[low]), float(self.t[low])), (float(values[high]), float(self.t[high]))
+
+    def _history(self, quantity: str) -> Vector:
+        """What `extremes` are those of, (k,)."""
+        require(quantity in ("force", "moment"), "quantity must be 'force' or 'moment'", quantity, "Reaction.extremes",
+                "choose one")  # fmt: skip
+        return np.asarray(getattr(self, quantity))
 
     def largest(self, quantity: str = "force") -> tuple[float, float]:
         """The value largest in size, and its time."""
         return max(self.extremes(quantity), key=lambda found: abs(found[0]))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BodyReaction(Reaction):
     """What one support, spring or dashpot exerts at a place of a body, by components: ``reaction["x"]`` (k,).
 
@@ -101,9 +103,6 @@ class BodyReaction(Reaction):
             return f"{type(self.part).__name__} at node {self.part.z}" + (f" of body {self.body}" if self.body else "")
         return super().name
 
-    def __repr__(self) -> str:
-        return f"<reaction of {self.name}, largest force {self.largest()[0]:.5g} N>"
-
     def __getitem__(self, component: str) -> Vector:
         """One of x, y, z, rx, ry, rz (k,)."""
         require(component in COMPONENTS, f"component must be one of {', '.join(COMPONENTS)}", component, "Reaction",
@@ -111,12 +110,10 @@ class BodyReaction(Reaction):
         number = COMPONENTS.index(component)
         return self.force[:, number] if number < 3 else self.moment[:, number - 3]
 
-    def extremes(self, quantity: str = "force") -> tuple[tuple[float, float], tuple[float, float]]:
-        """((least, its time), (greatest, its time)) of a component, or of the size of the "force" or the "moment"."""
+    def _history(self, quantity: str) -> Vector:
+        """A component (k,), or the size of the "force" or the "moment"."""
         whole = quantity in ("force", "moment")
-        values = np.linalg.norm(getattr(self, quantity), axis=1) if whole else self[quantity]
-        low, high = int(np.argmin(values)), int(np.argmax(values))
-        return (float(values[low]), float(self.t[low])), (float(values[high]), float(self.t[high]))
+        return np.asarray(np.linalg.norm(getattr(self, quantity), axis=1) if whole else self[quantity])
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,7 +284,8 @@ class _Held:
     def stresses(self) -> Vector:
         """Y (rows of B, c)."""
         B = self.B[:, self.free]
-        solve, stress = _solver(self.matrices), np.zeros((B.shape[0], self.columns.shape[1]))
+        solve = static_solver(self.matrices.K, self.matrices.M, rigid_shapes(self.matrices, 2))
+        stress = np.zeros((B.shape[0], self.columns.shape[1]))
         for _ in range(REFINED):
             left = self.columns[self.free] - B.T @ (self.sign[:, None] * stress)
             stress += B @ solve(left)
@@ -325,18 +323,3 @@ def _factor(scene: Scene, nodes: Vector) -> tuple[sparse.csr_matrix, Vector]:
     sign = np.ones(B.shape[0])
     sign[bending.shape[0] : bending.shape[0] + len(weight)] = np.sign(force)
     return B, sign
-
-
-def _solver(matrices: Matrices) -> Any:
-    """F -> K⁻¹ f; of a beam with rigid-body modes that of the part of f that does not drive them."""
-    M, K = matrices.M, matrices.K
-    lowest = reduction.modal_basis(M, K, min(2, M.shape[0]), root=matrices.root)
-    rigid = sparse.csr_matrix(M @ lowest.vectors[:, lowest.omega == 0.0])
-    count = rigid.shape[1]
-    bordered = sparse.bmat([[K, rigid], [rigid.T, None]], format="csc") if count else K.tocsc()
-    factors = sparse_linalg.splu(bordered)
-
-    def solve(f: Vector) -> Vector:
-        return np.asarray(factors.solve(np.vstack([f, np.zeros((count, f.shape[1]))]))[: f.shape[0]])
-
-    return solve

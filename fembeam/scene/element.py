@@ -65,8 +65,6 @@ class Element(ScenePart):
         super().__post_init__()
         where = self.where
         require_finite("gap", self.gap, where, "give the offset in m, or rad of a rotation")
-        if isinstance(self.direction, list):
-            object.__setattr__(self, "direction", tuple(self.direction))
         _ = self.coordinate
         check_law(self.law, where)
         why = next(one_sided(self.law), "")

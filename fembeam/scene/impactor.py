@@ -74,8 +74,6 @@ class Impactor(ScenePart):
                 "gap must not be negative: the mass would start inside the beam", self.gap, where,
                 "lift it, or give it a spring that presses it on")  # fmt: skip
         check_law(self.law, where)
-        if isinstance(self.direction, list):
-            object.__setattr__(self, "direction", tuple(self.direction))
         moves = self.direction is None or not turns(direction_of(self.direction, where))
         require(moves, "direction of an impactor must be no rotation", self.direction, where, "write 'x', 'y' or 'z'")
 

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from fembeam.scene.body_checks import is_body
 from fembeam.scene.part_places import SECOND
-from fembeam.scene.places import is_pair
 from fembeam.structures import JoinedBodies
-from fembeam.support import is_whole, require
+from fembeam.support import is_numbered, require
 
 if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
@@ -63,7 +62,7 @@ def _moved(part: Any, number: int, count: int) -> Any:
     for key in SECOND:
         to = getattr(part, key) if key in known else None
         if to is not None:
-            body, place = to if is_pair(to) and is_whole(to[0]) else (0, to)
+            body, place = to if is_numbered(to) else (0, to)
             if number:
                 changes[key] = (0, (number, place))
             elif 0 < body <= count:

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from scipy import sparse
 
-from fembeam.scene.places import is_directed, is_pair, is_place, place_words, unsigned
+from fembeam.scene.places import is_directed, is_place, place_words, unsigned
 from fembeam.structures import TURN, UP, Six, direction_of, turns
-from fembeam.support import is_whole, require
+from fembeam.support import is_numbered, is_pair, require
 
 if TYPE_CHECKING:
     from fembeam.scene.assembly import Matrices
@@ -104,7 +104,7 @@ class LocalCoordinate:
 def local_coordinate(z: Any, of: str, to: Any, where: str, key: str, direction: Any = None) -> LocalCoordinate:
     """The coordinate that `of` or a direction and a second place (or pair, None) name; ValueError for others."""
     require(of in KINDS, "of must be 'displacement' or 'rotation'", of, where, "choose one")
-    pair = to if to is None or (is_pair(to) and is_whole(to[0])) else (0, to)
+    pair = to if to is None or is_numbered(to) else (0, to)
     planar = direction is None and pair is not None and (is_pair(pair[1]) or is_directed(pair))  # not of a beam
     is_end = pair is None or (is_place(pair[1]) and not planar)
     require(is_end, f"{key} must be a place z, (body, z) or None", to, where,

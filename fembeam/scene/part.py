@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from fembeam.scene.places import Place, place_words, said, told
+from fembeam.structures import Six, direction_of
 from fembeam.support import is_whole, require, require_place
 
 UNSAID = ("direction", "motion", "name", "friction", "tangent", "radius")  # of a part, when they are None
@@ -30,12 +31,21 @@ class ScenePart:
         where = f"{type(self).__name__} at {told(self.z)}"
         require(name is None or text, "name must be text of one line, not empty", name, where,
                 "give one such as 'valve', or leave it out")  # fmt: skip
+        for key in ("direction", "tangent"):
+            if isinstance(given := getattr(self, key, None), list):
+                object.__setattr__(self, key, tuple(given))
 
     def __repr__(self) -> str:
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         values["name"] = values.pop("name")  # the last one
         shown = (f"{key}={value!r}" for key, value in values.items() if key not in UNSAID or value is not None)
         return f"{type(self).__name__}({', '.join(shown)})"
+
+    @property
+    def along(self) -> Six | None:
+        """Its direction on the six components; None without one, as on a beam."""
+        direction: Any = getattr(self, "direction", None)
+        return None if direction is None else direction_of(direction, self.where)
 
     @property
     def where(self) -> str:

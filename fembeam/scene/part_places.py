@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fembeam.scene.places import is_directed, is_pair
+from fembeam.scene.places import is_directed
 from fembeam.structures import has_place, nearest
-from fembeam.support import is_whole, require
+from fembeam.support import is_numbered, require
 
 if TYPE_CHECKING:
     from fembeam.scene.part import ScenePart
@@ -104,7 +104,7 @@ def _placed(part: Any, each: Sequence[tuple[Mapping[str, Any], Any]], where: str
     changes = {"z": _at(part.z, each[0], where)}
     for key in SECOND:
         to: Any = getattr(part, key) if key in {one.name for one in fields(part)} else None
-        if is_pair(to) and is_whole(to[0]) and 0 <= to[0] < len(each):
+        if is_numbered(to) and 0 <= to[0] < len(each):
             changes[key] = to[0], _at(to[1], each[to[0]], where)
         elif isinstance(to, str):
             changes[key] = _at(to, each[0], where)

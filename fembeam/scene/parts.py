@@ -17,7 +17,7 @@ from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
 from fembeam.scene.part import ScenePart
 from fembeam.scene.places import Place, Second, sign_of
 from fembeam.scene.rubbing import Friction, check_oblique
-from fembeam.structures import COMPONENTS, Direction, Six, direction_of, turns
+from fembeam.structures import COMPONENTS, Direction, direction_of, turns
 from fembeam.support import is_finite, require, require_finite, require_non_negative
 
 ROUNDED = 1e-9  # of the largest entry of a tensor
@@ -230,11 +230,6 @@ class Spring(ScenePart):
                 "give a motion such as Harmonic(amplitude, omega)")  # fmt: skip
         _check_direction(self, where)
 
-    @property
-    def along(self) -> Six | None:
-        """Its direction on the six components; None on a beam, where it acts on u and u_z."""
-        return _along(self)
-
 
 @dataclass(frozen=True, repr=False)
 class Dashpot(ScenePart):
@@ -259,11 +254,6 @@ class Dashpot(ScenePart):
         require_non_negative("damping", self.damping, where, "give N s/m")
         require_non_negative("rotational", self.rotational, where, "give N m s/rad")
         _check_direction(self, where)
-
-    @property
-    def along(self) -> Six | None:
-        """Its direction on the six components; None on a beam, where it acts on u and u_z."""
-        return _along(self)
 
 
 @dataclass(frozen=True, repr=False)
@@ -324,8 +314,6 @@ class Stop(ScenePart):
         check_law(self.law, where)
         acts_always = getattr(self.law, "memory", ()) and not getattr(self.law, "one_sided", False)
         require(not acts_always, "law must be one that opens", self.law, where, "make it an Element, which always acts")
-        if isinstance(self.tangent, list):
-            object.__setattr__(self, "tangent", tuple(self.tangent))
         check_oblique(self, where)
         remembers = self.friction is not None and bool(getattr(self.law, "memory", ()))
         require(not remembers, "law of a stop with friction must have no memory", self.law, where, "choose another one")
@@ -356,7 +344,32 @@ class Stop(ScenePart):
 
 
 @dataclass(frozen=True, repr=False)
-class PointForce(ScenePart):
+class _Load(ScenePart):
+    """What drives a place: signal(t), on other bodies than a `Beam` along or about `direction`."""
+
+    signal: Any
+    direction: Direction | None = None
+    derivative: ClassVar[int] = 0  # of u at the place that it works on
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(callable(self.signal), "signal must be a function of t", self.signal, self.where,
+                "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip
+        _check_direction(self, self.where)
+
+    @property
+    def coordinate(self) -> LocalCoordinate:
+        """What it acts on."""
+        return LocalCoordinate(self.z, self.derivative, None, self.along)
+
+    @property
+    def coordinates(self) -> tuple[LocalCoordinate, ...]:
+        """All that it acts on: the one."""
+        return (self.coordinate,)
+
+
+@dataclass(frozen=True, repr=False)
+class PointForce(_Load):
     """A force on the beam at z: signal(t) in N, positive up; on other bodies along `direction`.
 
     Examples
@@ -366,37 +379,16 @@ class PointForce(ScenePart):
     100.0
     """
 
-    signal: Any
-    direction: Direction | None = None
     word = "force"
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        where = self.where
-        require(callable(self.signal), "signal must be a function of t", self.signal, where,
-                "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip
-        _check_direction(self, where)
         pushes = self.along is None or not turns(self.along)
-        require(pushes, "direction of a force must be no rotation", self.direction, where, "make it a PointMoment")
-
-    @property
-    def along(self) -> Six | None:
-        """Its direction on the six components; None on a beam, where it is up."""
-        return _along(self)
-
-    @property
-    def coordinate(self) -> LocalCoordinate:
-        """What it acts on."""
-        return LocalCoordinate(self.z, 0, None, self.along)
-
-    @property
-    def coordinates(self) -> tuple[LocalCoordinate, ...]:
-        """All that it acts on: the one."""
-        return (self.coordinate,)
+        require(pushes, "direction of a force must be no rotation", self.direction, self.where, "make it a PointMoment")
 
 
 @dataclass(frozen=True, repr=False)
-class PointMoment(ScenePart):
+class PointMoment(_Load):
     """A moment on the beam at z: signal(t) in N m, positive where it turns u_z up; elsewhere about "rx", "ry", "rz".
 
     Examples
@@ -406,44 +398,17 @@ class PointMoment(ScenePart):
     1.5
     """
 
-    signal: Any
-    direction: Direction | None = None
     word = "moment"
+    derivative = 1
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        where = self.where
-        require(callable(self.signal), "signal must be a function of t", self.signal, where,
-                "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip
-        _check_direction(self, where)
         require(self.along is None or turns(self.along), "direction of a moment must be a rotation", self.direction,
-                where, "write 'rx', 'ry' or 'rz'")  # fmt: skip
-
-    @property
-    def along(self) -> Six | None:
-        """Its direction on the six components; None on a beam, where it turns u_z."""
-        return _along(self)
-
-    @property
-    def coordinate(self) -> LocalCoordinate:
-        """What it acts on."""
-        return LocalCoordinate(self.z, 1, None, self.along)
-
-    @property
-    def coordinates(self) -> tuple[LocalCoordinate, ...]:
-        """All that it acts on: the one."""
-        return (self.coordinate,)
-
-
-def _along(part: Any) -> Six | None:
-    """The direction of a part on the six components, None without one."""
-    return None if part.direction is None else direction_of(part.direction, part.where)
+                self.where, "write 'rx', 'ry' or 'rz'")  # fmt: skip
 
 
 def _check_direction(part: Any, where: str) -> None:
-    """Raise ValueError for a direction that is none; a list becomes a tuple."""
-    if isinstance(part.direction, list):
-        object.__setattr__(part, "direction", tuple(part.direction))
+    """Raise ValueError for a direction that is none."""
     if part.direction is not None:
         direction_of(part.direction, where)
     if getattr(part, "rotational", 0.0):

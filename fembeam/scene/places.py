@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from fembeam.structures import COMPONENTS, Six, direction_of, named
-from fembeam.support import is_finite, is_name, is_whole, require
+from fembeam.support import is_finite, is_name, is_numbered, is_pair, is_whole, require
 
 if TYPE_CHECKING:
     Place: TypeAlias = Any
@@ -64,11 +64,6 @@ def is_place(value: Any) -> bool:
     return is_finite(value) or is_name(value)
 
 
-def is_pair(value: Any) -> bool:
-    """Whether a value is two things in a row."""
-    return isinstance(value, (tuple, list)) and len(value) == 2
-
-
 def told(place: Any) -> str:
     """Where something is, in words.
 
@@ -77,7 +72,7 @@ def told(place: Any) -> str:
     >>> told(0.25), told("lever"), told(("A-B", 0.4)), told((1, "lever"))
     ('z = 0.25', "'lever'", "0.4 m along 'A-B'", "'lever' of body 1")
     """
-    if is_pair(place) and is_whole(place[0]):
+    if is_numbered(place):
         return f"{told(place[1]).removeprefix('z = ')} of body {place[0]}"
     if is_pair(place):
         return f"{place[1]} m along {place[0]!r}"
@@ -92,7 +87,7 @@ def place_words(place: Any) -> str:
     >>> place_words(0.25), place_words("lever"), place_words(("A-B", 0.4)), place_words((1, "lever"))
     ('0.25 m', 'lever', 'A-B + 0.4 m', 'lever of body 1')
     """
-    if is_pair(place) and is_whole(place[0]):
+    if is_numbered(place):
         inner = place[1]
         return f"{inner if is_whole(inner) else place_words(inner)} of body {place[0]}"
     if is_pair(place):
@@ -108,7 +103,7 @@ def is_directed(at: Any) -> bool:
     >>> [is_directed(at) for at in ("lever", ("lever", "-x"), ("A-B", 0.4), (1, "lever"), ("lever", (0, 1, 0)))]
     [False, True, False, False, True]
     """
-    if not (isinstance(at, (tuple, list)) and len(at) == 2):
+    if not is_pair(at):
         return False
     way = at[1]
     if isinstance(way, str):
@@ -124,7 +119,7 @@ def split(at: Any, components: Sequence[str] = COMPONENTS) -> tuple[Any, Six]:
     >>> split((("A-B", 0.4), "x"))[0], split(("lever", (0, 1, 0)))[0]
     (('A-B', 0.4), 'lever')
     """
-    pair = isinstance(at, (tuple, list)) and len(at) == 2 and not is_finite(at[1])
+    pair = is_pair(at) and not is_finite(at[1])
     if not pair and len(components) == 1:
         return at, direction_of(components[0], "a place")
     require(pair, f"a place of a frame or structure needs a direction of {', '.join(components)}", at, "a place",

@@ -17,7 +17,7 @@ from scipy import sparse
 from fembeam.excitation import Harmonic
 from fembeam.scene.local_coordinate import LocalCoordinate
 from fembeam.scene.part import ScenePart
-from fembeam.structures import COMPONENTS, Assembled, Direction, Six, direction_of
+from fembeam.structures import COMPONENTS, Assembled, Direction
 from fembeam.support import require, require_finite, require_non_negative
 
 SLACK = 1e-9  # of the polar moment of a thin disk
@@ -94,11 +94,6 @@ class Unbalance(ScenePart):
         super().__post_init__()
         require_non_negative("moment", self.moment, self.where, "give m e in kg m")
         require_finite("phase", self.phase, self.where, "give rad")
-
-    @property
-    def along(self) -> Six | None:
-        """Its direction on the six components."""
-        return None if self.direction is None else direction_of(self.direction, self.where)
 
     @property
     def coordinate(self) -> LocalCoordinate:

@@ -311,11 +311,6 @@ class Scene:
         """Stops, then elements: what acts on the scene's own beam by a law."""
         return [*self.stops, *self.elements]
 
-    @property
-    def loaded_places(self) -> list[float]:
-        """Coordinates of stops, elements, then forces."""
-        return [part.z for part in (*self.acting, *self.forces)]
-
     def buckling_load(self, elements: int | None = None) -> float:
         """The compression (N, positive) at which the beam buckles, on top of its own axial force.
 

@@ -20,9 +20,9 @@ from typing import TYPE_CHECKING, Any
 
 from fembeam.scene import FEATURES, Scene
 from fembeam.scene_file.frames import frame
-from fembeam.scene_file.structures import is_place, place, structure
+from fembeam.scene_file.structures import is_place, structure
 from fembeam.structures import GivenModes, Joint
-from fembeam.support import is_whole
+from fembeam.support import is_whole, tuples
 
 if TYPE_CHECKING:
     from fembeam.scene_file.tables import TableReader
@@ -116,6 +116,6 @@ def joint(reader: TableReader, table: Any, number: int) -> Joint:
             reader.fail(where, f"the key {key!r} is missing; a joint has at = a place, to = [1, a place there]")
         if not is_place(table[key]):
             reader.fail(where, f"{key} must name a place, got {table[key]!r}")
-    values = {"place": place(table["at"]), "to": place(table["to"])}
+    values = {"place": tuples(table["at"]), "to": tuples(table["to"])}
     made: Joint = reader.made(Joint, {**values, **{k: table[k] for k in JOINT[2:] if k in table}}, where)
     return made

@@ -82,17 +82,6 @@ def _inline(key: str, value: Any) -> Any:
     return value
 
 
-def place(value: Any) -> Any:
-    """A place, or a place and its direction, as the file writes them: lists as tuples.
-
-    Examples
-    --------
-    >>> place("lever"), place(["A-B", 0.4]), place([["A-B", 0.4], "x"])
-    ('lever', ('A-B', 0.4), (('A-B', 0.4), 'x'))
-    """
-    return tuple(place(one) for one in value) if isinstance(value, list) else value
-
-
 def is_place(value: Any) -> bool:
     """Whether a value of the file can be one: text, a number, or a list of two that begins with one.
 

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -288,15 +288,19 @@ def check_named(body: Any, places: Sequence[Any] | None, quantities: Sequence[st
         )
 
 
-def _check_place(scene: Scene, z: Place | None) -> None:
-    """Raise ValueError for a `z` that the scene does not have: said at once, not after minutes."""
-    if z is None:
-        return
-    asked = scene.at([z], "z")
+def _check_places(scene: Scene, places: list[Any], name: str) -> None:
+    """Raise ValueError for places that do not exist on the scene's own body."""
+    asked = scene.at(places, name)
     if scene.named:
         check_named(scene.beam, asked, ())
     else:
-        on_beam(np.array(asked, dtype=float), scene.beam, "z")
+        on_beam(np.array(asked, dtype=float), scene.beam, name)
+
+
+def _check_place(scene: Scene, z: Place | None) -> None:
+    """The same of one place, where it is given."""
+    if z is not None:
+        _check_places(scene, [z], "z")
 
 
 @dataclass(frozen=True)
@@ -479,8 +483,7 @@ class BasinsTable:
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Basins:
         """The basins, with their checkpoint ``basins.npz`` in the folder."""
-        keys = {field.name: getattr(self, field.name) for field in fields(self)}
-        return basins(file.model(), **keys, checkpoint=folder / "basins.npz", progress=progress)
+        return basins(file.model(), **vars(self), checkpoint=folder / "basins.npz", progress=progress)
 
 
 @dataclass(frozen=True)
@@ -545,11 +548,7 @@ class FloorSpectraTable:
 
     def check(self, scene: Scene) -> None:
         """Raise ValueError for places and directions that the scene does not have."""
-        asked = scene.at(list(self.places), "places")
-        if scene.named:
-            check_named(scene.beam, asked, ())
-        else:
-            on_beam(np.array(asked, dtype=float), scene.beam, "places")
+        _check_places(scene, list(self.places), "places")
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> FloorSpectra:
         """The spectra."""
@@ -586,8 +585,7 @@ class PeakTable:
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Peak:
         """The study."""
-        keys = {field.name: getattr(self, field.name) for field in fields(self)}
-        return peak(file.model(), **keys, progress=progress)
+        return peak(file.model(), **vars(self), progress=progress)
 
 
 @dataclass(frozen=True)
@@ -648,8 +646,7 @@ class BackboneTable:
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Backbone:
         """The study."""
-        keys = {field.name: getattr(self, field.name) for field in fields(self)}
-        return backbone(file.model(), **keys, progress=progress)
+        return backbone(file.model(), **vars(self), progress=progress)
 
 
 Draw = Mapping[str, str | float]  # a distribution of `scipy.stats` by its kind, with its numbers

@@ -27,8 +27,8 @@ from fembeam.scene_file.keys import (
     wanted,
 )
 from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
-from fembeam.scene_file.structures import PLACES, is_place, place
-from fembeam.support import is_whole
+from fembeam.scene_file.structures import PLACES, is_place
+from fembeam.support import is_whole, tuples
 
 Table = Mapping[str, Any]
 BODIES = tuple(further.MAKERS)  # tables beside [beam]
@@ -224,7 +224,7 @@ class TableReader:
         """The same of what has a place by name: `at` for z; `on` and `to` hold such places too."""
         known = ["at" if key == "z" else key for key in keys]
         self.check_keys(table, [*([chosen_by] if chosen_by else []), *known, *also], where, "key")
-        found = {key: place(table[key]) for key in PLACES if key in table and is_place(table[key])}
+        found = {key: tuples(table[key]) for key in PLACES if key in table and is_place(table[key])}
         wrong = [key for key in PLACES if key in table and key not in found]
         if wrong:
             self.fail(
@@ -256,9 +256,9 @@ class TableReader:
                 return [self.chosen(kind, one, f"{inner} number {i}") for i, one in enumerate(value, start=1)]
             return self.chosen(kind, value, inner)
         if key in PLACES and isinstance(value, list) and len(value) == 2 and is_place(value) and is_whole(value[0]):
-            return place(value)  # of another body
+            return tuples(value)  # of another body
         if self.named and key == "places" and isinstance(value, list) and all(map(is_place, value)):
-            return [place(one) for one in value]
+            return [tuples(one) for one in value]
         if not fits(value, parameter.annotation):
             self.fail(where, f"{key} must be {wanted(parameter.annotation)}, got {shown(value)}")
         if key == "path":

@@ -17,11 +17,11 @@ from fembeam.structures.directions import (
     require_components,
     turns,
 )
-from fembeam.structures.frame import Frame, total_mass
+from fembeam.structures.frame import Frame
 from fembeam.structures.frame_forces import FORCES, FrameForces
 from fembeam.structures.frame_mesh import FrameMatrices, FrameMesh
 from fembeam.structures.joined_bodies import JoinedBodies, JoinedForces, has_place, located_among
-from fembeam.structures.joints import Joint, joined, joining
+from fembeam.structures.joints import Joint, joining
 from fembeam.structures.massless import following
 from fembeam.structures.members import Member
 from fembeam.structures.modes_given import GivenModes

@@ -10,13 +10,13 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from fembeam.beams import SAME_PLACE, Section
 from fembeam.structures.assembled import COMPONENTS
 from fembeam.structures.directions import nearest
 from fembeam.structures.members import Member, axes_of
-from fembeam.support import in_mm, is_finite, is_whole, require, require_finite, require_positive
+from fembeam.support import in_mm, is_finite, is_pair, is_whole, require, require_finite, require_positive
 
 if TYPE_CHECKING:
     from fembeam.structures.frame_mesh import FrameMatrices
@@ -217,7 +217,7 @@ class Frame:
             advice = f"write ({place!r}, s) for a place s along the member" if inside else "use one of the names"
             _require_name("be a node", place, list(self.nodes), where, advice)
             return place
-        if isinstance(place, (tuple, list)) and len(place) == 2 and isinstance(place[0], str):
+        if is_pair(place) and isinstance(place[0], str):
             return self._inside(place[0], place[1], where)
         require(is_finite(place), "a place must be the name of a node, or (member, distance in m)", place, where,
                 f"write {next(iter(self.nodes))!r}, or ({self.members[0].name!r}, 0.0)")  # fmt: skip
@@ -352,9 +352,3 @@ def _require_name(what: str, name: str, names: list[str], where: str, advice: st
     """Raise ValueError, with the nearest name, unless a place is one of these."""
     close = "" if name in names else nearest(name, names)
     require(name in names, f"a place must {what} of the frame; {close}", name, where, advice)
-
-
-def total_mass(frame: Frame) -> float:
-    """Σ ρA L in kg."""
-    masses: ArrayLike = [one.section.line_mass for one in frame.members]
-    return float(np.dot(masses, frame.lengths))

@@ -46,7 +46,7 @@ def frame_of(
     flat = not np.any(points[np.unique(lines), 2]) and not options.get("bending_only") if plane is None else plane
     members = [
         Member(names[chain[0]], names[chain[-1]], table[group], _up_of(up, group), name)
-        for (chain, group), name in zip(chains, _member_names(chains), strict=True)
+        for (chain, group), name in zip(chains, _numbered([group for _, group in chains]), strict=True)
     ]
     nodes = {name: tuple(float(x) for x in points[node, : 2 if flat else 3]) for node, name in names.items()}
     return Frame(nodes, members, **options)
@@ -58,24 +58,21 @@ def _up_of(up: Any, group: str) -> Any:
 
 
 def _names(mesh: Any) -> dict[int, str]:
-    """Names of nodes; those of a set of several are numbered."""
+    """{node: name} of points that have a physical name of their own; several of one name are numbered."""
     found = list(named_nodes(mesh))
-    sizes, seen = Counter(name for name, _ in found), Counter[str]()
     names: dict[int, str] = {}
-    for name, node in found:
+    for (_, node), name in zip(found, _numbered([name for name, _ in found]), strict=True):
+        names.setdefault(node, name)
+    return names
+
+
+def _numbered(names: list[str]) -> list[str]:
+    """The same, each one of several numbered but for empty ones."""
+    sizes, seen, told = Counter(names), Counter[str](), []
+    for name in names:
         seen[name] += 1
-        names.setdefault(node, name if sizes[name] == 1 else f"{name} {seen[name]}")
-    return names
-
-
-def _member_names(chains: list[tuple[list[int], str]]) -> list[str]:
-    """The group, and a number where it has several members; "" for the names of the nodes where there is no group."""
-    sizes, seen = Counter(group for _, group in chains), Counter[str]()
-    names = []
-    for _, group in chains:
-        seen[group] += 1
-        names.append(group if sizes[group] == 1 or not group else f"{group} {seen[group]}")
-    return names
+        told.append(name if sizes[name] == 1 or not name else f"{name} {seen[name]}")
+    return told
 
 
 def _chains(

@@ -6,7 +6,7 @@ q_all = T q̂,    M̂ = Tᵀ M T,    K̂ = Tᵀ K T;    see `joints`.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -18,8 +18,8 @@ from fembeam.structures.assembled import COMPONENTS, Assembled
 from fembeam.structures.directions import nearest
 from fembeam.structures.frame_forces import FrameForces
 from fembeam.structures.frame_mesh import FrameMatrices
-from fembeam.structures.joints import Joint, blocks_joined, joining, shared_dofs, translations_of
-from fembeam.support import is_whole, require
+from fembeam.structures.joints import Joint, joined_fields, joining, shared_dofs, translations_of
+from fembeam.support import is_numbered, require
 
 Vector = NDArray[np.float64]
 APART = 1e-6  # of the size of the bodies: two places that a joint makes one
@@ -227,12 +227,12 @@ class JoinedBodies:
             count = elements if getattr(body, "meshed", True) else None
             frequency = {"omega": omega} if hasattr(body, "coarse") else {}
             made.append(body.assembled(count, modes, own, **frequency))
-        return self._joined(made)
+        return self.joined(made)
 
     def coarse(self, modes: int, places: Sequence[Any] = ()) -> JoinedMatrices:
         """The same of frames on few elements, to find out which frequencies their meshes have to resolve."""
         pairs = zip(self.bodies, self._places_of_each(places), strict=True)
-        return self._joined([
+        return self.joined([
             body.coarse(modes, own) if hasattr(body, "coarse") else body.assembled(None, modes, own)
             for body, own in pairs
         ])  # fmt: skip
@@ -243,24 +243,27 @@ class JoinedBodies:
         located += [end for joint in self.joints for end in ((joint.body, joint.place), joint.to)]
         return [[place for number, place in located if number == own] for own in range(len(self.bodies))]
 
-    def _joined(self, made: list[Assembled]) -> JoinedMatrices:
+    def joined(self, made: Sequence[Assembled]) -> JoinedMatrices:
+        """The matrices of all bodies from those of each; a place is (number of the body, its place)."""
         T, free = joining(self.bodies, made, self.joints)
-        whole = blocks_joined(self.bodies, made, T, free)
         first = tuple(int(i) for i in np.cumsum([0, *(one.M.shape[0] for one in made)]))
-        mine = {name: getattr(whole, name) for name in Assembled.__dataclass_fields__}
-        joined = JoinedMatrices(**mine, body=self, made=tuple(made), first=first, T=T)
-        object.__setattr__(joined, "rows", joined.rows_at)
-        return joined
+        return JoinedMatrices(
+            **joined_fields(self.bodies, made, T, free), body=self, made=tuple(made), first=first, T=T
+        )
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class JoinedMatrices(Assembled):
     """Matrices of joined bodies; `made` those of each, `first` where its dofs begin, T from q̂ to all dofs."""
 
+    rows: Any = field(init=False)
     body: JoinedBodies
     made: tuple[Assembled, ...]
     first: tuple[int, ...]
     T: sparse.csr_matrix
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "rows", self.rows_at)
 
     def rows_at(self, place: Any) -> sparse.csr_matrix:
         """A row (c, N) for each of the components that any body has, of zeros for those that this one has not."""
@@ -355,7 +358,7 @@ def located_among(bodies: Mapping[int, Any], place: Any, where: str) -> tuple[in
 
     ValueError for one that does not exist, or that several bodies have and not number 0.
     """
-    if isinstance(place, (tuple, list)) and len(place) == 2 and is_whole(place[0]):
+    if is_numbered(place):
         number, own = int(place[0]), place[1]
         listed = ", ".join(map(str, bodies))
         require(

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -18,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import linalg, sparse
 
 from fembeam.structures.assembled import COMPONENTS, Assembled
-from fembeam.support import is_whole, require, require_place
+from fembeam.support import is_numbered, is_whole, require, require_place, tuples
 
 Vector = NDArray[np.float64]
 
@@ -64,7 +63,7 @@ class Joint:
     body: int = 0
 
     def __post_init__(self) -> None:
-        paired = isinstance(self.to, (tuple, list)) and len(self.to) == 2 and is_whole(self.to[0])
+        paired = is_numbered(self.to)
         require(paired, "to must be (number of a body, its place)", self.to, "Joint", "write to=(1, 'flange')")
         for number in (self.body, self.to[0]):
             require(is_whole(number) and number >= 0, "bodies must be counted from 0, the first", number, "Joint",
@@ -72,8 +71,8 @@ class Joint:
         require(self.body != self.to[0], "a joint must join two bodies", self.to, "Joint", "name another body")
         require_place(self.place, self)
         require_place(self.to[1], self)
-        object.__setattr__(self, "to", (int(self.to[0]), _tuples(self.to[1])))
-        object.__setattr__(self, "place", _tuples(self.place))
+        object.__setattr__(self, "to", (int(self.to[0]), tuples(self.to[1])))
+        object.__setattr__(self, "place", tuples(self.place))
         if self.dofs is not None:
             listed = tuple(self.dofs)
             right = bool(listed) and len(set(listed)) == len(listed) and set(listed) <= set(COMPONENTS)
@@ -82,47 +81,21 @@ class Joint:
             object.__setattr__(self, "dofs", listed)
 
 
-def _tuples(place: Any) -> Any:
-    """A place with tuples for lists."""
-    return tuple(_tuples(one) for one in place) if isinstance(place, list) else place
-
-
-def joined(bodies: Sequence[Body], made: Sequence[Assembled], joints: Sequence[Joint]) -> Assembled:
-    """One body of several, on the unknowns that joints leave.
-
-    Parameters
-    ----------
-    bodies, made : the bodies and their matrices, in the order that joints count.
-    joints : list of `Joint`.
-
-    Returns
-    -------
-    Assembled : labels are ((number of the body, name), component); a place is (number of the body, its place).
-
-    Raises
-    ------
-    ValueError : a body, place or component that does not exist, two joints that fix one motion twice.
-    """
-    return blocks_joined(bodies, made, *joining(bodies, made, joints))
-
-
-def blocks_joined(bodies: Sequence[Body], made: Sequence[Assembled], T: sparse.csr_matrix, free: Any) -> Assembled:
-    """The same by a T that `joining` made."""
+def joined_fields(bodies: Sequence[Body], made: Sequence[Assembled], T: sparse.csr_matrix, free: Any) -> dict[str, Any]:
+    """Fields of the `Assembled` of all bodies but its rows, by a T that `joining` made."""
     labels = [((number, name), component) for number, one in enumerate(made) for name, component in one.labels]
     roots = [one.root for one in made if one.root is not None]
     root = sparse.block_diag(roots, format="csr") @ T if len(roots) == len(made) else None
-    first = np.cumsum([0, *(one.M.shape[0] for one in made)])
-    return Assembled(
-        (T.T @ sparse.block_diag([one.M for one in made], format="csr") @ T).tocsr(),
-        (T.T @ sparse.block_diag([one.K for one in made], format="csr") @ T).tocsr(),
-        tuple(labels[i] for i in free),
-        partial(_rows, tuple(made), tuple(first), T),
-        _translations(bodies, made)[free],
-        root=None if root is None else root.tocsr(),
-        C=_optional(made, "C", T),
-        gyroscopic=_optional(made, "gyroscopic", T),
-        accuracy="; ".join(one.accuracy for one in made if one.accuracy),
-    )
+    return {
+        "M": (T.T @ sparse.block_diag([one.M for one in made], format="csr") @ T).tocsr(),
+        "K": (T.T @ sparse.block_diag([one.K for one in made], format="csr") @ T).tocsr(),
+        "labels": tuple(labels[i] for i in free),
+        "translations": _translations(bodies, made)[free],
+        "root": None if root is None else root.tocsr(),
+        "C": _optional(made, "C", T),
+        "gyroscopic": _optional(made, "gyroscopic", T),
+        "accuracy": "; ".join(one.accuracy for one in made if one.accuracy),
+    }
 
 
 def joining(
@@ -192,12 +165,6 @@ def _independent(B: Vector, names: list[str]) -> None:
         require(size > DEPENDENT * float(np.linalg.norm(row)), "joints must not fix one motion twice", name, "joints",
                 "leave it out of one of them")  # fmt: skip
         Q = np.vstack([Q, left / size])
-
-
-def _rows(made: tuple[Assembled, ...], first: tuple[int, ...], T: sparse.csr_matrix, place: Any) -> sparse.csr_matrix:
-    """Rows of a place (number of the body, its place)."""
-    number, at = place
-    return made[number].rows(at) @ T[first[number] : first[number + 1]]
 
 
 def _translations(bodies: Sequence[Body], made: Sequence[Assembled]) -> Vector:

@@ -24,7 +24,7 @@ from fembeam.model.branch import Family
 from fembeam.scene import Scene, called, path_of
 from fembeam.study.peak import check_peak
 from fembeam.study.response_curve import ResponseCurve, Seen
-from fembeam.study.result import Result
+from fembeam.study.result import Result, column
 from fembeam.support import Part, counting, require
 
 Vector = NDArray[np.float64]
@@ -63,35 +63,12 @@ class Backbone(Result):
     resonances: tuple[Resonance, ...]
     z: Any
 
-    @property
-    def levels(self) -> Vector:
-        """(k,) amplitudes of the tone."""
-        return np.array([one.level for one in self.resonances])
-
-    @property
-    def omega(self) -> Vector:
-        """(k,) rad/s, of phase resonance."""
-        return np.array([one.omega for one in self.resonances])
-
-    @property
-    def zeta(self) -> Vector:
-        """(k,) damping ratios of the linear oscillator that loses as much."""
-        return np.array([one.zeta for one in self.resonances])
-
-    @property
-    def amplitude(self) -> Vector:
-        """(k,) m: half the range of the displacement at z."""
-        return np.array([one.amplitude for one in self.resonances])
-
-    @property
-    def energy(self) -> Vector:
-        """(k,) J lost in a period."""
-        return np.array([one.energy for one in self.resonances])
-
-    @property
-    def stable(self) -> Any:
-        """(k,) whether the orbits are stable."""
-        return np.array([one.stable for one in self.resonances])
+    levels = column("resonances", "level", "(k,) amplitudes of the tone.")
+    omega = column("resonances", "omega", "(k,) rad/s, of phase resonance.")
+    zeta = column("resonances", "zeta", "(k,) damping ratios of the linear oscillator that loses as much.")
+    amplitude = column("resonances", "amplitude", "(k,) m: half the range of the displacement at z.")
+    energy = column("resonances", "energy", "(k,) J lost in a period.")
+    stable = column("resonances", "stable", "(k,) whether the orbits are stable.")
 
     def __repr__(self) -> str:
         low, high = self.amplitude.min(), self.amplitude.max()

@@ -166,10 +166,7 @@ def cut(run: Run, start: float, end: float) -> Run:
 
     A contact belongs to the part in which it began; forces at samples are those of the run all the same.
     """
-    log, half = run.contacts, 1e-9 * max(float(run.t[-1]), end)
-    mine = (log.t_in >= start) & (log.t_in < end)
-    columns = {name: column[mine] for name, column in log.arrays().items()}
-    columns["t_in"], columns["t_out"] = columns["t_in"] - start, columns["t_out"] - start
+    half, of_log = 1e-9 * max(float(run.t[-1]), end), partial(_part_of_log, run, start, end)
     if len(run.t) == 1:
         kept, t = slice(0, 1), np.array([end - start])
     else:
@@ -177,9 +174,9 @@ def cut(run: Run, start: float, end: float) -> Run:
         t = run.t[kept] - start
     part = replace(
         run, t=t, q=run.q[kept], q_dot=run.q_dot[kept],
-        contacts=replace(log, **columns), ledger=partial(_ledger_of, run, kept),
-        lost=partial(_lost_of, run, kept), rubbing=partial(_rubbed, run, start, end),
-        borders=partial(_passed, run, start, end), reached=end - start,
+        contacts=of_log("contacts", "t_in", "t_out"), ledger=partial(_ledger_of, run, kept),
+        lost=partial(_lost_of, run, kept), rubbing=partial(of_log, "friction_log", "t_in", "t_out"),
+        borders=partial(of_log, "transitions", "t"), reached=end - start,
         began=latched_before(run, start),
         kept={"forces": run._forces[:, kept], "t": run.t[kept]},  # signals have the times of the run
     )  # fmt: skip
@@ -194,18 +191,12 @@ def _lost_of(run: Run, kept: slice) -> Any:
     return replace(part, friction=np.nan, spin=np.nan) if run.rubs.any() else part
 
 
-def _rubbed(run: Run, start: float, end: float) -> Any:
-    """What friction did in the contacts that began from start to end, times counted from start."""
-    log = run.friction_log
-    columns = {name: column[(log.t_in >= start) & (log.t_in < end)] for name, column in log.arrays().items()}
-    return replace(log, **columns | {"t_in": columns["t_in"] - start, "t_out": columns["t_out"] - start})
-
-
-def _passed(run: Run, start: float, end: float) -> Any:
-    """The borders that laws with memory passed from start to end, times counted from start."""
-    log = run.transitions
-    columns = {name: column[(log.t >= start) & (log.t < end)] for name, column in log.arrays().items()}
-    return replace(log, **columns | {"t": columns["t"] - start})
+def _part_of_log(run: Run, start: float, end: float, name: str, *times: str) -> Any:
+    """What a log of a run has whose first time lies from start to end, its times counted from start."""
+    log = getattr(run, name)
+    began = getattr(log, times[0])
+    columns = {key: column[(began >= start) & (began < end)] for key, column in log.arrays().items()}
+    return replace(log, **columns | {key: columns[key] - start for key in times})
 
 
 def _ledger_of(run: Run, kept: slice) -> solvers.Energy:

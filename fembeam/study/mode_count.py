@@ -285,7 +285,9 @@ def check_comparable(measured: Mapping[str, Measured], reference: Measured) -> N
 
 def kinds_of(scene: Scene, residual: bool | None) -> tuple[bool, ...]:
     """With static shapes or without; both if neither is asked for and the scene has any."""
-    return (residual,) if residual is not None else (False, True) if scene.loaded_places else (False,)
+    if residual is not None:
+        return (residual,)
+    return (False, True) if scene.acting or scene.forces else (False,)
 
 
 def difference(one: Measured, other: Measured) -> tuple[float, float]:

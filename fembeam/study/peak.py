@@ -26,7 +26,7 @@ from fembeam.model.sensitivity import of_amplitude
 from fembeam.plot.axis_names import axis_name
 from fembeam.scene import Scene, called, path_of
 from fembeam.study.response_curve import ResponseCurve, Seen
-from fembeam.study.result import Result
+from fembeam.study.result import Result, column
 from fembeam.support import Part, counting, is_finite, numbers, require
 
 Vector = NDArray[np.float64]
@@ -72,30 +72,11 @@ class Peak(Result):
     z: Any
     titles: tuple[str, str]
 
-    @property
-    def values(self) -> Vector:
-        """(k,) of p."""
-        return np.array([one.value for one in self.tops])
-
-    @property
-    def at(self) -> Vector:
-        """(k,) ω of the peaks."""
-        return np.array([one.at for one in self.tops])
-
-    @property
-    def amplitude(self) -> Vector:
-        """(k,) m: half the range of the displacement."""
-        return np.array([one.amplitude for one in self.tops])
-
-    @property
-    def slope(self) -> Vector:
-        """(k,) da/dp of the peaks, exact; NaN where a contact grazes."""
-        return np.array([one.slope for one in self.tops])
-
-    @property
-    def stable(self) -> Any:
-        """(k,) whether the orbits of the peaks are stable."""
-        return np.array([one.stable for one in self.tops])
+    values = column("tops", "value", "(k,) of p.")
+    at = column("tops", "at", "(k,) ω of the peaks.")
+    amplitude = column("tops", "amplitude", "(k,) m: half the range of the displacement.")
+    slope = column("tops", "slope", "(k,) da/dp of the peaks, exact; NaN where a contact grazes.")
+    stable = column("tops", "stable", "(k,) whether the orbits of the peaks are stable.")
 
     def __repr__(self) -> str:
         low, high = self.tops[0].value, self.tops[-1].value

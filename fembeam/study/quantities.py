@@ -19,7 +19,7 @@ from fembeam.model import Run, extremes_of, places
 from fembeam.model.extremes import of_top
 from fembeam.scene import Place
 from fembeam.statistics import psd
-from fembeam.support import is_finite, is_whole, require
+from fembeam.support import is_finite, is_pair, is_whole, require
 
 if TYPE_CHECKING:
     from fembeam.study.gradients import Change
@@ -151,7 +151,7 @@ class Psd:
     sampled: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        two = isinstance(self.band, (tuple, list)) and len(self.band) == 2 and all(map(is_finite, self.band))
+        two = is_pair(self.band) and all(map(is_finite, self.band))
         right = two and 0 <= self.band[0] < self.band[1]
         require(right, "band must be (lo, hi) in rad/s, 0 ≤ lo < hi", self.band, "Psd", "e.g. (1, 1200)")
         right = is_whole(self.parts) and self.parts >= 1

@@ -48,6 +48,11 @@ class Result(Printed, ABC):
         return found
 
 
+def column(rows: str, name: str, doc: str) -> Any:
+    """A property of a result: one number of each of its rows."""
+    return property(lambda self: np.array([getattr(one, name) for one in getattr(self, rows)]), doc=doc)
+
+
 def plain(value: Any) -> Any:
     """Dataclasses as dictionaries, arrays as lists."""
     if is_dataclass(value) and not isinstance(value, type):

@@ -9,6 +9,8 @@ from fembeam.support.checks import (
     is_finite,
     is_name,
     is_number,
+    is_numbered,
+    is_pair,
     is_whole,
     number,
     numbers,
@@ -17,6 +19,7 @@ from fembeam.support.checks import (
     require_non_negative,
     require_place,
     require_positive,
+    tuples,
 )
 from fembeam.support.files import write_rows, written_whole
 from fembeam.support.notes import note

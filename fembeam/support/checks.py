@@ -77,14 +77,21 @@ def is_name(value: object) -> TypeGuard[str]:
     return False
 
 
+def is_pair(value: Any) -> bool:
+    """Whether a value is two things in a row."""
+    return isinstance(value, (tuple, list)) and len(value) == 2
+
+
+def is_numbered(place: Any) -> bool:
+    """Whether a place is (number of a body, its place)."""
+    return is_pair(place) and is_whole(place[0])
+
+
 def require_place(z: Any, part: object) -> None:
     """Raise ValueError unless z is a place for a part of a scene: a coordinate along a beam, or a name."""
-    if isinstance(z, (tuple, list)) and len(z) == 2:
-        if is_name(z[0]) and is_finite(z[1]):
-            return
-        if is_whole(z[0]) and z[0] >= 0:  # (number of a joined body, its place)
-            return require_place(z[1], part)
-    if is_name(z):
+    if is_numbered(z) and z[0] >= 0:
+        return require_place(z[1], part)
+    if is_name(z) or (is_pair(z) and is_name(z[0]) and is_finite(z[1])):
         return
     require_finite("z", z, type(part).__name__, "give the coordinate along the beam in m")
 
@@ -113,6 +120,17 @@ def numbers(name: str, values: Any, where: str, advice: str) -> NDArray[np.float
         given = np.asarray(None)
     require(given.dtype.kind in "iuf", f"{name} must be real numbers", values, where, advice)
     return given.astype(np.float64)
+
+
+def tuples(value: Any) -> Any:
+    """Tuples for lists, as files have them: of places, directions, pairs of these.
+
+    Examples
+    --------
+    >>> tuples("lever"), tuples(["A-B", 0.4]), tuples([["A-B", 0.4], "x"])
+    ('lever', ('A-B', 0.4), (('A-B', 0.4), 'x'))
+    """
+    return tuple(tuples(one) for one in value) if isinstance(value, list) else value
 
 
 def frozen(values: ArrayLike) -> NDArray[np.float64]:

@@ -21,7 +21,6 @@ def restarted(
     walks: list[list[dict[str, Any]]],
     status: list[str],
     step: float,
-    method: Any = None,
 ) -> Branch:
     """A branch restored from records of its orbits per direction.
 
@@ -30,25 +29,19 @@ def restarted(
     upwards = [walks[0][0]["parameter"] < span[1], False]  # of one direction alone only one has room
     return Branch(
         [
-            _restarted_walk(make_system, span, records, BranchStatus[name], step, method, up)
+            _restarted_walk(make_system, span, records, BranchStatus[name], step, up)
             for records, name, up in zip(walks, status, upwards, strict=False)
         ]
     )
 
 
 def _restarted_walk(
-    make: Any,
-    span: tuple[float, float],
-    records: list[dict[str, Any]],
-    status: BranchStatus,
-    step: float,
-    method: Any,
-    up: bool,
+    make: Any, span: tuple[float, float], records: list[dict[str, Any]], status: BranchStatus, step: float, up: bool
 ) -> Walk:
     """One direction, up or down from its first orbit; orbits are integrated again, their states are not changed."""
     points: list[Point] = []
     system, period = make(records[0]["parameter"])
-    method, width = checked(system, period, method, 1), span[1] - span[0]
+    method, width = checked(system, period, None, 1), span[1] - span[0]
     for record in records:
         _, period = make(record["parameter"])
         x = np.array([record["state"]])

@@ -29,3 +29,10 @@ def ends_of(rows: Array) -> Array:
 def begins_of(rows: Array) -> Array:
     """Events by which they begin."""
     return rows[(rows[:, FROM] == 0.0) & (rows[:, TO] > 0.0)]
+
+
+def paired(begins: Array, ends: Array) -> tuple[Array, Array]:
+    """The begin of the contact that each end ends, beside the ends; an element begins and ends in turn."""
+    first = np.empty_like(ends)
+    first[np.argsort(ends[:, ELEMENT], kind="stable")] = begins[np.argsort(begins[:, ELEMENT], kind="stable")]
+    return first, ends

@@ -37,6 +37,9 @@ class Columns:
 
     names: tuple[str, ...]  # of all contacts, empty where one has none
 
+    def __len__(self) -> int:
+        return len(next(iter(self.arrays().values())))
+
     @property
     def name(self) -> Any:
         """What the contact of each row is called."""

@@ -102,9 +102,6 @@ class ContactLog(Columns):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, np.full(len(self.stop), np.nan))
 
-    def __len__(self) -> int:
-        return len(self.stop)
-
     def named_arrays(self) -> dict[str, Any]:
         """The columns by name, without those of angles where there are none."""
         bare = np.all(np.isnan(self.angle_in)) and np.all(np.isnan(self.angle_out))
@@ -117,9 +114,7 @@ class ContactLog(Columns):
     @classmethod
     def of_events(cls, rows: Array, names: Sequence[str] = ()) -> ContactLog:
         """From an event list in which every contact begins and ends, with names of all stops."""
-        ends, begins = at.ends_of(rows), at.begins_of(rows)
-        first = np.empty_like(ends)
-        first[np.argsort(ends[:, at.ELEMENT], kind="stable")] = begins[np.argsort(begins[:, at.ELEMENT], kind="stable")]
+        first, ends = at.paired(at.begins_of(rows), at.ends_of(rows))
         return cls(
             stop=ends[:, at.ELEMENT].astype(int),
             t_in=first[:, at.TIME].copy(),
@@ -194,9 +189,6 @@ class FrictionLog(Columns):
     energy_loss: Array
     names: tuple[str, ...] = field(default=(), kw_only=True)
 
-    def __len__(self) -> int:
-        return len(self.contact)
-
     def __repr__(self) -> str:
         return f"<friction of {counted(len(self), 'contact')}>"
 
@@ -204,9 +196,7 @@ class FrictionLog(Columns):
     def of_events(cls, rows: Array, names: Sequence[str] = ()) -> FrictionLog:
         """From an event list in which every contact begins and ends."""
         rows = rows[rows[:, at.GUARD] == at.FRICTION]
-        ends, begins = rows[rows[:, at.CLIPPED] == 0.0], rows[rows[:, at.CLIPPED] == 1.0]
-        first = np.empty_like(ends)
-        first[np.argsort(ends[:, at.ELEMENT], kind="stable")] = begins[np.argsort(begins[:, at.ELEMENT], kind="stable")]
+        first, ends = at.paired(rows[rows[:, at.CLIPPED] == 1.0], rows[rows[:, at.CLIPPED] == 0.0])
         both: list[Any] = [
             part for c in (at.TIME, at.DELTA, at.RATE) for part in (first[:, c].copy(), ends[:, c].copy())
         ]
@@ -245,9 +235,6 @@ class Transitions(Columns):
     impulse: Array
     work: Array
     names: tuple[str, ...] = field(default=(), kw_only=True)
-
-    def __len__(self) -> int:
-        return len(self.t)
 
     def __repr__(self) -> str:
         return f"<{counted(len(self), 'transition')} of laws with memory>"

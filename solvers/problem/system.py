@@ -250,16 +250,6 @@ class Contact:
         turning = (speed if not self.outer else -speed) / distance - rate * place / distance**2
         return delta, float(rate), along @ self.direction, turning @ self.direction
 
-    def slide(self, q: ArrayLike, t: ArrayLike = 0.0) -> Array:
-        """ξ (...) in m at coordinates (..., n) and times; of an annulus with its angle in (-π, π]."""
-        q = np.asarray(q)
-        if self.tangent is not None:
-            return q @ self.tangent
-        x, y = np.moveaxis(q @ self.direction.T - self.centre, -1, 0)
-        arm = 0.0 if self.radius is None else -self.radius if self.outer else self.radius
-        turned = 0.0 if self.rotation is None else q @ self.rotation
-        return self.gap * np.arctan2(y, x) + arm * (turned + self.spin * np.asarray(t))
-
 
 @dataclass(frozen=True, eq=False)
 class System:

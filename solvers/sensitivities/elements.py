@@ -47,8 +47,9 @@ class ElementMotion:
     angle: Array
 
 
-def motion_of(contact: Any, t: Any, y: Array, y_dot: Array) -> ElementMotion:
-    """The motion of an element from that of its rows, y and ẏ (m, k)."""
+def motion_of(contact: Any, q: Array, q_dot: Array, t: Any = 0.0) -> ElementMotion:
+    """The motion of an element at coordinates (n, k)."""
+    y, y_dot = -contact.rows @ q - contact.row_gaps[:, None], -contact.rows @ q_dot  # of its rows
     m, k = y.shape
     none, slopes, bends = np.zeros(k), np.zeros((m, k)), np.zeros((m, m, k))
     if contact.map != "annulus":

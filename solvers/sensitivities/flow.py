@@ -66,14 +66,11 @@ class Flow:
         """(d, 2n) derivatives of [q, q̇] by the parameters."""
         return np.asarray((self.T @ self.y[:, self.own]).T)
 
-    def _of_rows(self, t: Any, s: int) -> tuple[Array, Array]:
-        """Motion y and ẏ (m, k) of an element's rows at times (k,)."""
-        q, q_dot = self.motion.at(np.atleast_1d(t))
-        return -self.rows[s] @ q - self.system.contacts[s].row_gaps[:, None], -self.rows[s] @ q_dot
-
     def motion_of(self, t: Any, s: int) -> ElementMotion:
         """`ElementMotion` of an element at times."""
-        return motion_of(self.system.contacts[s], np.atleast_1d(t), *self._of_rows(t, s))
+        times = np.atleast_1d(t)
+        q, q_dot = self.motion.at(times)
+        return motion_of(self.system.contacts[s], q, q_dot, times)
 
     def slider(self, s: int, acting: Acting) -> Slider | None:
         """The slider of an element, None without friction."""

@@ -112,13 +112,12 @@ def indentation_change(
 ) -> tuple[Array, Array]:
     """Changes (k,) of δ and δ̇ of element s due to those of q and q̇ (k, n) at fixed times, and to a parameter."""
     (q, q_dot), (d_q, d_q_dot) = motion, change
-    y, y_dot = -contact.rows @ q.T - contact.row_gaps[:, None], -contact.rows @ q_dot.T
     moved, sped, clearance = -contact.rows @ d_q.T, -contact.rows @ d_q_dot.T, 0.0
     if nearby is not None:
         one = ElementChange.of([nearby], s, contact.rows.shape)
         moved, sped = moved - one.rows[0] @ q.T - one.offsets[0][:, None], sped - one.rows[0] @ q_dot.T
         clearance = float(one.clearance[0] * np.sign(contact.circle))
-    element = motion_of(contact, 0.0, y, y_dot)
+    element = motion_of(contact, q.T, q_dot.T)
     rate = (element.delta_slopes * sped + element.rate_slopes * moved).sum(axis=0)
     return (element.delta_slopes * moved).sum(axis=0) - clearance, rate
 

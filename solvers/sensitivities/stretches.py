@@ -15,7 +15,7 @@ from solvers.integration import prepared_run
 from solvers.problem import Array, Solution, SolverError, Status, System, dense
 from solvers.problem import event_list as at
 from solvers.sensitivities import laws
-from solvers.sensitivities.elements import ElementMotion, Slider, motion_of
+from solvers.sensitivities.elements import Slider, motion_of
 from solvers.sensitivities.panels import Clock, Panels
 from solvers.sensitivities.sampled import SampledLoads
 
@@ -86,7 +86,7 @@ def acting_at_start(system: System, x: Array, rows: Array, memory: Sequence[Any]
     segment, entry_rate, parameters = [], [], list(law_parameters(system))
     for s, contact in enumerate(system.contacts):
         law: Any = contact.law
-        motion = motion_at(contact, *np.split(x[:, None], 2))
+        motion = motion_of(contact, *np.split(x[:, None], 2))
         begin = begun.get(s)
         known = begin[at.TO] if begin is not None else 0.0
         above = sum(motion.delta[0] > knot for knot in law.knots)
@@ -187,11 +187,6 @@ def _power(contact: Any) -> int:
     if np.all(powers == np.round(powers)):
         return 1
     return 2 if np.all(2.0 * powers == np.round(2.0 * powers)) else 6
-
-
-def motion_at(contact: Any, q: Array, q_dot: Array, t: Any = 0.0) -> ElementMotion:
-    """Motion of an element at coordinates (n, k)."""
-    return motion_of(contact, t, -contact.rows @ q - contact.row_gaps[:, None], -contact.rows @ q_dot)
 
 
 class Motion:

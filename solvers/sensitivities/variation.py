@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from solvers.problem import Array, ContactLog, Solution, System, dense
 from solvers.problem import event_list as at
+from solvers.sensitivities.elements import motion_of
 from solvers.sensitivities.events import GRAZING, NoDerivativeError, called, cross
 from solvers.sensitivities.flow import Flow, latched_columns
 from solvers.sensitivities.nearby import Change, Nearby, unchanged
@@ -24,7 +25,6 @@ from solvers.sensitivities.stretches import (
     Stretch,
     acting_at_start,
     grouped,
-    motion_at,
     replayed,
 )
 
@@ -215,7 +215,7 @@ class _Request:
         """Set the sizes of the displacements; NoDerivativeError for a stop that is touched but not entered."""
         self.span, self.depth = (np.zeros(len(self.system.contacts)) for _ in range(2))
         for s, contact in enumerate(self.system.contacts):
-            delta = motion_at(contact, solution.q.T, solution.q_dot.T).delta
+            delta = motion_of(contact, solution.q.T, solution.q_dot.T).delta
             mine = rows[rows[:, at.ELEMENT] == s]
             self.span[s] = np.abs(delta + contact.gap * (-1.0 if contact.outer else 1.0)).max() + 1e-300
             deepest = np.nanmax(np.append(mine[:, at.DEEPEST], 0.0))
@@ -251,7 +251,7 @@ class _Request:
     def _maxima(self, solution: Solution, s: int) -> list[tuple[float, float, float]]:
         """(time, distance of samples, δ) of the maxima of δ below zero between samples, from cubics."""
         contact, t = self.system.contacts[s], solution.t
-        motion, found = motion_at(contact, solution.q.T, solution.q_dot.T), []
+        motion, found = motion_of(contact, solution.q.T, solution.q_dot.T), []
         delta, rate = motion.delta, motion.rate
         for i in np.flatnonzero((rate[:-1] > 0.0) & (rate[1:] <= 0.0) & (delta[:-1] < 0.0) & (delta[1:] < 0.0)):
             h, x = t[i + 1] - t[i], rate[i] / (rate[i] - rate[i + 1])

@@ -123,55 +123,27 @@ def _slider_margins_at(problem, state, space, h, s, theta):
 
 
 @inner
-def _minus_margin(known, theta):
-    """Minus a margin of a law at θ of the step."""
-    problem, state, space, _, s, j = known
-    space.trial[0], space.trial[1] = polynomial(space.coefficients[0], theta), polynomial(space.coefficients[1], theta)
-    margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.one)
-    return -space.one[j]
-
-
-@inner
-def _minus_slider_margin(known, theta):
-    """Minus a margin of friction at θ of the step."""
-    problem, state, space, h, s, j = known
-    _slider_margins_at(problem, state, space, h, s, theta)
-    return -space.one[j]
-
-
-@inner
 def _margin_at(known, theta):
-    """A margin of a law at θ of the step."""
-    return -_minus_margin(known, theta)
+    """A margin at θ of the step."""
+    problem, state, space, h, s, j = known
+    if rubs(problem, s):
+        _slider_margins_at(problem, state, space, h, s, theta)
+    else:
+        delta, rate = polynomial(space.coefficients[0], theta), polynomial(space.coefficients[1], theta)
+        space.trial[0], space.trial[1] = delta, rate
+        margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.one)
+    return space.one[j]
 
 
 @inner
-def _slider_margin_at(known, theta):
-    """A margin of friction at θ of the step."""
-    return -_minus_slider_margin(known, theta)
-
-
-@inner
-def _highest_between(known, a, b):
-    """(θ, value) of the highest margin on [a, b]."""
-    if rubs(known[0], known[4]):
-        return golden_section(_slider_margin_at, known, a, b)
-    return golden_section(_margin_at, known, a, b)
-
-
-@inner
-def _lowest_between(known, a, b):
-    """(θ, minus the value) of the lowest margin on [a, b]."""
-    if rubs(known[0], known[4]):
-        return golden_section(_minus_slider_margin, known, a, b)
-    return golden_section(_minus_margin, known, a, b)
+def _minus_margin(known, theta):
+    """Minus a margin at θ of the step."""
+    return -_margin_at(known, theta)
 
 
 @inner
 def _zero_between(known, a, b):
     """θ at which a margin falls below zero in [a, b]."""
-    if rubs(known[0], known[4]):
-        return bisection(_minus_slider_margin, known, a, b)
     return bisection(_minus_margin, known, a, b)
 
 
@@ -199,7 +171,7 @@ def _falls_from_zero(known, theta):
     parabola through it at the start, a step before and a step after by extrapolation.
     """
     problem, state, space, _, s, j = known
-    place, highest_margin = _highest_between(known, 0.0, theta)
+    place, highest_margin = golden_section(_margin_at, known, 0.0, theta)
     if highest_margin > space.rounding[s, j]:
         return _zero_between(known, place, theta)
     if rubs(problem, s) and slider_of(problem, s)[CODE] == 0.0 and state.now[T] == state.now[LAST_EVENT]:
@@ -217,7 +189,7 @@ def _lowest_around(known, values, i, rounding):
     before, after = values[i - 1], values[min(i + 1, _NODES.size - 1)]
     if values[i] > before or values[i] > after or values[i] > 2.0 * (max(before, after) - values[i]):
         return NONE
-    place, below = _lowest_between(known, _NODES[i - 1], _NODES[min(i + 1, _NODES.size - 1)])
+    place, below = golden_section(_minus_margin, known, _NODES[i - 1], _NODES[min(i + 1, _NODES.size - 1)])
     return place if below > rounding else NONE
 
 

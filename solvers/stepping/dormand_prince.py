@@ -117,17 +117,13 @@ class DormandPrince:
     events: ClassVar[int] = LOCATED
     work_rows: ClassVar[int] = EXTENDED + 2
     constants: ClassVar[tuple[float, ...]] = ()
+    step: ClassVar[Any] = staticmethod(step)
 
     def __post_init__(self) -> None:
         if not 1e-14 <= self.rtol <= 1e-2:
             raise ValueError(f"rtol must lie in [1e-14, 1e-2], got {self.rtol!r}")
         if not 0.0 < self.atol < math.inf:
             raise ValueError(f"atol must be positive and finite, got {self.atol!r}")
-
-    @property
-    def step(self) -> Any:
-        """The compiled step."""
-        return step
 
     def prepared(self, system: System, forcing: Forcing, duration: float) -> tuple[Forcing, None]:
         """The forcing alone: nothing is tabulated in advance."""

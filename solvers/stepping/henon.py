@@ -104,6 +104,7 @@ class HenonRK2(ConstantStep):
 
     rtol: ClassVar[float] = 1e-8
     work_rows: ClassVar[int] = 3
+    step: ClassVar[Any] = staticmethod(step)
 
     def __post_init__(self) -> None:
         for name in ("dt_flight", "dt_contact"):
@@ -123,8 +124,3 @@ class HenonRK2(ConstantStep):
     def radius(self) -> Radius:
         """|1 + z + z²/2|, z = hλ."""
         return taylor_radius(2)
-
-    @property
-    def step(self) -> Any:
-        """The compiled step."""
-        return step

@@ -237,16 +237,12 @@ class _Family(ConstantStep):
     """What the methods of this module share."""
 
     work_rows: ClassVar[int] = 5
+    step: ClassVar[Any] = staticmethod(step)
 
     @property
     def radius(self) -> Radius:
         """Of the matrix of one step."""
         return alpha_radius(*self.constants)
-
-    @property
-    def step(self) -> Any:
-        """The compiled step."""
-        return step
 
     def takes_matrices(self, system: System) -> bool:
         """Sparse matrices, and damping or gyroscopic terms that couple the modes, are stepped on as they are."""

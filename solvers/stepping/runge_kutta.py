@@ -83,6 +83,7 @@ class RK4(ConstantStep):
     force_unstable: bool = False
 
     work_rows: ClassVar[int] = 3
+    step: ClassVar[Any] = staticmethod(step)
 
     def __post_init__(self) -> None:
         require_step("dt", self.dt)
@@ -91,11 +92,6 @@ class RK4(ConstantStep):
     def radius(self) -> Radius:
         """|1 + z + z²/2 + z³/6 + z⁴/24|, z = hλ."""
         return taylor_radius(4)
-
-    @property
-    def step(self) -> Any:
-        """The compiled step."""
-        return step
 
     def takes_matrices(self, system: System) -> bool:
         """Sparse matrices are stepped on as they are."""
