@@ -14,7 +14,6 @@ from scipy.linalg import expm
 import solvers
 from contacts import Hertz
 from solvers import Contact, System
-from solvers.problem import decouple
 
 LAW = Hertz(1e8)
 
@@ -33,7 +32,7 @@ def block_matrix(blocks):
 
 def check_decoupled(M, C, K, times=(0.0, 0.3, 1.7)):
     """T and its inverse fit, and the blocks move as the system does."""
-    blocks = decouple(M, C, K)
+    blocks = System(M, C, K).blocks
     n = len(M)
     condition = np.linalg.cond(blocks.T)
     np.testing.assert_allclose(blocks.T @ blocks.inverse, np.eye(2 * n), atol=1e-14 * n * condition)
@@ -82,7 +81,7 @@ def test_modes_that_rayleigh_damping_overdamps_are_named():
     """C = βK, β = 1 s, and a dashpot: slow roots -1/β (1 + 1/(β²k)), k of 1e6 and more, lie within 1e-6."""
     k, row = 1e6 * np.arange(1.0, 13.0) ** 2, np.cos(np.arange(12.0))
     with pytest.raises(ValueError, match=r"Rayleigh's beta, overdamps high modes.* lower beta, or keep fewer modes"):
-        decouple(np.eye(12), np.diag(k) + np.outer(row, row), np.diag(k))
+        _ = System(np.eye(12), np.diag(k) + np.outer(row, row), np.diag(k)).blocks
 
 
 @pytest.mark.parametrize("zeta", [0.0, 0.01, 0.999999, 1.0, 1.000001, 3.0])
@@ -110,7 +109,7 @@ def test_a_free_coordinate_may_stand_anywhere_beside_coupled_ones(free):
 
 def test_proportional_damping_needs_no_complex_modes():
     M, K = np.diag([1.0, 2.0]), np.array([[3.0, -1.0], [-1.0, 1.0]])
-    blocks = decouple(M, 0.1 * M + 0.02 * K, K)
+    blocks = System(M, 0.1 * M + 0.02 * K, K).blocks
     assert blocks.loss.size == 0
     np.testing.assert_allclose(blocks.c, 0.1 + 0.02 * blocks.k, rtol=1e-13)
     phi = blocks.T[:2, :2]
@@ -140,7 +139,7 @@ def test_blocks_are_the_same_in_any_unit_of_time(unit, turn):
     """Of micro-beams frequencies are some 1e7 rad/s; T went to rounding with their square, and was then refused."""
     row, K = np.array([1.0, -1.0, 1.0]), np.diag([1.0, 40.0, 300.0])
     C, G = np.diag([0.02, 0.1, 0.3]) + 0.4 * np.outer(row, row), turn * (np.eye(3, k=1) - np.eye(3, k=-1))
-    slow, fast = (decouple(np.eye(3), one * C, one**2 * K, one * G) for one in (1.0, unit))
+    slow, fast = (System(np.eye(3), one * C, one**2 * K, gyroscopic=one * G).blocks for one in (1.0, unit))
     rates = np.repeat([1.0, unit], 3)
     np.testing.assert_allclose(fast.k / unit**2, slow.k, rtol=1e-12)
     np.testing.assert_allclose(fast.c / unit, slow.c, rtol=1e-12)
