@@ -237,16 +237,6 @@ def test_ball_comes_to_rest_in_permanent_contact():
 # --- several stops ------------------------------------------------------------------------------------------------
 
 
-def test_two_identical_stops_at_one_instant_act_as_one_of_twice_the_stiffness():
-    twins = [Contact([1.0], Hysteretic(1e8, 0.7), 0.01)] * 2
-    one = integrate(free_mass(Hysteretic(2e8, 0.7), gap=0.01), [0.0], [-1.0], 0.1, method=Exponential(1e-11))
-    two = integrate(System([[1.0]], [[0.0]], [[0.0]], twins), [0.0], [-1.0], 0.1, method=Exponential(1e-11))
-    assert sorted(two.contacts.stop.tolist()) == [0, 1]
-    np.testing.assert_allclose(two.contacts.t_in, one.contacts.t_in[0], rtol=1e-13)
-    np.testing.assert_allclose(two.contacts.t_out, one.contacts.t_out[0], rtol=1e-10)
-    np.testing.assert_allclose(two.q, one.q, rtol=5e-9)
-
-
 def test_stop_at_the_node_of_a_mode_does_not_move_it():
     contact = Contact([1.0, 0.0], Hertz(1e5), 1e-3)
     run = integrate(System.modal([10.0, 37.0], 0.0, [contact]), [0.0, 0.3], [-1.0, 0.2], 0.5, 0.05, Exponential(1e-10))
