@@ -223,16 +223,6 @@ def test_peak_of_a_contact_under_way_is_that_reached_so_far():
     assert run.contacts.peak_indentation[0] == pytest.approx(-run.q[0, 0], rel=1e-9)
 
 
-def test_ball_comes_to_rest_in_permanent_contact():
-    for stop in (KelvinVoigt(1e4, 20.0), Hysteretic(1e6, 1.4)):
-        run = integrate(free_mass(stop, loads=WEIGHT), [0.1], [0.0], 20.0, method=Exponential(1e-9))
-        assert run.status is Status.DONE
-        assert np.isnan(run.contacts.t_out).sum() == 1
-        assert np.isnan(run.contacts.t_out[-1])
-        assert stop.force(-run.q[0, 0], 0.0, 1.0) == pytest.approx(9.81, rel=1e-6)
-        assert run.cost.steps < 20_000
-
-
 # --- several stops ------------------------------------------------------------------------------------------------
 
 
