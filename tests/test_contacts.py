@@ -616,8 +616,7 @@ def test_laws_for_a_mass_refuse(make):
 
 
 @pytest.mark.parametrize(
-    "of",
-    [Hertz(3e8), Hysteretic(2e8, 0.7), Hysteretic(5e4, 0.3, exponent=1.0), KelvinVoigt(1e5, 30.0)],
+    "of", [Hertz(3e8), Hysteretic(2e8, 0.7), Hysteretic(5e4, 0.3, exponent=1.0), KelvinVoigt(1e5, 30.0)]
 )
 def test_the_formula_of_inlined_laws_is_their_kernel(of):
     K, p, a, c = of.inlined

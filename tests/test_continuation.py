@@ -270,9 +270,7 @@ def test_orbits_at_rest_begin_a_branch_over_the_amplitude():
         ({"step": 0.0}, "step must lie in"),
         ({"step": math.nan}, "step must lie in"),
         ({"shots": 0}, "shots must be a whole number"),
-        pytest.param(
-            *({"start": [1.0, 2.0, 3.0]}, "start must be 2 finite numbers"),
-        ),
+        pytest.param(*({"start": [1.0, 2.0, 3.0]}, "start must be 2 finite numbers")),
         ({"make_system": over(DAMPED, periods=0)}, "period must be positive"),
         ({"make_system": over(DAMPED, periods=1.5)}, "does not have the period"),
     ],

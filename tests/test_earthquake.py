@@ -107,11 +107,7 @@ def test_the_baseline_is_the_parabola_of_least_velocity():
         (cosmos(step=-999.0), {}, "803 samples of nan s do not make the 4 s"),
         (cosmos(step=0.01), {}, "803 samples of 0.01 s do not make the 4 s"),
         (cosmos(count=900), {}, "its (header says 900 samples, there are|data are not numbers)"),
-        (
-            cosmos().replace("acceleration pts, approx", "velocity pts"),
-            {},
-            "the COSMOS file has no acceleration",
-        ),
+        (cosmos().replace("acceleration pts, approx", "velocity pts"), {}, "the COSMOS file has no acceleration"),
     ],
 )
 def test_what_is_wrong_is_said_with_the_file(tmp_path, text, options, message):

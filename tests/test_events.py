@@ -6,14 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from problems import (
-    DampedHalfWave,
-    HertzBounce,
-    bilinear,
-    bounce,
-    free_mass,
-    paper_scene,
-)
+from problems import DampedHalfWave, HertzBounce, bilinear, bounce, free_mass, paper_scene
 from scipy.optimize import brentq
 
 import fembeam as fb
@@ -212,11 +205,7 @@ def test_amplitudes_of_any_size_are_right_or_refused(law):
 
 def test_stop_above_under_mirrored_motion_equals_stop_below():
     scene = paper_scene()
-    above = replace(
-        scene,
-        stops=[fb.Stop(0.24445, LN, 1e-4, "above")],
-        base=fb.Harmonic(amplitude=-1e-3, omega=195.0),
-    )
+    above = replace(scene, stops=[fb.Stop(0.24445, LN, 1e-4, "above")], base=fb.Harmonic(amplitude=-1e-3, omega=195.0))
     below = replace(scene, stops=[fb.Stop(0.24445, LN, 1e-4, "below")])
     runs = [s.reduce(2).simulate(3 * PERIOD, PERIOD / 20, solver=DormandPrince(1e-9)) for s in (below, above)]
     assert len(runs[0].contacts) >= 3

@@ -255,10 +255,7 @@ def test_features_must_sit_on_the_beam(name, feature):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (
-            lambda: LumpedMass(0.5, -1.0),
-            "mass must be finite and not negative, got -1.0 in LumpedMass at z = 0.5",
-        ),
+        (lambda: LumpedMass(0.5, -1.0), "mass must be finite and not negative, got -1.0 in LumpedMass at z = 0.5"),
         (lambda: LumpedMass(0.5, 1.0, math.nan), "inertia must be finite and not negative, got nan"),
         (lambda: LumpedMass(0.5, 1.0, 0.0, math.inf), "offset must be finite, got inf"),
         (lambda: Spring(0.5, -2.0), "stiffness must be finite and not negative"),

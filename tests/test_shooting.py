@@ -376,8 +376,7 @@ def test_hysteretic_stop_that_never_opens():
 
 
 @pytest.mark.parametrize(
-    ("stop", "latched"),
-    [(HYSTERETIC, True), (replace(HYSTERETIC, entry_rate_floor=0.5), True), (Hertz(2.1e8), False)],
+    ("stop", "latched"), [(HYSTERETIC, True), (replace(HYSTERETIC, entry_rate_floor=0.5), True), (Hertz(2.1e8), False)]
 )
 def test_a_law_that_latches_is_known_whatever_its_floor(stop, latched):
     assert latches(Contact([1.0], stop)) is latched

@@ -59,12 +59,7 @@ from solvers import Exponential, integrate
 
 MOST_TRANSITIONS = 40
 VALVES = ("throttled", "relieved upwards", "relieved downwards")
-BY_RATE = (
-    "stick",
-    "reversal",
-    "unload",
-    *VALVES,
-)  # events at a certain δ̇, most at zero; others at a δ or force
+BY_RATE = ("stick", "reversal", "unload", *VALVES)  # events at a certain δ̇, most at zero; others at a δ or force
 BETWEEN = 1e-5 / ALLOWED  # rtol of the reference between its steps
 WIDER = (1.5, 3.0, 6.0)  # a pair on one side of a bound in one run may be on the other side in the other, once
 
