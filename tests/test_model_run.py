@@ -422,17 +422,6 @@ def test_archive_of_something_else_is_refused(tmp_path, arrays, message):
         fb.load(tmp_path / "other.npz")
 
 
-def test_failing_write_leaves_nothing_behind(run, tmp_path, monkeypatch):
-    def full_disk(file, **arrays):
-        file.write(b"half of it")
-        raise OSError("no space left on device")
-
-    monkeypatch.setattr(np, "savez", full_disk)
-    with pytest.raises(OSError, match=r"no space left"):
-        run.save(tmp_path / "run.npz")
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_saved_file_has_the_usual_permissions(run, tmp_path):
     plain = tmp_path / "plain"
     plain.write_bytes(b"")
