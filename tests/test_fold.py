@@ -5,12 +5,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+from problems import ROD, ROD_FILE
 
 import fembeam as fb
 from contacts import KelvinVoigt, Polynomial
 from fembeam import scene_file
 
-ROD, TIP = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), 0.5
+TIP = 0.5
 CUBIC, ZETA, FORCE = 2e7, 0.01, "forces[0].signal.amplitude"
 
 
@@ -95,13 +96,7 @@ def test_it_prints_and_is_drawn(tmp_path):
 
 def test_the_table_of_a_scene_file(tmp_path):
     path = tmp_path / "scene.toml"
-    path.write_text(f"""
-[beam]
-length = 0.5
-section = {{ shape = "circle", E = 2.1e11, rho = 7800.0, diameter = 0.01 }}
-[[supports]]
-kind = "clamped"
-z = 0.0
+    path.write_text(f"""{ROD_FILE}
 [[elements]]
 z = 0.5
 law = {{ kind = "polynomial", coefficients = [0.0, 0.0, {CUBIC}] }}

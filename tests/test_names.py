@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from problems import ROD_FILE
 
 import fembeam as fb
 import solvers
@@ -193,14 +194,9 @@ def test_names_of_parameters():
     assert path_of(cantilever(bodies=[body]), "bodies[0].stops[far].gap") == "bodies[0].stops[0].gap"
 
 
-FILE = """
-[beam]
-length = 0.5
-section = { shape = "circle", E = 2.1e11, rho = 7800, diameter = 0.01 }
-[[supports]]
-kind = "clamped"
-z = 0
-name = "wall"
+FILE = (
+    ROD_FILE
+    + """name = "wall"
 [[stops]]
 z = 0.5
 law = { kind = "hertz", stiffness = 1e7 }
@@ -215,6 +211,7 @@ omega = 140.0
 duration = 0.2
 dt = 1e-3
 """
+)
 
 
 def test_names_in_scene_files(tmp_path):

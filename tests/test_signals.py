@@ -4,7 +4,7 @@ from dataclasses import MISSING, fields, replace
 
 import numpy as np
 import pytest
-from problems import ROD_FILE
+from problems import ROD, ROD_FILE
 
 import fembeam as fb
 from contacts import Hertz
@@ -28,7 +28,6 @@ from fembeam.study.measure import Plan, runs
 from fembeam.study.realisations import realisation
 from fembeam.study.segments import Segments
 
-BEAM = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
 PLAIN = {  # annotations of what is no signal
     *("float", "str", "str | None", "float | tuple[float, float, float]", "tuple[str, ...]"),
     *("Of", "Place", "Second | None", "Direction | None", "float | Sequence[float]", "bool", "float | None"),
@@ -62,7 +61,7 @@ def made(kind, key, signal):
 
 
 def scene_of(**parts):
-    return Scene(BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.05), **parts)
+    return Scene(ROD, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.05), **parts)
 
 
 def places():
