@@ -6,7 +6,6 @@ from test_moving_supports import DAMPED, SPAN, WAVE, equal
 
 import fembeam as fb
 from contacts import Hertz, KelvinVoigt
-from fembeam import scene_file
 
 STEEL = fb.Section(E=2.1e11, rho=7850.0, A=1e-4, I=1e-9)
 RAIL, END = fb.Harmonic(2e-3, 30.0), fb.Harmonic(1e-3, 20.0, phase=0.3)
@@ -182,7 +181,7 @@ def test_kept_by_a_file(tmp_path):
     assert run.to_vtu(tmp_path / "run").is_file()
 
 
-def test_in_a_file(tmp_path):
+def test_in_a_file(file_of):
     """A table of signals by dof, also along a beam."""
     text = """
 [beam]
@@ -193,8 +192,7 @@ kind = "clamped"
 z = 0.0
 motion = { y = { kind = "harmonic", amplitude = 1e-3, omega = 46.0, phase = 0.7 } }
 """
-    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
-    assert scene_file.read(tmp_path / "scene.toml").scene.supports == (fb.Clamped(0.0, motion={"y": WAVE}),)
+    assert file_of(text).scene.supports == (fb.Clamped(0.0, motion={"y": WAVE}),)
 
 
 def test_drawn():

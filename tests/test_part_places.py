@@ -9,7 +9,7 @@ from structures import beam_structure
 
 import fembeam as fb
 from contacts import KelvinVoigt
-from fembeam.scene_file import SceneFileError, read
+from fembeam.scene_file import SceneFileError
 
 LAW = KelvinVoigt(1e5, 10.0)
 STEEL = fb.Section.tube(2.0e11, 7900.0, 0.0603, 0.0525)
@@ -133,10 +133,8 @@ places = ["valve", 0.2]
 )
 
 
-def test_scene_files(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(FILE)
-    assert read(path).scene.stops[0].z == 0.4
+def test_scene_files(file_of):
+    assert file_of(FILE).scene.stops[0].z == 0.4
     for old, new, message in (
         ('z = "valve"', 'z = "vlave"', r"'valve' is the nearest there is, got 'vlave' in stops\[0\]"),
         (
@@ -146,9 +144,8 @@ def test_scene_files(tmp_path):
         ),
         ('z = "valve"', 'z = "0.4"', "z must be a number, got '0.4' in Stop"),
     ):
-        path.write_text(FILE.replace(old, new))
         with pytest.raises(SceneFileError, match=message):
-            read(path)
+            file_of(FILE.replace(old, new))
 
 
 @pytest.mark.parametrize(("make", "message"), [

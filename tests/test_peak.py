@@ -12,7 +12,6 @@ from test_equivalent import jenkins
 
 import fembeam as fb
 from contacts import Jenkins, KelvinVoigt, Polynomial
-from fembeam import scene_file
 from fembeam.model.sensitivity import of_amplitude
 from fembeam.scene import with_value
 
@@ -203,16 +202,13 @@ span = [100.0, 300.0]
 )
 
 
-def test_the_table_peak(tmp_path):
-    path = tmp_path / "rod.toml"
-    path.write_text(FILE, encoding="utf-8")
-    file = scene_file.read(path)
+def test_the_table_peak(tmp_path, file_of):
+    file = file_of(FILE)
     found = file.studies["peak"].run(file, tmp_path)
     exact = file.model().omega[0] * np.sqrt(1.0 - 2.0 * np.array([0.05, 0.1]) ** 2)
     np.testing.assert_allclose(found.at, exact, rtol=1e-6)
-    path.write_text(FILE.replace("zeta[0]", "zeta[7]"), encoding="utf-8")
     with pytest.raises(ValueError, match="no such parameter"):
-        scene_file.read(path)
+        file_of(FILE.replace("zeta[0]", "zeta[7]"))
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,6 @@ from fembeam.scene import (
     with_value,
 )
 from fembeam.scene.signals import is_of_signal
-from fembeam.scene_file import read
 from fembeam.study import ensemble
 from fembeam.study.execution.checkpoint import identity
 from fembeam.study.measure import Plan, runs
@@ -186,9 +185,8 @@ def test_orbit_and_branch_of_a_beam_shaken_by_the_foot_of_a_spring_alone():
     assert {150.0, 151.0} <= set(branch.parameter)
 
 
-def test_doubts_see_feet(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(
+def test_doubts_see_feet(file_of):
+    file = file_of(
         ROD_FILE
         + """
 [[springs]]
@@ -197,7 +195,6 @@ stiffness = 100
 foot = { kind = "harmonic", amplitude = 2.0, omega = 1e5 }
 """
     )
-    file = read(path)
     said = doubts(file.scene.reduce(modes=2))
     assert any("springs[0].foot moves by 2 m" in one for one in said)
     assert any("loads reach 100000 rad/s" in one for one in said)
