@@ -547,7 +547,6 @@ def test_run_without_anything_to_do_stays_at_rest():
         (([0.0], [0.0], 1.0, -1e-3), "dt must be positive and finite"),
         (([0.0], [0.0], 1.0, math.nan), "dt must be positive and finite"),
         (([0.0], [0.0], 1.0, 1.5), r"dt = 1\.5 s is longer than the duration of 1 s.*or leave dt out"),
-        (([0.0], [0.0], 1.0, None, DormandPrince(), True), "tangent is not offered by DormandPrince"),
         (([0.0], [0.0], 1.0, [0.1, 0.1]), "dt as output times must be one increasing row"),
         (([0.0], [0.0], 1.0, [[0.1, 0.2]]), "dt as output times must be one increasing row"),
         (([0.0], [0.0], 1.0, [0.1, math.nan]), "dt as output times must be one increasing row"),
