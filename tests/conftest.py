@@ -81,6 +81,19 @@ def dots():
 
 
 @pytest.fixture
+def file_of(tmp_path):
+    """Reads the scene file that has a text; entries such as ``stops[0].gap=1`` may follow, in place of those there."""
+    from fembeam import scene_file
+
+    def read(text, *overrides):
+        path = tmp_path / "scene.toml"
+        path.write_text(text, encoding="utf-8")
+        return scene_file.read(path, overrides)
+
+    return read
+
+
+@pytest.fixture
 def whole_figures(dots, monkeypatch):
     """Figures are saved as they are."""
     from matplotlib.figure import Figure

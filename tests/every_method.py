@@ -27,11 +27,7 @@ METHODS = {
     "Newmark": Newmark(1e-4),
     "GeneralizedAlpha": GeneralizedAlpha(1e-4),
 }
-LAWS = {
-    "law": hertz_by_hand(stiffness=1e6),
-    "law with derivative": cubic(stiffness=1e9),
-    "law with memory": OWN,
-}
+LAWS = {"law": hertz_by_hand(stiffness=1e6), "law with derivative": cubic(stiffness=1e9), "law with memory": OWN}
 START = [1e-3], [-0.5]
 
 

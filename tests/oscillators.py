@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq, root
 
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear
-from solvers import Contact, System
+from solvers import Contact, Exponential, System, integrate
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,44 @@ class Tone:
 
     def tones(self):
         return np.array([self.omega]), np.array([self.amplitude + 0j])
+
+
+@dataclass(frozen=True)
+class Later:
+    """A signal ``by`` seconds later."""
+
+    signal: object
+    by: float
+
+    def __call__(self, t):
+        return self.signal(np.asarray(t) + self.by)
+
+    def tones(self):
+        omega, amplitude = self.signal.tones()
+        return omega, amplitude * np.exp(1j * omega * self.by)
+
+
+def from_phase(found):
+    """The system of an orbit, at time 0 of which the orbit has its state: ``phase`` s later."""
+    return found.system.like(loads=[(vector, Later(signal, found.phase)) for vector, signal in found.system.loads])
+
+
+def state_after(system, x, duration, method):
+    """[q, q', latched numbers of all contacts] after a time."""
+    n, counts = system.size, [len(getattr(contact.law, "memory", ())) for contact in system.contacts]
+    memory = np.split(x[2 * n :], np.cumsum(counts)[:-1]) if sum(counts) else None
+    return integrate(system, x[:n], x[n : 2 * n], duration, method=method, memory=memory).end
+
+
+def state_at_zero(found):
+    """The same of an orbit at t = 0, by a run that knows the phase only."""
+    later = found.period - found.phase if found.phase else 0.0
+    return state_after(from_phase(found), found.whole, later, Exponential(1e-12)) if later else found.whole
+
+
+def status_names(found):
+    """How the directions of a branch ended."""
+    return [status.name for status in found.status]
 
 
 @cache

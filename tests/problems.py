@@ -27,9 +27,10 @@ section = { shape = "circle", E = 2.1e11, rho = 7800, diameter = 0.01 }
 [[supports]]
 kind = "clamped"
 z = 0
-"""  # a scene file to add to
+"""  # a scene file to add to, of a beam as ROD
 STEEL = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
 PAPER_BEAM = fb.Beam(0.2599, STEEL)
+ROD = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
 
 
 def free_mass(law, mass=1.0, gap=0.0, loads=()):

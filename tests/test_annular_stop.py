@@ -11,7 +11,7 @@ import solvers
 from contacts import Hertz, KelvinVoigt, WaltonBraun
 from fembeam.inspection.check import _limits
 from fembeam.response import backbone
-from fembeam.scene_file import SceneFileError, read
+from fembeam.scene_file import SceneFileError
 
 STEEL = fb.Section.tube(2.0e11, 7850.0, 0.0191, 0.0168)
 LAW = KelvinVoigt(2e5, 20.0)
@@ -242,10 +242,8 @@ dt = 1e-3
 """
 
 
-def test_scene_files(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(TOML)
-    stops = read(path).scene.stops
+def test_scene_files(file_of):
+    stops = file_of(TOML).scene.stops
     ways = ((0.6, 0.8, 0), (0.8, -0.6, 0))
     assert stops[:2] == (
         fb.AnnularStop(0.4, LAW, 2e-4, directions=("x", "y"), name="baffle"),
@@ -258,9 +256,8 @@ def test_scene_files(tmp_path):
         ('kind = "annular"', 'kind = "anular"', "kind must be one of stop, annular; got 'anular'; did you mean"),
         ("outer = true", "out = true", "unknown key 'out'"),
     ):
-        path.write_text(TOML.replace(old, new))
         with pytest.raises(SceneFileError, match=message):
-            read(path)
+            file_of(TOML.replace(old, new))
 
 
 @pytest.mark.parametrize(

@@ -4,17 +4,17 @@ import dataclasses
 
 import numpy as np
 import pytest
+from problems import ROD
 
 import fembeam as fb
 from contacts import Hertz, Jenkins, KelvinVoigt, PiecewiseLinear, Polynomial
 from fembeam.response import backbone
 
-BEAM = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
 AMPLITUDES = np.array([1e-4, 1e-3, 2e-3, 8e-3])
 
 
 def model(*stops, **changes):
-    scene = fb.Scene(BEAM, [fb.Clamped(0.0)], stops=list(stops), **changes)
+    scene = fb.Scene(ROD, [fb.Clamped(0.0)], stops=list(stops), **changes)
     return scene.reduce(modes=1)
 
 
@@ -78,7 +78,7 @@ def test_free_vibration_against_a_stiff_stop_has_its_period():
 
 def test_what_has_no_backbone_of_this_kind_is_nan():
     stop = fb.Stop(0.5, Hertz(1e9))
-    other = fb.Scene(fb.Beam(0.3, BEAM.section), [fb.Clamped(0.0)])
+    other = fb.Scene(fb.Beam(0.3, ROD.section), [fb.Clamped(0.0)])
     cases = [
         model(stop, gravity=9.81),
         model(dataclasses.replace(stop, gap=-1e-4)),

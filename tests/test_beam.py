@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 import reduction
-from fembeam.beams import Beam, Section, bending_matrices, bending_root, hermite_rows
+from fembeam.beams import Beam, Section, Taper, bending_matrices, bending_root, hermite_rows
 from fembeam.scene import Clamped, Guided, LumpedMass, Pinned, Scene
 
 UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)
@@ -20,11 +20,10 @@ def omegas(scene, modes, **mesh):
     return reduction.modal_basis(matrices.M, matrices.K, modes, root=matrices.root).omega
 
 
-@pytest.fixture
-def graded():
-    """Uneven nodes on a beam of two spans."""
-    beam = Beam.of_spans([(0.4, UNIT), (0.6, Section(2.0, 3.0, 0.5, 0.7))])
-    return beam, np.array([0.0, 0.1, 0.25, 0.4, 0.7, 1.0])
+SPANS, UNEVEN = (
+    Beam.of_spans([(0.4, UNIT), (0.6, Section(2.0, 3.0, 0.5, 0.7))]),
+    np.array([0.0, 0.1, 0.25, 0.4, 0.7, 1.0]),
+)
 
 
 def test_section_shapes():
@@ -88,8 +87,8 @@ def test_textbook_element():
     np.testing.assert_allclose(M.toarray(), m * h / 420 * np.array(M_e), rtol=1e-13)
 
 
-def test_rigid_motions_cost_nothing_and_carry_the_mass(graded):
-    beam, z = graded
+def test_rigid_motions_cost_nothing_and_carry_the_mass():
+    beam, z = SPANS, UNEVEN
     K, M = bending_matrices(beam, z)
     rigid = np.zeros((2 * len(z), 2))
     rigid[0::2, 0], rigid[0::2, 1], rigid[1::2, 1] = 1.0, z, 1.0
@@ -100,19 +99,25 @@ def test_rigid_motions_cost_nothing_and_carry_the_mass(graded):
     assert rigid[:, 1] @ (M @ rigid[:, 1]) == pytest.approx(inertia, rel=1e-14)
 
 
-def test_root_squares_to_the_stiffness(graded):
-    K, R = bending_matrices(*graded)[0], bending_root(*graded)
-    assert abs(R.T @ R - K).max() < 1e-14 * abs(K).max()
+TAPERED = Taper(Section.rectangle(1.0, 12.0, 1.0, 1.0), Section.rectangle(1.0, 12.0, 0.4, 0.2))
 
 
-def test_matrices_keep_their_digits_on_fine_meshes():
-    nodes = np.linspace(0, 1, 1001)
-    K, R = bending_matrices(Beam(1.0, UNIT), nodes)[0], bending_root(Beam(1.0, UNIT), nodes)
+@pytest.mark.parametrize(
+    ("beam", "nodes"),
+    [
+        (SPANS, UNEVEN),
+        (Beam(1.0, UNIT), np.linspace(0.0, 1.0, 1001)),
+        (Beam(1.0, TAPERED, foundation=3.0, axial_force=2.0), np.linspace(0.0, 1.0, 8) ** 1.5),
+    ],
+    ids=["two spans", "fine mesh", "tapered, on a foundation, under tension"],
+)
+def test_root_squares_to_the_stiffness(beam, nodes):
+    K, R = bending_matrices(beam, nodes)[0], bending_root(beam, nodes)
     assert abs(R.T @ R - K).max() < 1e-13 * abs(K).max()
 
 
-def test_interpolation_is_exact_for_cubics(graded):
-    _, nodes = graded
+def test_interpolation_is_exact_for_cubics():
+    nodes = UNEVEN
     u = np.polynomial.Polynomial([1.0, -2.0, 3.0, 4.0])
     dofs = np.column_stack([u(nodes), u.deriv()(nodes)]).ravel()
     z = np.linspace(0, 1, 41)

@@ -60,13 +60,6 @@ law = {{ kind = "hertz", stiffness = 1e8 }}
 """
 
 
-def read(tmp_path, text):
-    """A scene file of this text."""
-    path = tmp_path / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    return scene_file.read(path)
-
-
 def in_python():
     """The same scene."""
     steel = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
@@ -81,17 +74,17 @@ def in_python():
                     stops=[fb.Stop(("A-B", 0.2), Hertz(1e8), 1.0, direction="x", on=(2, "D"))])  # fmt: skip
 
 
-def test_the_same_as_in_python(tmp_path):
+def test_the_same_as_in_python(file_of):
     """Bodies in tables, one like another and turned, one reduced; joints; a run's own copy of the file."""
-    found, scene = read(tmp_path, LEGS).scene, in_python()
+    found, scene = file_of(LEGS).scene, in_python()
     assert repr(found) == repr(scene)
-    model = read(tmp_path, LEGS).model(modes=4)
+    model = file_of(LEGS).model(modes=4)
     assert np.array_equal(model.omega, scene.reduce(4).omega)
     run = model.simulate(0.02, 1e-3)
     assert run.names == ("stop at A-B + 0.2 m, x, on D of body 2", "lift")
 
 
-def test_a_beam_that_meets_another(tmp_path):
+def test_a_beam_that_meets_another(file_of):
     """Without joints bodies are beams of their own; a stop lies on one of them."""
     beam = f"length = 0.5\nsection = {STEEL}"
     text = f"""
@@ -113,7 +106,7 @@ zeta = 0.02
 kind = "clamped"
 z = 0
 """
-    scene = read(tmp_path, text).scene
+    scene = file_of(text).scene
     section = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
     other = fb.Scene(fb.Beam(0.5, section), [fb.Clamped(0.0)], damping=fb.ModalDamping(0.02))
     assert scene.bodies == (other,)
@@ -132,10 +125,10 @@ z = 0
     ("[bodies.frame]", "[bodies.like]", "number 2 like: unknown key 'nodes'"),
     ("turned = [0, 0,", "turned = [0,", "like turned: rotation must be three finite numbers"),
 ])  # fmt: skip
-def test_refused(tmp_path, old, new, says):
+def test_refused(file_of, old, new, says):
     """What is wrong, with its table and line."""
     with pytest.raises(ValueError, match=says):
-        read(tmp_path, LEGS.replace(old, new))
+        file_of(LEGS.replace(old, new))
 
 
 def test_the_schema():

@@ -32,9 +32,7 @@ def prepared(system, duration):
 
 @settings(max_examples=30, deadline=None)
 @given(
-    fast=st.lists(st.floats(0.0, 4.0), min_size=1, max_size=5),
-    damping=st.floats(-3.0, 0.3),
-    seed=st.integers(0, 10**6),
+    fast=st.lists(st.floats(0.0, 4.0), min_size=1, max_size=5), damping=st.floats(-3.0, 0.3), seed=st.integers(0, 10**6)
 )
 def test_the_bound_of_cells_holds_for_any_modes(fast, damping, seed):
     """δ between two nodes is nearer to the chord than the bound for 1 and for 8 cells says: slow, fast, overdamped."""

@@ -7,12 +7,12 @@ from functools import cache
 
 import numpy as np
 import pytest
-from oscillators import Bilinear, Duffing, Tone
+from oscillators import Bilinear, Duffing, Tone, state_at_zero, status_names
 
 import solvers.branches.count_changes
 import solvers.branches.walk
 from contacts import law
-from solvers import Contact, Exponential, OrbitError, System, branch, integrate, orbit
+from solvers import Contact, OrbitError, System, branch, orbit
 from solvers.branches import BranchStatus, restarted
 
 DAMPED = Bilinear(1.1, zeta=0.05)  # doubles its period between 0.83 and 0.93 rad/s
@@ -42,19 +42,6 @@ def between_cubic_stops():
 
 def duffing(omega):
     return between_cubic_stops().like(loads=[([1.0], Tone(0.2, omega))]), 2.0 * math.pi / omega
-
-
-def state_at_zero(found):
-    """[q, q'] at t = 0, by a run that knows the phase only."""
-    if found.phase == 0.0:
-        return found.state
-    turned = [
-        (vector, Tone(s.amplitude * np.exp(1j * s.omega * found.phase), s.omega)) for vector, s in found.system.loads
-    ]
-    system = replace(found.system, loads=turned)
-    n = system.size
-    run = integrate(system, found.state[:n], found.state[n:], found.period - found.phase, method=Exponential(1e-12))
-    return np.concatenate((run.q[-1], run.q_dot[-1]))
 
 
 def marks(found, mark):
@@ -166,7 +153,7 @@ def test_grazing_against_the_linear_amplitude(name):
     ends = sorted((o.parameter, len(o.contacts)) for o in (found.orbits[0], found.orbits[-1]))
     assert [p for p, _ in ends] == pytest.approx(list(span), rel=1e-12)
     assert [count for _, count in ends] == ([0, 1] if name == "amplitude" else [1, 0])
-    assert found.status == (BranchStatus.END, BranchStatus.END)
+    assert status_names(found) == ["END", "END"]
 
 
 def test_grazing_frequencies_on_both_flanks():
@@ -177,7 +164,7 @@ def test_grazing_frequencies_on_both_flanks():
     found = branch(over(problem), (0.5, 1.4), problem.steady(False, 0.0), step=0.2).run()
     np.testing.assert_allclose([g.parameter for g in marks(found, "grazing")], exact, rtol=1e-8)
     assert [found.orbits[i].parameter for i in (0, -1)] == pytest.approx([0.5, 1.4], rel=1e-12)
-    assert found.status == (BranchStatus.END,)
+    assert status_names(found) == ["END"]
 
 
 # --- closed branches, ends ----------------------------------------------------------------------------------------
@@ -188,7 +175,7 @@ def test_isolated_subharmonic_branch_closes_with_two_folds():
     x, *_ = problem.orbit(np.array([-0.1142407, 0.14874975]), periods=3)
     found = branch(over(problem, periods=3), (3.5, 5.0), x, at=4.2, step=0.2)
     found.run()
-    assert set(found.status) == {BranchStatus.CLOSED}
+    assert set(status_names(found)) == {"CLOSED"}
     assert str(found.status[0].value).startswith("closed")
     folds = marks(found, "fold")
     assert len(folds) in (2, 4)  # 4: the closed branch is walked in both directions
@@ -205,12 +192,12 @@ def test_both_directions_meet_at_the_start(damped):
     assert np.all(np.diff(parameters) > 0.0) or np.all(np.diff(parameters) < 0.0)
     assert parameters.count(1.0) == 1
     assert {parameters[0], parameters[-1]} == {0.8, 1.1}
-    assert damped.status == (BranchStatus.END, BranchStatus.END)
+    assert status_names(damped) == ["END", "END"]
 
 
 def test_a_start_at_the_end_of_the_span_has_one_direction():
     found = branch(over(DAMPED), (1.0, 1.1), DAMPED.settled(60), at=1.1, step=0.5).run()
-    assert found.status == (BranchStatus.END,)
+    assert status_names(found) == ["END"]
     assert found.orbits[-1].parameter == 1.0
 
 
@@ -224,7 +211,7 @@ def test_an_interrupted_iteration_resumes():
     assert len(interrupted.orbits) == 1
     known = list(itertools.islice(interrupted, 3))
     assert [found.parameter for found in interrupted.orbits] == [found.parameter for found in known]
-    assert interrupted.status[0] is BranchStatus.RUNNING
+    assert status_names(interrupted)[0] == "RUNNING"
     assert next(iter(interrupted)) is known[0]
     assert sorted(found.parameter for found in interrupted) == sorted(whole)
     assert [found.parameter for found in interrupted.orbits] == whole
@@ -266,7 +253,7 @@ def test_a_problem_that_ends_within_the_span_is_lost():
 
     problem = replace(GAPPED, gap=3.0)
     found = branch(make, (1.0, 4.0), problem.steady(False, 0.0), at=3.0, step=0.3).run()
-    assert sorted(status.name for status in found.status) == ["END", "LOST"]
+    assert sorted(status_names(found)) == ["END", "LOST"]
     assert min(o.parameter for o in found.orbits) == pytest.approx(1.5, abs=1e-3)
     assert all(isinstance(status.value, str) and len(status.value) > 10 for status in found.status)
 
@@ -275,14 +262,14 @@ def test_a_resonance_without_damping_never_ends_the_program(monkeypatch):
     monkeypatch.setattr(solvers.branches.walk, "MOST_ORBITS", 25)
     problem = Bilinear(0.6, zeta=0.0, gap=1e9)
     found = branch(over(problem), (0.6, 1.5), problem.steady(False, 0.0), step=0.2).run()
-    assert found.status[0] in (BranchStatus.LIMIT, BranchStatus.LOST)
+    assert status_names(found)[0] in ("LIMIT", "LOST")
     assert len(found.orbits) <= 27
     assert all(o.parameter < 1.0 for o in found.orbits)
 
 
 def test_orbits_at_rest_begin_a_branch_over_the_amplitude():
     found = branch(over(GAPPED, "amplitude"), (0.0, 0.3), [0.0, 0.0], at=0.0, step=0.5).run()
-    assert found.status == (BranchStatus.END,)
+    assert status_names(found) == ["END"]
     assert not found.special
     last = replace(GAPPED, amplitude=0.3).steady(False, 0.0)
     np.testing.assert_allclose(found.orbits[-1].state, last, rtol=0.0, atol=1e-10)
@@ -303,9 +290,7 @@ def test_orbits_at_rest_begin_a_branch_over_the_amplitude():
         ({"step": 0.0}, "step must lie in"),
         ({"step": math.nan}, "step must lie in"),
         ({"shots": 0}, "shots must be a whole number"),
-        pytest.param(
-            *({"start": [1.0, 2.0, 3.0]}, "start must be 2 finite numbers"),
-        ),
+        pytest.param(*({"start": [1.0, 2.0, 3.0]}, "start must be 2 finite numbers")),
         ({"make_system": over(DAMPED, periods=0)}, "period must be positive"),
         ({"make_system": over(DAMPED, periods=1.5)}, "does not have the period"),
     ],

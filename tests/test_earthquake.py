@@ -5,7 +5,7 @@ import pytest
 
 import fembeam as fb
 from fembeam.excitation.earthquake import without_baseline
-from fembeam.scene_file import SceneFileError, read
+from fembeam.scene_file import SceneFileError
 
 STEP = 0.005
 T = STEP * np.arange(803)
@@ -61,20 +61,18 @@ def test_a_cosmos_file_says_unit_step_and_columns(tmp_path, options, scale):
     assert record.duration == pytest.approx(T[-1] + 2.0)
 
 
-def test_columns_in_any_unit_and_in_a_scene_file(tmp_path):
+def test_columns_in_any_unit_and_in_a_scene_file(tmp_path, file_of):
     for unit, factor in (("g", 9.80665), ("m/s2", 1.0), ("cm/s2", 0.01)):
         np.savetxt(tmp_path / "quake.csv", np.column_stack([T, QUAKE]), header="t,a", delimiter=",", comments="")
         record = fb.Record.earthquake(tmp_path / "quake.csv", unit, baseline=False)
         np.testing.assert_allclose(record.y, factor * QUAKE, rtol=1e-12)
     beam = '[beam]\nlength = 1.0\nsection = { shape = "circle", E = 2e11, rho = 7800, diameter = 0.01 }\n[base]\n'
     text = beam + 'kind = "earthquake"\npath = "quake.csv"\nunit = "g"\npadding = 1\n'
-    (tmp_path / "scene.toml").write_text(text)
-    base = read(tmp_path / "scene.toml").scene.base
+    base = file_of(text).scene.base
     np.testing.assert_allclose(base.y, without_baseline(T, 9.80665 * QUAKE), rtol=1e-12)
     assert base.padding == 1.0
-    (tmp_path / "scene.toml").write_text(text.replace('"g"', '"G"'))
     with pytest.raises(SceneFileError, match="unit must be 'g' or 'm/s2' or 'cm/s2', got 'G'"):
-        read(tmp_path / "scene.toml")
+        file_of(text.replace('"g"', '"G"'))
 
 
 def test_the_baseline_is_the_parabola_of_least_velocity():
@@ -107,11 +105,7 @@ def test_the_baseline_is_the_parabola_of_least_velocity():
         (cosmos(step=-999.0), {}, "803 samples of nan s do not make the 4 s"),
         (cosmos(step=0.01), {}, "803 samples of 0.01 s do not make the 4 s"),
         (cosmos(count=900), {}, "its (header says 900 samples, there are|data are not numbers)"),
-        (
-            cosmos().replace("acceleration pts, approx", "velocity pts"),
-            {},
-            "the COSMOS file has no acceleration",
-        ),
+        (cosmos().replace("acceleration pts, approx", "velocity pts"), {}, "the COSMOS file has no acceleration"),
     ],
 )
 def test_what_is_wrong_is_said_with_the_file(tmp_path, text, options, message):
@@ -120,7 +114,7 @@ def test_what_is_wrong_is_said_with_the_file(tmp_path, text, options, message):
         fb.Record.earthquake(tmp_path / "quake.txt", **options)
 
 
-def test_check_follows_a_record_to_its_end(tmp_path, recwarn):
+def test_check_follows_a_record_to_its_end(tmp_path, file_of, recwarn):
     """Shaken late, and not for twenty periods of the beam: the trial is as long as the record."""
     from fembeam.inspection import check
 
@@ -129,8 +123,7 @@ def test_check_follows_a_record_to_its_end(tmp_path, recwarn):
     support = '[[supports]]\nkind = "clamped"\nz = 0\n[damping]\nzeta = 0.02\n'
     stop = '[[stops]]\nz = 2.0\ngap = 5e-3\nlaw = { kind = "hertz", stiffness = 1e7 }\n'
     text = beam + support + stop + '[base]\nkind = "earthquake"\npath = "quake.AT2"\n'
-    (tmp_path / "scene.toml").write_text(text)
-    file = read(tmp_path / "scene.toml")
+    file = file_of(text)
     model = file.scene.reduce(2)
     assert 20 * 2 * np.pi / model.omega[0] > T[-1]
     assert check(model).touched[0].contacts > 0

@@ -31,7 +31,7 @@ from contacts import (
 )
 from fembeam.plot.axis_names import axis_name
 from fembeam.scene import changes_structure, with_value
-from fembeam.scene_file import SceneFileError, json_schema, read
+from fembeam.scene_file import SceneFileError, json_schema
 
 UNIT = fb.Section(E=1.0, rho=1.0, A=1.0, I=1.0)
 PINNED = [fb.Pinned(0.0), fb.Pinned(1.0)]
@@ -501,12 +501,10 @@ residual = true
 """
 
 
-def test_scene_files(tmp_path):
+def test_scene_files(file_of):
     from fembeam.inspection import check
 
-    path = tmp_path / "hinge.toml"
-    path.write_text(FILE)
-    file = read(path)
+    file = file_of(FILE)
     assert file.scene.elements[0] == fb.Element(0.3, Polynomial([1.0, 0.0, 1e3]), to=0.8)
     assert file.scene.stops[0].of == "rotation"
     model = file.scene.reduce(**file.reduce)
@@ -521,8 +519,8 @@ def test_scene_files(tmp_path):
         ("elements[0].at=1", r"unknown key 'at'.*valid: z, law, of, to, gap"),
     ):
         with pytest.raises(SceneFileError, match=message):
-            read(path, [change])
-    steep = read(path, ["stops[0].gap=2.0"])
+            file_of(FILE, change)
+    steep = file_of(FILE, "stops[0].gap=2.0")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         assert any("is it in degrees?" in said for said in check(steep.model()))

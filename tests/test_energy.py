@@ -1,44 +1,48 @@
 """Work and damping of whole steps and of runs: against quadrature, closed forms, and the balance of energy."""
 
-import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from problems import PAPER_BEAM, TIP
-from scipy.integrate import quad_vec, solve_ivp
-from scipy.linalg import expm
+from scipy.integrate import solve_ivp
+from scipy.interpolate import BPoly
+from scipy.linalg import block_diag
 
 import fembeam as fb
-from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
+from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic
 from solvers import Contact, Exponential, SolverError, System, integrate, integrate_many
-from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy import flight_tables
-from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES, contact_table
-from solvers.exponential.preparation import prepare_run
 from solvers.integration import prepared_run
-from solvers.problem import forcing_of
 
 FREE = [Contact([1.0, 1.0, 1.0, 0.5], Hertz(1e6), gap=1e9)]
 
 
 class Nodes:
-    """A signal that is known at nodes only: two unequal waves."""
+    """A signal that is known at nodes only, in between a quintic: two unequal waves."""
+
+    def __init__(self):
+        t = np.arange(102) * 0.02
+        sin, cos, fast_sin, fast_cos = np.sin(7.0 * t), np.cos(7.0 * t), np.sin(31.0 * t), np.cos(31.0 * t)
+        rows = sin + 0.3 * fast_cos, 7.0 * cos - 9.3 * fast_sin, -49.0 * sin - 288.3 * fast_cos
+        self.rows = np.stack(rows, axis=1)
+        self.quintic = BPoly.from_derivatives(t, self.rows)
 
     def __call__(self, t):
-        return np.sin(7.0 * t) + 0.3 * np.cos(31.0 * t)
+        return self.quintic(t)
 
     def nodes(self, duration, rtol):
         """Rows [s, s', s'']."""
-        t = np.arange(np.ceil(duration / 0.02) + 2) * 0.02
-        return 0.02, np.stack(
-            (
-                self(t),
-                7.0 * np.cos(7.0 * t) - 9.3 * np.sin(31.0 * t),
-                -49.0 * np.sin(7.0 * t) - 288.3 * np.cos(31.0 * t),
-            ),
-            axis=1,
-        )
+        return 0.02, self.rows
+
+
+SIGNALS = [], [Nodes()], [fb.Harmonic(2.0, 13.0), Nodes()]
+
+
+def named(law):
+    """Class of a law."""
+    return type(law).__name__
 
 
 def blocks(signals, omega=(0.0, 9.0, 40.0, 75.0), zeta=(0.0, 1.0, 3.0, 0.02), contacts=FREE):
@@ -47,149 +51,49 @@ def blocks(signals, omega=(0.0, 9.0, 40.0, 75.0), zeta=(0.0, 1.0, 3.0, 0.02), co
     return System.modal(omega, zeta, contacts, loads)
 
 
-def prepared(system, spacing=0.013, duration=1.0):
-    """What a run of the system would prepare, and its ledger's tables."""
-    forcing = forcing_of([signal for _, signal in system.loads], duration, 1e-10)
-    forcing, made = prepare_run(system, forcing, duration, 1e-10)
-    problem = made.problem.value._replace(table=forcing.table, table_start=forcing.table_start)
-    return problem, made.tables.value, made.energy_tables_for(spacing).value
+@pytest.mark.parametrize("stops", [1, 2, 3])  # of more than two, forces act through the blocks
+@pytest.mark.parametrize("law", [Hertz(1e6), Viscoelastic.tsuji(1e6, 0.6, 1.0), KelvinVoigt(2e4, 20.0)], ids=named)
+@pytest.mark.parametrize("signals", SIGNALS, ids=len)
+def test_strongly_damped_blocks_balance_in_contact(signals, law, stops):
+    """Much of what is handled is damped: what forces do to blocks of all kinds in steps of all kinds counts."""
+    rows = np.array([[1.0, 1.0, 1.0, 0.5], [-0.8, 0.3, 1.2, -0.6], [0.4, -0.9, 0.7, 1.1]])[:stops]
+    system = blocks(signals, contacts=[Contact(row, law, 1e-3 * i) for i, row in enumerate(rows)])
+    run = integrate(system, np.zeros(4), -2.0 * rows.sum(axis=0), 0.2, 1.7e-4, Exponential(1e-12))
+    assert set(run.contacts.stop.tolist()) == set(range(stops))
+    assert run.energy.damping[-1] > 0.2 * run.energy.initial
+    assert unaccounted(run) < 1e-12
 
 
-def quadrature(problem, tables, h, x, s):
-    """Work and damping of a step from x under signals with derivatives s, by adaptive quadrature of exponentials."""
-    n = len(problem.k)
-    size, signals = 2 * n, len(problem.table_dt)
-    generator = np.zeros((size + 6 * signals,) * 2)
-    generator[:n, n:size], generator[n:size, :n] = np.eye(n), -np.diag(problem.k)
-    generator[n:size, n:size] = -np.diag(problem.c)
-    for j, load in enumerate(problem.table_load):
-        generator[:size, size + 6 * j] = problem.load[load]
-        generator[size + 6 * j : size + 6 * j + 5, size + 6 * j + 1 : size + 6 * j + 6] = np.eye(5)
-
-    def rates(t):
-        y = expm(generator * t) @ np.concatenate((x, *s))
-        signal = tables.signal_rows @ y[:size]
-        for j, load in enumerate(problem.table_load):
-            signal[load] += y[size + 6 * j]
-        return np.array([signal @ (tables.power_rows @ y[:size]), np.sum((tables.loss_rows @ y[:size]) ** 2)])
-
-    return quad_vec(rates, 0.0, h, epsabs=0.0, epsrel=1e-13, limit=400)[0]
+ROW = np.array([1.0, 1.0, 1.0, 0.5])
 
 
-def by_forms(energy_tables, level, x, s):
-    """The same by the tables; for a whole cell the signals are given by their values at its ends."""
-    n, whole = len(x) // 2, level == len(energy_tables.rows) - 1
-    signals = np.concatenate([at_ends(part, energy_tables.spacing) if whole else part for part in s] or [np.zeros(0)])
-    given = np.concatenate((signals, x[energy_tables.driver]))
-    rows = (given @ energy_tables.rows[level]).reshape(2, 2, -1)[..., :n].reshape(2, -1) @ x
-    p, v = np.split(x, 2)
-    rows[1] += (energy_tables.plain[level][:, :n] * [p * p, p * v, v * v]).sum()
-    if len(signals):
-        rows += (signals @ energy_tables.pairs[level]).reshape(2, -1)[:, : len(signals)] @ signals
-    return rows
+def powers(system, stiffness, t, y):
+    """Rates of (q, q', work of the loads, damping) at a spring and a cubic spring between ROW and the ground."""
+    q, v = y[:4], y[4:8]
+    load = sum((vector * signal(t) for vector, signal in system.loads), np.zeros(4))
+    stretch = ROW @ q
+    spring = stiffness * (stretch + stretch**3) * ROW
+    return np.concatenate((v, load - spring - system.C @ v - system.K @ q, [load @ v, v @ system.C @ v]))
 
 
-def at_ends(s, h):
-    """s, s', s'' of a quintic at its start and after the time h, from its derivatives at the start."""
-    after = [sum(s[i] * h ** (i - d) / math.factorial(i - d) for i in range(d, 6)) for d in range(3)]
-    return np.concatenate((s[:3], after))
-
-
-@pytest.mark.parametrize("signals", [[], [Nodes()], [fb.Harmonic(2.0, 13.0), Nodes()]], ids=len)
-def test_forms_of_flight_steps_are_their_quadrature(signals):
-    """Long and short steps and the step of its own length, for rigid, critical, over- and hardly damped blocks."""
-    problem, tables, energy_tables = prepared(blocks(signals))
-    rng = np.random.default_rng(1)
-    scale = np.concatenate((np.ones(len(problem.k)), np.maximum(np.sqrt(problem.k), 1.0)))
-    assert energy_tables.spacing == (problem.table_dt[0] if len(problem.table_dt) else 0.013)
-    for level in (len(tables.flight_step), 8, 30):
-        h = np.append(tables.flight_step, energy_tables.spacing)[level]
-        x = rng.standard_normal(len(scale)) * scale
-        s = [rng.standard_normal(6) * 7.0 ** np.arange(6) for _ in problem.table_dt]
-        exact = quadrature(problem, tables, h, x, s)
-        parts = sum(abs(quadrature(problem, tables, h, x * sign, s)) for sign in (1.0, -1.0))  # sizes that may cancel
-        np.testing.assert_array_less(abs(by_forms(energy_tables, level, x, s) - exact), 1e-12 * parts + 1e-300)
-
-
-@pytest.mark.parametrize(
-    ("power", "lead", "k", "c"),
-    [(1.0, 0.0, 900.0, 0.6), (2.0, 3.0, 0.0, 0.0), (2.0, 3.0, 30.0, 40.0), (4.0, 1.0, 4.0, 4.0)],
-)
-def test_tables_of_contact_steps_are_their_quadrature(power, lead, k, c):
-    """∫ L_i v dt and ∫ v² dt of a block under forces given at the nodes, all of one integration of the equation."""
-    from scipy.special import roots_jacobi
-
-    nodes = 0.5 * (1.0 + roots_jacobi(S, 0.0, lead + power - 1.0)[0])
-    arrays = [np.array(values).tobytes() for values in ([k], [c], [0.7])]
-    table = contact_table(*arrays, power, lead, nodes.tobytes())[0, 0]
-    rng = np.random.default_rng(2)
-    start, forces = [0.3, -1.0], rng.standard_normal(S)
-    entering = rng.standard_normal(S) if lead else np.zeros(S)
-
-    def lagrange(sigma):
-        return np.array([np.prod([(sigma - b) / (a - b) for b in nodes if b != a]) for a in nodes])
-
-    def rate(sigma, z):
-        basis, pace = lagrange(sigma), 0.7 * power * sigma ** (power - 1.0)
-        weighted = (sigma / nodes) ** lead if lead else np.zeros(S)
-        force = basis @ forces + (basis * weighted) @ entering
-        v = z[1]
-        return pace * np.concatenate(([v, force - k * z[0] - c * v, v * v], basis * v))
-
-    exact = solve_ivp(rate, (0.0, 1.0), [*start, *np.zeros(1 + S)], "DOP853", rtol=3e-14, atol=1e-14).y[2:, -1]
-    sums = np.concatenate((forces, start)) @ table[:BEGAN] + entering @ table[ENTERING:SQUARES]
-    squares = sums[S:] @ forces + table[BEGAN, :3] @ [start[0] ** 2, start[0] * start[1], start[1] ** 2]
-    squares += np.concatenate((entering, start)) @ table[SQUARES:, :S] @ entering
-    np.testing.assert_allclose(sums[:S], exact[1:], rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(squares, exact[0], rtol=1e-12)
-
-
-def by_sums(problem, tables, energy_tables, node_set, place, x, heads):
-    """Work of loads and damping of a contact step by the forms that are summed over the blocks."""
-    n, size, signals = int(tables.own_blocks), len(x), len(heads) - len(problem.gap)
-    last = S * (len(heads) + signals)
-    sums = np.concatenate((x, heads.ravel())) @ energy_tables.sums[node_set, place]
-    damping, work = sums[: heads.size] * heads.ravel(), sums[heads.size : last] * heads[len(problem.gap) :].ravel()
-    tone = np.append(np.arange(n, size // 2), np.arange(size // 2 + n, size))
-    of_tones = sums[last : last + 2 * len(tone)].reshape(2, -1) @ x[tone]
-    p, v = x.reshape(2, -1)[:, :n]
-    free = (energy_tables.free_loss[energy_tables.kind[node_set], place] * [p * p, p * v, v * v]).sum()
-    return np.array([work.sum() + of_tones[1], damping.sum() + of_tones[0] + free])
-
-
-@pytest.mark.parametrize("node_set", [0, 1, 2])
-@pytest.mark.parametrize("signals", [[Nodes()], [fb.Harmonic(2.0, 13.0), Nodes()]], ids=len)
-def test_sums_over_blocks_are_their_quadrature(signals, node_set):
-    """Blocks of all kinds under two stops' forces, a signal and a tone: one integration of motion and powers."""
-    stops = [*FREE, Contact([-0.8, 0.3, 1.2, -0.6], Hertz(1e6), gap=1e9)]
-    problem, tables, energy_tables = prepared(blocks(signals, contacts=stops))
-    place = int(np.searchsorted(-tables.contact_step, -0.02)) - int(energy_tables.first)
-    h, n, size = tables.contact_step[place + int(energy_tables.first)], int(tables.own_blocks), len(problem.k)
-    power, lead, nodes = (getattr(tables, name)[node_set] for name in ("time_exponent", "weight_exponent", "nodes"))
-    x, heads = np.split(np.random.default_rng(3).standard_normal(2 * size + S * len(energy_tables.head)), [2 * size])
-    heads = heads.reshape(-1, S)
-    smooth = np.arange(len(heads)) != node_set - 1 if lead else np.arange(len(heads)) > 1
-    heads[smooth] = heads[smooth, :1] * (0.7 - 1.1 * nodes**power)  # in time: signals, forces on another stop's entry
-    push = np.concatenate((problem.push, problem.load))[energy_tables.head, size : size + n]
-
-    def rate(sigma, z):
-        full, basis = z[: 2 * size], [np.prod([(sigma - b) / (a - b) for b in nodes if b != a]) for a in nodes]
-        values = heads @ basis
-        if lead:
-            values[node_set - 1] = heads[node_set - 1] @ (basis * (sigma / nodes) ** lead)
-        signal = tables.signal_rows @ full
-        signal[energy_tables.head[2:] - 2] += values[2:]
-        bent = np.append(push.T @ values, np.zeros(size - n)) - problem.k * full[:size] - problem.c * full[size:]
-        work, damping = signal @ (tables.power_rows @ full), np.sum((tables.loss_rows @ full) ** 2)
-        return h * power * sigma ** (power - 1.0) * np.concatenate((full[size:], bent, [work, damping]))
-
-    exact = solve_ivp(rate, (0.0, 1.0), [*x, 0.0, 0.0], "DOP853", rtol=3e-14, atol=1e-14).y[2 * size :, -1]
-    error = np.abs(by_sums(problem, tables, energy_tables, node_set, place, x, heads) - exact)
-    assert error.max() < 1e-12 * np.abs(exact).max()
+@pytest.mark.parametrize("stiffness", [0.0, 300.0], ids=["flight", "contact"])
+@pytest.mark.parametrize("signals", SIGNALS, ids=len)
+def test_work_and_damping_are_those_of_a_quadrature(signals, stiffness):
+    """Each by itself, of motion integrated with them by SciPy."""
+    springs = [Contact(ROW, Polynomial([stiffness, 0.0, stiffness]), always=True)] if stiffness else []
+    system, start = blocks(signals, contacts=springs), ([0.1, 0.2, 0.1, 0.05], [1.0, 1.0, -2.0, 3.0])
+    energy = integrate(system, *start, 0.4, 1e-2, Exponential(1e-12)).energy
+    ends = np.arange(41) * 1e-2
+    y, found = np.concatenate((*start, [0.0, 0.0])), np.zeros((41, 2))
+    for i in range(40):  # a signal known at nodes has other third derivatives in every cell
+        y = solve_ivp(partial(powers, system, stiffness), ends[i : i + 2], y, "DOP853", rtol=1e-13, atol=1e-14).y[:, -1]
+        found[i + 1] = y[-2:]
+    for known, exact in ((energy.input, found[:, 0]), (energy.damping, found[:, 1])):
+        np.testing.assert_allclose(known, exact, rtol=0.0, atol=1e-11 * found[-1, 1])
 
 
 @pytest.mark.parametrize("dt", [3e-4, 1e-2, 0.3])
-@pytest.mark.parametrize("signals", [[], [Nodes()], [fb.Harmonic(2.0, 13.0), Nodes()]], ids=len)
+@pytest.mark.parametrize("signals", SIGNALS, ids=len)
 def test_free_motion_balances_to_rounding(signals, dt):
     """Outputs closer than a step, within cells, and over many of them."""
     run = integrate(blocks(signals), [0.1, 0.2, 0.1, 0.05], [1.0, 1.0, -2.0, 3.0], 1.0, dt)
@@ -347,7 +251,7 @@ def unaccounted(run):
         *(Hertz(1e6), Hysteretic(1e6, 0.4), Viscoelastic.tsuji(1e6, 0.6, 1.0), KelvinVoigt(2e4, 20.0)),
         *(PiecewiseLinear([1e4, 5e4], [5e-3]), Jenkins(400.0, 1.5)),
     ],
-    ids=lambda law: type(law).__name__,
+    ids=named,
 )
 def test_samples_within_contacts_balance_as_well_as_their_ends(law, rtol):
     """Many samples within every step, one mode and two: rtol or rounding, however stiff or flat the law."""
@@ -429,3 +333,35 @@ def test_runs_in_broken_steps_are_refused(broken):
     finally:
         table[:] = kept
     integrate(*arguments)
+
+
+# --- many coordinates ------------------------------------------------------------------------------------------------
+
+COPIES = 5  # of 12 coordinates each: more than 100 rows, from which on forms are sparse
+
+
+def chain(copies, tones_only):
+    """Copies of twelve chain modes that do not touch each other, each with a stop, a tone, a record and noise."""
+    n = 12
+    K = 400.0 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    w2, V = np.linalg.eigh(K)
+    t = np.linspace(0.0, 1.0, 101)
+    signals = [fb.Harmonic(3.0, 11.0), fb.Record(t, np.sin(9 * t) ** 3), fb.Record(t, 2.0 * np.cos(14 * t) ** 5)]
+    loads = [(np.tile(V[3 + i], copies), signal) for i, signal in enumerate(signals)]
+    stops = [Contact(row, KelvinVoigt(5e3, 1.0), 1e-3) for row in np.kron(np.eye(copies), -V[6])]
+    C, K = (block_diag(*[part] * copies) for part in (np.diag(0.04 * np.sqrt(w2)), np.diag(w2)))
+    return System(np.eye(copies * n), C, K, stops, loads[:1] if tones_only else loads)
+
+
+@pytest.mark.parametrize("tones_only", [True, False])
+def test_copies_of_a_structure_take_as_many_times_its_energy(tones_only):
+    one, many = (
+        integrate(system, np.zeros(system.size), np.zeros(system.size), 1.0, 0.01)
+        for system in (chain(1, tones_only), chain(COPIES, tones_only))
+    )
+    assert len(many.contacts) == COPIES * len(one.contacts) > 0
+    size = COPIES * np.abs(one.energy.stored).max()
+    for name in ("input", "damping", "stored", "contact"):
+        found, expected = getattr(many.energy, name), COPIES * getattr(one.energy, name)
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * size, err_msg=name)
+    assert np.abs(many.energy.residual).max() < 1e-9 * np.abs(many.energy.input).max()

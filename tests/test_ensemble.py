@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from problems import ROD
 
 import fembeam as fb
 import solvers
@@ -28,7 +29,7 @@ HERE = Path(__file__).parent
 def small_model(base=None, stop=None, forces=()):
     """One mode of a cantilever that meets a stop under noise."""
     scene = fb.Scene(
-        beam=fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)),
+        beam=ROD,
         supports=[fb.Clamped(0.0)],
         stops=[fb.Stop(0.5, law=stop or Hysteretic.achieving(1e8, restitution=0.7))],
         damping=fb.ModalDamping(0.05),

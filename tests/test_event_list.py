@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from contacts import Jenkins, PiecewiseLinear, WaltonBraun
-from solvers import Contact, DormandPrince, Exponential, System
+from solvers import Contact, DormandPrince, Exponential, Status, System
 from solvers.integration import prepared_run
-from solvers.problem import Status
 from solvers.problem import event_list as at
 
 STOPS = [

@@ -6,21 +6,12 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from problems import (
-    DampedHalfWave,
-    HertzBounce,
-    bilinear,
-    bounce,
-    free_mass,
-    paper_scene,
-    reference,
-    two_sided_scene,
-)
+from problems import DampedHalfWave, HertzBounce, bilinear, bounce, free_mass, paper_scene
 from scipy.optimize import brentq
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, achieved_restitution
-from solvers import Contact, DormandPrince, Exponential, HenonRK2, SolverError, Status, System, integrate
+from solvers import Contact, DormandPrince, Exponential, HenonRK2, Newmark, SolverError, Status, System, integrate
 
 FINE = DormandPrince(rtol=1e-13)
 PERIOD = 2 * math.pi / 195.0
@@ -214,29 +205,13 @@ def test_amplitudes_of_any_size_are_right_or_refused(law):
 
 def test_stop_above_under_mirrored_motion_equals_stop_below():
     scene = paper_scene()
-    above = replace(
-        scene,
-        stops=[fb.Stop(0.24445, LN, 1e-4, "above")],
-        base=fb.Harmonic(amplitude=-1e-3, omega=195.0),
-    )
+    above = replace(scene, stops=[fb.Stop(0.24445, LN, 1e-4, "above")], base=fb.Harmonic(amplitude=-1e-3, omega=195.0))
     below = replace(scene, stops=[fb.Stop(0.24445, LN, 1e-4, "below")])
     runs = [s.reduce(2).simulate(3 * PERIOD, PERIOD / 20, solver=DormandPrince(1e-9)) for s in (below, above)]
     assert len(runs[0].contacts) >= 3
     np.testing.assert_allclose(runs[1].q, -runs[0].q, atol=1e-15)
     np.testing.assert_allclose(runs[1].indentation(), runs[0].indentation(), atol=1e-15)
     np.testing.assert_allclose(runs[1].force(), runs[0].force(), rtol=1e-9, atol=1e-9)
-
-
-def test_stops_on_both_sides_and_at_mid_beam_agree_with_the_reference():
-    system = two_sided_scene(gap=2e-4, mid_gap=1e-4).reduce(2).system
-    duration = 2.5 * PERIOD
-    ours = integrate(system, np.zeros(2), np.zeros(2), duration, duration / 50, FINE)
-    theirs = reference(system, np.zeros(2), np.zeros(2), duration, ours.t)
-    assert {0, 1, 2} <= set(ours.contacts.stop.tolist())
-    assert len(ours.contacts) == len(theirs.contacts)
-    np.testing.assert_allclose(ours.q, theirs.q, atol=1e-9 * np.abs(theirs.q).max())
-    np.testing.assert_allclose(np.sort(ours.contacts.t_in), np.sort([c[1] for c in theirs.contacts]), rtol=1e-9)
-    assert abs(ours.energy.residual[-1]) < 1e-11 * ours.energy.stored.max()
 
 
 def test_free_mass_between_two_walls_bounces_to_and_fro():
@@ -247,16 +222,17 @@ def test_free_mass_between_two_walls_bounces_to_and_fro():
     np.testing.assert_allclose(log.t_in, 0.1 + (0.4 + contact) * np.arange(len(log)), rtol=1e-9)
 
 
-def test_two_identical_stops_at_one_instant_act_as_one_of_twice_the_stiffness():
+@pytest.mark.parametrize("method", [FINE, Exponential(1e-11), Newmark(1e-5)], ids=lambda method: type(method).__name__)
+def test_two_identical_stops_at_one_instant_act_as_one_of_twice_the_stiffness(method):
     twins = [Contact([1.0], Hysteretic(1e8, 0.7), 0.01)] * 2
-    one = integrate(free_mass(Hysteretic(2e8, 0.7), gap=0.01), [0.0], [-1.0], 0.1, method=FINE)
-    two = integrate(System([[1.0]], [[0.0]], [[0.0]], twins), [0.0], [-1.0], 0.1, method=FINE)
+    one = integrate(free_mass(Hysteretic(2e8, 0.7), gap=0.01), [0.0], [-1.0], 0.1, method=method)
+    two = integrate(System([[1.0]], [[0.0]], [[0.0]], twins), [0.0], [-1.0], 0.1, method=method)
     assert two.contacts.stop.tolist() in ([0, 1], [1, 0])
     np.testing.assert_allclose(two.contacts.t_in, one.contacts.t_in[0], rtol=1e-14)
-    np.testing.assert_allclose(two.contacts.t_out, one.contacts.t_out[0], rtol=1e-11)
-    np.testing.assert_allclose(two.contacts.peak_force, one.contacts.peak_force[0] / 2, rtol=1e-11)
+    np.testing.assert_allclose(two.contacts.t_out, one.contacts.t_out[0], rtol=5e-11)
+    np.testing.assert_allclose(two.contacts.peak_force, one.contacts.peak_force[0] / 2, rtol=5e-11)
     np.testing.assert_allclose(two.contacts.energy_loss, one.contacts.energy_loss[0] / 2, rtol=1e-10)
-    np.testing.assert_allclose(two.q, one.q, rtol=1e-11)
+    np.testing.assert_allclose(two.q, one.q, rtol=5e-11)
 
 
 def test_stops_in_a_row_are_met_one_after_the_other():
@@ -354,8 +330,10 @@ def test_preloaded_rest_at_static_equilibrium_lasts(method):
 
 
 @pytest.mark.parametrize("law", [KelvinVoigt(1e4, 20.0), Hysteretic(1e6, 1.4)])
-def test_bouncing_ball_comes_to_rest_in_permanent_contact(law):
-    run = integrate(free_mass(law, loads=WEIGHT), [0.1], [0.0], 20.0, method=DormandPrince(1e-9))
+@pytest.mark.parametrize("method", [DormandPrince(1e-9), Exponential(1e-9)], ids=["dormand", "exponential"])
+def test_bouncing_ball_comes_to_rest_in_permanent_contact(law, method):
+    run = integrate(free_mass(law, loads=WEIGHT), [0.1], [0.0], 20.0, method=method)
+    assert run.cost.steps < 20_000
     assert run.status is Status.DONE
     assert np.isnan(run.contacts.t_out).sum() == 1
     assert law.force(-run.q[0, 0], 0.0, 1.0) == pytest.approx(9.81, rel=1e-6)

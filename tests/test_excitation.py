@@ -396,23 +396,14 @@ def test_a_constant_density_is_flat_noise():
         (lambda: BandNoise(1.0, BROAD).nodes(1.0, 0.0), r"rtol must lie in \[1e-13, 1\), got 0.0"),
         (lambda: BandNoise(1.0, BROAD).nodes(math.nan, 1e-6), r"duration \(s\) must be finite"),
         (lambda: BandNoise(1.0, BROAD).series(dt=-1.0), r"dt \(s\) must be finite above 0"),
-        (
-            lambda: BandNoise.of_psd(lambda w: -w, BROAD),
-            "psd must be finite and at least 0, got -0.2.* at omega = 0.2",
-        ),
-        (
-            lambda: BandNoise.of_psd(lambda w: w * math.nan, BROAD),
-            "psd must be finite and at least 0, got nan",
-        ),
+        (lambda: BandNoise.of_psd(lambda w: -w, BROAD), "psd must be finite and at least 0, got -0.2.* at omega = 0.2"),
+        (lambda: BandNoise.of_psd(lambda w: w * math.nan, BROAD), "psd must be finite and at least 0, got nan"),
         (lambda: BandNoise.of_psd(lambda w: 0.0 * w, BROAD), "psd is zero on every line"),
         (lambda: BandNoise.of_psd(lambda w: w[:3], BROAD), r"one value per omega, got shape \(3,\)"),
         (lambda: BandNoise.of_psd(None, BROAD), "got None"),
         (lambda: BandNoise.of_psd("flat", BROAD), "psd must be a function of omega or a table .* got str"),
         (lambda: BandNoise.of_psd(([0, 2000], [1, -1]), BROAD), "got -1.0 at omega = 2000 rad/s"),
-        (
-            lambda: BandNoise.of_psd(([0, 1000], [1, 1]), BROAD),
-            r"spans \[0, 1000\] rad/s and must cover the band",
-        ),
+        (lambda: BandNoise.of_psd(([0, 1000], [1, 1]), BROAD), r"spans \[0, 1000\] rad/s and must cover the band"),
         (lambda: BandNoise.of_psd(([0, 3000, 2000], [1, 1, 1]), BROAD), "strictly increasing omega"),
         (lambda: BandNoise.of_psd(([0, 3000], [1]), BROAD), "two columns of equal length"),
         (lambda: dataclasses.replace(BandNoise.of_psd(roll_off, BROAD), std=1.0), "std follows from psd"),
@@ -550,14 +541,7 @@ def test_record_leaves_the_arrays_alone():
 
 
 @pytest.mark.parametrize(
-    "text",
-    [
-        "{rows}",
-        "\ufeff{rows}",
-        "time,motion\n{rows}",
-        "\ufeff# rig 3\n\ntime (s);y (mm)\n{rows}",
-        "{rows}\n\n",
-    ],
+    "text", ["{rows}", "\ufeff{rows}", "time,motion\n{rows}", "\ufeff# rig 3\n\ntime (s);y (mm)\n{rows}", "{rows}\n\n"]
 )
 @pytest.mark.parametrize("mark", [",", "\t", "  ", " ; "])
 def test_csv_with_and_without_header(tmp_path, text, mark):
@@ -585,10 +569,7 @@ def test_csv_columns(tmp_path):
         ("a,b\nc,d\n", r"has no row with numbers in columns \(0, 1\)"),
         ("t,y\n0,1\n0.1,oops\n", "record.csv, line 3: no numbers in columns"),
         ("0,1\n0.1\n", "line 2: no numbers"),
-        (
-            "\n".join(f"{k},nan" if k == 4 else f"{k},1" for k in range(12)),
-            r"record.csv: Record y .* got nan in row 4",
-        ),
+        ("\n".join(f"{k},nan" if k == 4 else f"{k},1" for k in range(12)), r"record.csv: Record y .* got nan in row 4"),
     ],
 )
 def test_bad_csv(tmp_path, text, message):
@@ -609,31 +590,16 @@ def times(**changed):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (
-            lambda: Record(times(r4=0.2), np.ones(10)),
-            "t must increase strictly, got 0.2 s after 0.3 s in row 4",
-        ),
-        (
-            lambda: Record(times(r4=0.3), np.ones(10)),
-            "t must increase strictly, got 0.3 s after 0.3 s in row 4",
-        ),
+        (lambda: Record(times(r4=0.2), np.ones(10)), "t must increase strictly, got 0.2 s after 0.3 s in row 4"),
+        (lambda: Record(times(r4=0.3), np.ones(10)), "t must increase strictly, got 0.3 s after 0.3 s in row 4"),
         (lambda: Record(times(r4=math.nan), np.ones(10)), "t must be finite, got nan in row 4"),
-        (
-            lambda: Record(times(), np.where(np.arange(10) == 6, np.inf, 1)),
-            "y must be finite, got inf in row 6",
-        ),
+        (lambda: Record(times(), np.where(np.arange(10) == 6, np.inf, 1)), "y must be finite, got inf in row 6"),
         (lambda: Record(times(), np.ones(9)), r"got shapes \(10,\) and \(9,\)"),
         (lambda: Record([0, 1, 2], [0, 1, 2]), "one length of at least 8"),
         (lambda: Record("file.csv", [1]), "must be arrays of numbers"),
-        (
-            lambda: Record(times(r9=5.0), np.ones(10)),
-            "a gap of 4.2 s before row 9, more than 10 median steps of 0.1 s",
-        ),
+        (lambda: Record(times(r9=5.0), np.ones(10)), "a gap of 4.2 s before row 9, more than 10 median steps of 0.1 s"),
         (lambda: Record(times(), np.ones(10), band=(9.0, 3.0)), "band must run from lo to hi"),
-        (
-            lambda: Record(times(), np.ones(10), band=(900.0, 950.0)),
-            r"band .* holds no line: the record resolves 3.49",
-        ),
+        (lambda: Record(times(), np.ones(10), band=(900.0, 950.0)), r"band .* holds no line: the record resolves 3.49"),
         (lambda: Record(times(), np.ones(10), kind="jerk"), "'acceleration' or 'force', got 'jerk'"),
         (
             lambda: Record(times(), np.ones(10)).for_duration(1.0),

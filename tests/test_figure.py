@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from matplotlib import figure as of_matplotlib
 from matplotlib import pyplot as plt
+from problems import ROD
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, bounce, identify
@@ -15,7 +16,7 @@ from fembeam.plot.figure import sheet
 
 @pytest.fixture(scope="module")
 def model():
-    beam = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+    beam = ROD
     stops, drive, damping = [fb.Stop(0.5, Hertz(1e9))], fb.Harmonic(1e-3, 150.0), fb.ModalDamping(0.05)
     return fb.Scene(beam, [fb.Clamped(0.0)], stops=stops, base=drive, damping=damping).reduce(modes=2)
 

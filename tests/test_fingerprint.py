@@ -57,10 +57,7 @@ SAME_AND_OTHER = {
         "def f(x):\n def g(y): return -y\n return g(x)",
     ),
     "comprehension": ("def f(x): return [2 * i for i in x]", "def f(x): return [3 * i for i in x]"),
-    "partial": (
-        "f = functools.partial(lambda x, a: a * x, a=1.0)",
-        "f = functools.partial(lambda x, a: a * x, a=2.0)",
-    ),
+    "partial": ("f = functools.partial(lambda x, a: a * x, a=1.0)", "f = functools.partial(lambda x, a: a * x, a=2.0)"),
     "function of a partial": (
         "f = functools.partial(lambda x, a: a * x, a=1.0)",
         "f = functools.partial(lambda x, a: a + x, a=1.0)",

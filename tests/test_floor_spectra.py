@@ -118,19 +118,15 @@ def test_on_the_command_line(tmp_path):
     ('places = ["valve", ["B", "z"]]', "places = []", "places must be one or more"),
     ("dt = 1e-3", "", "the key 'dt' is missing"),
 ])  # fmt: skip
-def test_refused_before_computing(tmp_path, old, new, message):
-    path = tmp_path / "scene.toml"
-    path.write_text(FILE.replace(old, new))
+def test_refused_before_computing(file_of, old, new, message):
     with pytest.raises(SceneFileError, match=message):
-        read(path)
+        file_of(FILE.replace(old, new))
 
 
-def test_a_direction_that_the_place_lacks_is_refused_before_computing(tmp_path):
-    path = tmp_path / "scene.toml"
+def test_a_direction_that_the_place_lacks_is_refused_before_computing(file_of):
     flat = FILE.replace("[0, 0, 0]", "[0, 0]").replace("[0.5, 0, 0]", "[0.5, 0]").replace("[0.5, 0.3, 0]", "[0.5, 0.3]")
-    path.write_text(flat.replace("[base.z]", "[base.y]"))
     with pytest.raises(SceneFileError, match="the place 'B' must move along z; it has x, y, rz"):
-        read(path)
+        file_of(flat.replace("[base.z]", "[base.y]"))
 
 
 def test_refused_in_python(run):

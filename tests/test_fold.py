@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from problems import ROD, ROD_FILE
 
 import fembeam as fb
 from contacts import KelvinVoigt, Polynomial
-from fembeam import scene_file
 
-ROD, TIP = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), 0.5
+TIP = 0.5
 CUBIC, ZETA, FORCE = 2e7, 0.01, "forces[0].signal.amplitude"
 
 
@@ -93,15 +93,8 @@ def test_it_prints_and_is_drawn(tmp_path):
     fb.plot.fold_curve(found, figure.axes)
 
 
-def test_the_table_of_a_scene_file(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(f"""
-[beam]
-length = 0.5
-section = {{ shape = "circle", E = 2.1e11, rho = 7800.0, diameter = 0.01 }}
-[[supports]]
-kind = "clamped"
-z = 0.0
+def test_the_table_of_a_scene_file(tmp_path, file_of):
+    file = file_of(f"""{ROD_FILE}
 [[elements]]
 z = 0.5
 law = {{ kind = "polynomial", coefficients = [0.0, 0.0, {CUBIC}] }}
@@ -117,7 +110,6 @@ over = "forces[0].signal.amplitude"
 values = [0.298, 0.3]
 span = [175.0, 210.0]
 """)
-    file = scene_file.read(path)
     found = file.studies["fold"].run(file, tmp_path)
     assert np.abs(np.array(places(known())) - found.at[found.values == 0.3]).min() < 1e-7
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from frames import portal, space_l
 from mpl_toolkits.mplot3d import proj3d
+from problems import ROD
 
 import fembeam as fb
 from contacts import KelvinVoigt
@@ -79,7 +80,7 @@ def test_refused(plane):
     for options, says in ({"t": 2.0}, "within the run, 0 to 1 s"), ({"scale": 0.0}, "scale must be above 0"):
         with pytest.raises(ValueError, match=says):
             fb.plot.deflected(plane, **options)
-    beam = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)]).reduce(modes=1)
+    beam = fb.Scene(ROD, [fb.Clamped(0.0)]).reduce(modes=1)
     with pytest.raises(ValueError, match="must be a frame or a structure"):
         fb.plot.deflected(beam.simulate(duration=0.1, dt=1e-2))
 
@@ -129,7 +130,7 @@ def test_rigs_in_space_of_unknown_places_and_of_several_bodies():
     z = axis.lines[-1].get_data_3d()[2]
     assert z[1] < z[0] < 0.0
     chain = fb.Structure([[2.0, -1.0], [-1.0, 2.0]], np.eye(2), labels=[(20, "x"), (40, "x")])
-    body = fb.Scene(fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), [fb.Clamped(0.0)])
+    body = fb.Scene(ROD, [fb.Clamped(0.0)])
     both = fb.Scene(chain, masses=[fb.LumpedMass(40, 1.0)], bodies=[body])
     first, second = both.figure().axes
     assert "places are not known" in first.get_title(loc="left")

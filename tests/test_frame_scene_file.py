@@ -43,14 +43,7 @@ omega = 25.0
 """
 
 
-def read(tmp_path, text):
-    """The scene of a file's text."""
-    path = tmp_path / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    return scene_file.read(path).scene
-
-
-def test_the_same_as_in_python(tmp_path):
+def test_the_same_as_in_python(file_of):
     """Members along chains, supports, a stop within a member, motion along one axis."""
     steel = fb.Section.rectangle(2.1e11, 7850.0, width=0.05, height=0.1)
     members = [fb.Member("A", "B", steel), fb.Member("B", "C", steel),
@@ -62,12 +55,12 @@ def test_the_same_as_in_python(tmp_path):
         stops=[fb.Stop(("B-C", 1.5), KelvinVoigt(2e6, 2e3), gap=2e-3, direction="-y")],
         base={"x": fb.Harmonic(1e-3, 25.0)},
     )
-    found = read(tmp_path, PORTAL)
+    found = file_of(PORTAL).scene
     assert repr(found) == repr(scene)
     assert found.beam == frame
 
 
-def test_a_mesh(tmp_path):
+def test_a_mesh(tmp_path, file_of):
     """Groups of lines with their sections."""
     written(tmp_path / "l.msh")
     text = f"""
@@ -80,7 +73,7 @@ sections = {{ run = {STEEL}, drop = {STEEL} }}
 kind = "clamped"
 at = "foot"
 """
-    scene = read(tmp_path, text)
+    scene = file_of(text).scene
     assert [one.name for one in scene.beam.members] == ["run", "drop"]
     assert len(scene.reduce(modes=2, elements=6).omega) == 2
 
@@ -101,10 +94,10 @@ def test_the_pipe_of_the_examples():
     ('at = "A"', 'at = "F"', "must be a node of the frame"),
     ("[frame]", "[beam]\nlength = 1.0\n[frame]", r"one of the tables \[beam\] and \[frame\]"),
 ])  # fmt: skip
-def test_refused(tmp_path, old, new, says):
+def test_refused(file_of, old, new, says):
     """What is wrong, in which table."""
     with pytest.raises(ValueError, match=says):
-        read(tmp_path, PORTAL.replace(old, new, 1))
+        file_of(PORTAL.replace(old, new, 1))
 
 
 OUTPUTS = """
@@ -152,7 +145,7 @@ def test_section_forces_of_a_file(tmp_path):
     ('places = [["B-C", 1.5], ["C", "x"]]', "", r"section forces need places, got \['moment'\] in simulate"),
     ('"moment"', '"slope"', "slope is of a Beam"),
 ])  # fmt: skip
-def test_outputs_that_are_not_there(tmp_path, old, new, says):
+def test_outputs_that_are_not_there(file_of, old, new, says):
     """Before anything is computed."""
     with pytest.raises(ValueError, match=says):
-        read(tmp_path, PORTAL + OUTPUTS.replace(old, new))
+        file_of(PORTAL + OUTPUTS.replace(old, new))

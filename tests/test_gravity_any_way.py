@@ -5,7 +5,6 @@ import pytest
 from frames import portal, space_l, turned
 
 import fembeam as fb
-from fembeam import scene_file
 
 DOWN = np.array([0.0, 0.0, -9.81])
 WEIGHT = 7850 * 2e-4 * 0.8 * 9.81
@@ -52,7 +51,7 @@ def test_free_fall():
     assert run.displacement("B", "y")[0] == pytest.approx(-0.5 * 9.81 * 0.04, rel=1e-9)
 
 
-def test_in_a_file_and_drawn(tmp_path):
+def test_in_a_file_and_drawn(file_of):
     """A list of three numbers; the rig says it."""
     text = """
 gravity = [0, 0, -9.81]
@@ -62,16 +61,14 @@ nodes = { A = [0, 0, 0], B = [1, 0, 0] }
 nodes = ["A", "B"]
 section = { shape = "circle", E = 2.1e11, rho = 7850.0, diameter = 0.02 }
 """
-    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
-    scene = scene_file.read(tmp_path / "scene.toml").scene
+    scene = file_of(text).scene
     assert scene.gravity == (0.0, 0.0, -9.81)
     texts = [text.get_text() for axes in scene.figure().axes for text in axes.texts] + [
         a.get_title() for a in scene.figure().axes
     ]
     assert any("gravity (0, 0, -9.81) m/s²" in text for text in texts)
-    (tmp_path / "scene.toml").write_text(text.replace("[0, 0, -9.81]", '"down"'), encoding="utf-8")
     with pytest.raises(ValueError, match="must be a number, or three"):
-        scene_file.read(tmp_path / "scene.toml")
+        file_of(text.replace("[0, 0, -9.81]", '"down"'))
 
 
 @pytest.mark.parametrize(("make", "says"), [

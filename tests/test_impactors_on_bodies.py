@@ -6,7 +6,6 @@ from structures import beam_structure, space_truss
 
 import fembeam as fb
 from contacts import Hertz
-from fembeam import scene_file
 
 STEEL = fb.Section(E=2.1e11, rho=7850.0, A=1e-4, I=1e-9)
 LAW = Hertz(1e8)
@@ -101,7 +100,7 @@ def test_base_motion_by_components():
     assert np.allclose(run.impactor_displacement(), -n[0] * part[0] - n[1] * part[1], atol=1e-13)
 
 
-def test_kept_and_drawn(tmp_path):
+def test_kept_and_drawn(tmp_path, file_of):
     """A saved run knows it; the rig says its mass and gap; a scene file has `at` and `direction`."""
     scene = framed(("A-B", 0.3), direction="y", name="ball")
     run = scene.reduce(2).simulate(0.05, 1e-3)
@@ -127,9 +126,7 @@ gap = 1e-3
 direction = "y"
 law = { kind = "hertz", stiffness = 1e8 }
 """
-    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
-    found = scene_file.read(tmp_path / "scene.toml").scene.impactors
-    assert found == (fb.Impactor(("A-B", 0.3), **BALL, direction="y"),)
+    assert file_of(text).scene.impactors == (fb.Impactor(("A-B", 0.3), **BALL, direction="y"),)
 
 
 @pytest.mark.parametrize(("make", "says"), [

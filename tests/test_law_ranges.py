@@ -75,7 +75,7 @@ def excess(a, r):
 
 
 @fast
-@given(st.one_of(st.sampled_from(ENDS), powers(-323, 308), powers(-16, 2)))
+@given(st.one_of(st.sampled_from([0.0, *ENDS]), powers(-323, 308), powers(-16, 2)))
 def test_the_achieved_restitution_of_any_factor(a):
     r = achieved_restitution(a)
     if a < 1e-17:

@@ -24,13 +24,7 @@ from solvers import (
 
 DECAY = Slider(spring=1.0, stiffness=4.0, limit=0.3)
 START, DURATION = (0.05, 3.0), 30.0
-CONSTANT = [
-    CentralDifference,
-    Newmark,
-    GeneralizedAlpha,
-    RK4,
-    lambda h: HenonRK2(h, h),
-]
+CONSTANT = [CentralDifference, Newmark, GeneralizedAlpha, RK4, lambda h: HenonRK2(h, h)]
 NAMES = ["central", "newmark", "alpha", "rk4", "henon"]
 
 

@@ -6,7 +6,6 @@ from test_moving_supports import DAMPED, SPAN, WAVE, equal
 
 import fembeam as fb
 from contacts import Hertz, KelvinVoigt
-from fembeam import scene_file
 
 STEEL = fb.Section(E=2.1e11, rho=7850.0, A=1e-4, I=1e-9)
 RAIL, END = fb.Harmonic(2e-3, 30.0), fb.Harmonic(1e-3, 20.0, phase=0.3)
@@ -95,19 +94,6 @@ def test_equal_motions_are_a_base_motion():
         assert equal(mine.force, other.force, 1e-8)
 
 
-@pytest.mark.parametrize("omega", [3.0, 20.0, 55.0])
-def test_one_end_moves(omega):
-    """A beam on two pins, one of which moves: u = Y/2 (sin κz/sin κL + sinh κz/sinh κL)."""
-    scene = fb.Scene(fb.Beam(1.0, SPAN), [fb.Pinned(0.0), fb.Pinned(1.0, motion={"y": fb.Harmonic(1.0, omega)})])
-    kappa, at, errors = np.sqrt(omega), np.array([0.25, 0.5, 0.9]), []
-    exact = 0.5 * (np.sin(kappa * at) / np.sin(kappa) + np.sinh(kappa * at) / np.sinh(kappa))
-    for modes in (8, 24):
-        response = scene.reduce(modes).frequency_response([omega], "supports[1].motion.y", at)
-        errors.append(np.abs(response.values[0] - exact).max())
-    assert errors[1] < 5e-5
-    assert errors[1] < 0.2 * errors[0]  # what the modes left out had of the inertia
-
-
 def test_settlement():
     """A slow settlement y of a propped end, and a slow turn θ of the clamp: 3 EI y/L³ and 3 EI θ/L² in the prop."""
     slow, turn = fb.Harmonic(1.0, 1e-4, phase=0.5), fb.Harmonic(0.3, 1e-4, phase=0.5)
@@ -182,7 +168,7 @@ def test_kept_by_a_file(tmp_path):
     assert run.to_vtu(tmp_path / "run").is_file()
 
 
-def test_in_a_file(tmp_path):
+def test_in_a_file(file_of):
     """A table of signals by dof, also along a beam."""
     text = """
 [beam]
@@ -193,8 +179,7 @@ kind = "clamped"
 z = 0.0
 motion = { y = { kind = "harmonic", amplitude = 1e-3, omega = 46.0, phase = 0.7 } }
 """
-    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
-    assert scene_file.read(tmp_path / "scene.toml").scene.supports == (fb.Clamped(0.0, motion={"y": WAVE}),)
+    assert file_of(text).scene.supports == (fb.Clamped(0.0, motion={"y": WAVE}),)
 
 
 def test_drawn():

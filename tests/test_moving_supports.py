@@ -6,7 +6,6 @@ from frames import PORTAL, portal
 
 import fembeam as fb
 from contacts import Hertz, KelvinVoigt
-from fembeam import scene_file
 from fembeam.plot.bodies import displacements
 
 WAVE = fb.Harmonic(1e-3, 46.0, phase=0.7)
@@ -129,7 +128,7 @@ def test_names_of_signals():
     assert repr(fb.Clamped("A")) == "Clamped(z='A')"
 
 
-def test_in_a_file(tmp_path):
+def test_in_a_file(file_of):
     """A table of signals by dof."""
     nodes = ", ".join(f"{name} = {list(at)}" for name, at in PORTAL.items())
     text = f"""
@@ -151,9 +150,7 @@ kind = "harmonic"
 amplitude = 2e-3
 omega = 30.0
 """
-    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
-    scene = scene_file.read(tmp_path / "scene.toml").scene
-    assert scene.supports == (
+    assert file_of(text).scene.supports == (
         fb.Clamped("A", motion={"x": WAVE}),
         fb.Fixed("D", "x", "y", motion={"x": fb.Harmonic(2e-3, 30.0)}),
     )

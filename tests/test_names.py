@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from problems import ROD_FILE
 
 import fembeam as fb
 import solvers
@@ -15,7 +16,7 @@ from contacts import Hertz, Jenkins, KelvinVoigt, Polynomial
 from fembeam.plot.axis_names import axis_name
 from fembeam.results import files, html_page
 from fembeam.scene import path_of, value_of, with_value
-from fembeam.scene_file import SceneFileError, json_schema, read
+from fembeam.scene_file import SceneFileError, json_schema
 
 STEEL = fb.Section.circle(E=2.1e11, rho=7800.0, diameter=0.01)
 TONE = fb.Harmonic(1.0, 50.0)
@@ -193,14 +194,9 @@ def test_names_of_parameters():
     assert path_of(cantilever(bodies=[body]), "bodies[0].stops[far].gap") == "bodies[0].stops[0].gap"
 
 
-FILE = """
-[beam]
-length = 0.5
-section = { shape = "circle", E = 2.1e11, rho = 7800, diameter = 0.01 }
-[[supports]]
-kind = "clamped"
-z = 0
-name = "wall"
+FILE = (
+    ROD_FILE
+    + """name = "wall"
 [[stops]]
 z = 0.5
 law = { kind = "hertz", stiffness = 1e7 }
@@ -215,15 +211,14 @@ omega = 140.0
 duration = 0.2
 dt = 1e-3
 """
+)
 
 
-def test_names_in_scene_files(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(FILE)
-    file = read(path, ["stops[valve].gap=1e-4"])
+def test_names_in_scene_files(tmp_path, file_of):
+    file = file_of(FILE, "stops[valve].gap=1e-4")
     assert file.scene.stops[0] == fb.Stop(0.5, Hertz(1e7), gap=1e-4, name="valve")
     assert file.scene.supports[0].name == "wall"
-    assert read(path, ["stops[0].name=exhaust"]).scene.stops[0].name == "exhaust"
+    assert file_of(FILE, "stops[0].name=exhaust").scene.stops[0].name == "exhaust"
     again = fb.load(replace(file.model().simulate(0.05, 1e-3), source=file.source).save(tmp_path / "run"))
     assert again.scene_file.scene == file.scene
     for change, message in (
@@ -233,7 +228,7 @@ def test_names_in_scene_files(tmp_path):
         ("stops[0].name=''", r"name must be text of one line, not empty"),
     ):
         with pytest.raises(SceneFileError, match=message):
-            read(path, [change])
+            file_of(FILE, change)
     assert json_schema()["properties"]["stops"]["items"]["anyOf"][0]["properties"]["name"] == {"type": "string"}
 
 

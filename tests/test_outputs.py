@@ -9,7 +9,7 @@ from test_cli import check_against
 import fembeam as fb
 from fembeam.cli import main
 from fembeam.model.run_csv import UNITS, extremes_table, histories
-from fembeam.scene_file import SceneFileError, json_schema, read
+from fembeam.scene_file import SceneFileError, json_schema
 
 SCENE = """
 [beam]
@@ -105,10 +105,9 @@ def test_without_a_choice_nothing_is_added(tmp_path):
         ("beam.section={E=2e11,rho=7800,A=4e-5,I=1e-11}", "stress needs the outer fibre of sections; give fibre in m"),
     ],
 )
-def test_messages_before_anything_is_computed(tmp_path, change, message):
-    (tmp_path / "scene.toml").write_text((SCENE + CHOSEN).lstrip(), encoding="utf-8")
+def test_messages_before_anything_is_computed(file_of, change, message):
     with pytest.raises(SceneFileError, match=message):
-        read(tmp_path / "scene.toml", [change])
+        file_of((SCENE + CHOSEN).lstrip(), change)
 
 
 def test_the_schema_knows_the_quantities():

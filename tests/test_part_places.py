@@ -4,18 +4,18 @@ import re
 
 import numpy as np
 import pytest
+from problems import ROD, ROD_FILE
 from structures import beam_structure
 
 import fembeam as fb
 from contacts import KelvinVoigt
-from fembeam.scene_file import SceneFileError, read
+from fembeam.scene_file import SceneFileError
 
 LAW = KelvinVoigt(1e5, 10.0)
 STEEL = fb.Section.tube(2.0e11, 7900.0, 0.0603, 0.0525)
 PIPE = fb.Frame.polyline({"A": (0, 0, 0), "B": (2, 0, 0), "C": (2, 0, 1.5), "D": (2, 1, 1.5)}, STEEL)
 MASSES = [fb.LumpedMass("C", 12.0, name="valve"), fb.LumpedMass(("B-C", 0.75), 1.0, name="box")]
 ENDS = [fb.Clamped("A"), fb.Clamped("D")]
-BEAM = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
 
 
 def pipe(**parts):
@@ -24,7 +24,7 @@ def pipe(**parts):
 
 def beam(**parts):
     given = {"masses": [fb.LumpedMass(0.4, 0.1, name="valve")], **parts}
-    return fb.Scene(BEAM, [fb.Clamped(0.0)], base=fb.Harmonic(1e-3, 100.0), damping=fb.ModalDamping(0.02), **given)
+    return fb.Scene(ROD, [fb.Clamped(0.0)], base=fb.Harmonic(1e-3, 100.0), damping=fb.ModalDamping(0.02), **given)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def test_parts_stand_at_parts():
     flat = beam(stops=[fb.Stop("valve", LAW)], springs=[fb.Spring("valve", 9.0)],
                 elements=[fb.Element(0.2, LAW, to="valve")])  # fmt: skip
     assert (flat.stops[0].z, flat.springs[0].z, flat.elements[0].to) == (0.4, 0.4, 0.4)
-    body = fb.Scene(BEAM, [fb.Clamped(0.0)], [fb.LumpedMass(0.1, 1.0, name="post")])
+    body = fb.Scene(ROD, [fb.Clamped(0.0)], [fb.LumpedMass(0.1, 1.0, name="post")])
     assert beam(stops=[fb.Stop(0.4, LAW, on=(1, "post"))], bodies=[body]).stops[0].on == (1, 0.1)
 
 
@@ -112,14 +112,9 @@ def test_csv_and_figures_show_the_name(runs, tmp_path):
     assert fb.plot.time_history(runs[1], z="valve").get_suptitle().startswith("Displacement at valve")
 
 
-FILE = """
-[beam]
-length = 0.5
-section = { shape = "circle", E = 2.1e11, rho = 7800, diameter = 0.01 }
-[[supports]]
-kind = "clamped"
-z = 0
-[[masses]]
+FILE = (
+    ROD_FILE
+    + """[[masses]]
 z = 0.4
 mass = 0.1
 name = "valve"
@@ -135,12 +130,11 @@ duration = 0.02
 dt = 1e-3
 places = ["valve", 0.2]
 """
+)
 
 
-def test_scene_files(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(FILE)
-    assert read(path).scene.stops[0].z == 0.4
+def test_scene_files(file_of):
+    assert file_of(FILE).scene.stops[0].z == 0.4
     for old, new, message in (
         ('z = "valve"', 'z = "vlave"', r"'valve' is the nearest there is, got 'vlave' in stops\[0\]"),
         (
@@ -150,9 +144,8 @@ def test_scene_files(tmp_path):
         ),
         ('z = "valve"', 'z = "0.4"', "z must be a number, got '0.4' in Stop"),
     ):
-        path.write_text(FILE.replace(old, new))
         with pytest.raises(SceneFileError, match=message):
-            read(path)
+            file_of(FILE.replace(old, new))
 
 
 @pytest.mark.parametrize(("make", "message"), [

@@ -6,16 +6,16 @@ from functools import cache
 
 import numpy as np
 import pytest
+from problems import ROD, ROD_FILE
 from scipy.optimize import brentq, minimize_scalar
 from test_equivalent import jenkins
 
 import fembeam as fb
 from contacts import Jenkins, KelvinVoigt, Polynomial
-from fembeam import scene_file
 from fembeam.model.sensitivity import of_amplitude
 from fembeam.scene import with_value
 
-ROD, TIP = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01)), 0.5
+TIP = 0.5
 SPRING, LIMIT, ZETA = 2e3, 1.0, 0.01
 DAMPER, SPAN = "elements[damper].law.limit", (160.0, 270.0)
 
@@ -180,15 +180,9 @@ def test_what_is_found_prints_and_draws():
     assert lower.get_ylabel() == "drive frequency ω / rad s⁻¹"
 
 
-FILE = """
-[beam]
-length = 0.5
-section = { shape = "circle", E = 2.1e11, rho = 7800.0, diameter = 0.01 }
-
-[[supports]]
-kind = "clamped"
-z = 0.0
-
+FILE = (
+    ROD_FILE
+    + """
 [[forces]]
 z = 0.5
 signal = { kind = "harmonic", amplitude = 1.0, omega = 200.0 }
@@ -205,18 +199,16 @@ over = "zeta[0]"
 values = [0.05, 0.1]
 span = [100.0, 300.0]
 """
+)
 
 
-def test_the_table_peak(tmp_path):
-    path = tmp_path / "rod.toml"
-    path.write_text(FILE, encoding="utf-8")
-    file = scene_file.read(path)
+def test_the_table_peak(tmp_path, file_of):
+    file = file_of(FILE)
     found = file.studies["peak"].run(file, tmp_path)
     exact = file.model().omega[0] * np.sqrt(1.0 - 2.0 * np.array([0.05, 0.1]) ** 2)
     np.testing.assert_allclose(found.at, exact, rtol=1e-6)
-    path.write_text(FILE.replace("zeta[0]", "zeta[7]"), encoding="utf-8")
     with pytest.raises(ValueError, match="no such parameter"):
-        scene_file.read(path)
+        file_of(FILE.replace("zeta[0]", "zeta[7]"))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from test_peak import FILE, SPRING, TIP, ZETA, damped, driven
 
 import fembeam as fb
 from contacts import Jenkins, Polynomial
-from fembeam import scene_file
 from fembeam.study import equivalent
 
 SPAN = (150.0, 300.0)
@@ -106,15 +105,13 @@ def test_what_is_found_prints_and_draws():
     assert [axis.get_ylabel() for axis in found.figure().axes] == ["ω / rad s⁻¹", "equivalent damping ratio ζ"]
 
 
-def test_the_table_backbone(tmp_path):
-    path, table = tmp_path / "rod.toml", "[backbone]\nlevels = [0.1, 1.0]\nspan = [100, 300]\n"
-    path.write_text(FILE[: FILE.index("[peak]")] + table, encoding="utf-8")
-    file = scene_file.read(path)
+def test_the_table_backbone(tmp_path, file_of):
+    text = FILE[: FILE.index("[peak]")] + "[backbone]\nlevels = [0.1, 1.0]\nspan = [100, 300]\n"
+    file = file_of(text)
     found = file.studies["backbone"].run(file, tmp_path)
     np.testing.assert_allclose(found.omega, file.model().omega[0], rtol=1e-9)
-    path.write_text(path.read_text(encoding="utf-8").replace("0.1, 1.0", "1.0, 0.1"), encoding="utf-8")
     with pytest.raises(ValueError, match="ascending"):
-        scene_file.read(path)
+        file_of(text.replace("0.1, 1.0", "1.0, 0.1"))
 
 
 def two_tones():

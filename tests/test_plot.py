@@ -384,10 +384,7 @@ def test_figures_of_laws():
         assert all(axis.get_ylabel() for axis in one.axes)
 
 
-@pytest.mark.parametrize(
-    "draw",
-    [lambda: fb.plot.branch([]), lambda: fb.plot.loops({}), fb.plot.stability_map],
-)
+@pytest.mark.parametrize("draw", [lambda: fb.plot.branch([]), lambda: fb.plot.loops({}), fb.plot.stability_map])
 def test_figures_of_nothing_are_refused(draw):
     with pytest.raises(ValueError, match=r"nothing to draw, got .* in plot\.\w+; give "):
         draw()

@@ -8,7 +8,6 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fembeam as fb
-from fembeam.beams import bending_matrices, bending_root
 
 UNIT = fb.Section(E=1.0, rho=1.0, A=1.0, I=1.0)
 CLAMPED = [fb.Clamped(0.0)]
@@ -83,13 +82,6 @@ def test_taper_refuses_two_materials():
         fb.Taper(UNIT, fb.Section(2.0, 1.0, 1.0, 1.0))
     with pytest.raises(TypeError, match="end must be a Section"):
         fb.Taper(UNIT, 3.0)
-
-
-@pytest.mark.parametrize("beam", [fb.Beam(1.0, wedge(0.2, 0.4), foundation=3.0, axial_force=2.0)])
-def test_root_squares_to_the_stiffness_whatever_the_beam(beam):
-    nodes = np.linspace(0, 1, 8) ** 1.5
-    K, R = bending_matrices(beam, nodes)[0], bending_root(beam, nodes)
-    assert abs(R.T @ R - K).max() < 1e-13 * abs(K).max()
 
 
 # --- elastic supports and foundations -----------------------------------------------------------------------------

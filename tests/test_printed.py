@@ -11,6 +11,7 @@ import sys
 
 import numpy as np
 import pytest
+from problems import ROD
 
 import contacts
 import fembeam as fb
@@ -25,7 +26,7 @@ from fembeam.support import Printed, counting, html_table
 @pytest.fixture(scope="module")
 def things():
     """One of everything that holds arrays, by name."""
-    beam = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+    beam = ROD
     stops, drive, damping = [fb.Stop(0.5, Hertz(1e9))], fb.Harmonic(1e-3, 150.0), fb.ModalDamping(0.05)
     scene = fb.Scene(beam, [fb.Clamped(0.0)], stops=stops, base=drive, damping=damping)
     model, bare = scene.reduce(modes=2), dataclasses.replace(scene, stops=[], base=fb.BandNoise(1e-5, (0.0, 400.0), 1))

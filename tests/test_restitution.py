@@ -24,8 +24,6 @@ from contacts import (
 )
 from contacts import bounce as throw
 
-FACTORS = [1e-6, 1e-3, 0.05, 0.5625, 1.432750533, 5.0, 60.0]
-
 
 def relation(a, r):
     """Residual of the exact relation."""
@@ -37,31 +35,6 @@ def test_published_values():
     assert achieved_restitution(0.5625) == pytest.approx(0.725241114010, abs=5e-13)
     assert damping_factor_for(0.5) == pytest.approx(1.432750533, abs=5e-10)
     assert Hysteretic.achieving(1e8, 0.5).damping_factor == damping_factor_for(0.5)
-
-
-@pytest.mark.parametrize("a", FACTORS)
-def test_achieved_restitution_satisfies_the_relation(a):
-    r = achieved_restitution(a)
-    assert 0.0 < r < 1.0
-    # rounding of the logarithms, seen through the relation's slope a - a/(1 - a r)
-    slope = abs(a - a / (1.0 - a * r)) if a * r < 1.0 else math.inf
-    assert abs(relation(a, r)) <= 1e-13 * max(slope, 1e-2) if math.isfinite(slope) else r == 1.0 / a
-
-
-def test_small_factors_follow_the_series():
-    # r = 1 - 2a/3 + 4a²/9 + O(a³)
-    for a in (1e-4, 1e-6, 1e-8):
-        assert achieved_restitution(a) == pytest.approx(1 - 2 * a / 3 + 4 * a**2 / 9, abs=a**3 + 2e-16)
-
-
-@pytest.mark.parametrize("r", [0.02, 0.1, 0.3, 0.5, 0.725, 0.9, 0.99, 0.999999])
-def test_the_two_functions_are_inverse(r):
-    assert achieved_restitution(damping_factor_for(r)) == pytest.approx(r, rel=1e-12)
-
-
-def test_elastic_limits():
-    assert achieved_restitution(0.0) == 1.0
-    assert damping_factor_for(1.0) == 0.0
 
 
 @pytest.mark.parametrize("bad", [0.0, -0.1, 1.0000001, math.nan, math.inf])
@@ -97,17 +70,6 @@ def test_free_mass_rebounds_by_the_relation(a, mass, speed, stiffness, exponent)
     assert abs(relation(a, log.speed_out[0] / speed)) < 1e-9
 
 
-@pytest.mark.parametrize("restitution", [0.1, 0.5, 0.9])
-def test_achieving_achieves(restitution):
-    log = bounce(Hysteretic.achieving(2.1e8, restitution), speed=0.7, duration=10.0).contacts
-    assert log.speed_out[0] / log.speed_in[0] == pytest.approx(restitution, rel=1e-10)
-
-
-def test_lankarani_nikravesh_does_not_achieve_its_nominal_value():
-    log = bounce(Hysteretic.lankarani_nikravesh(2.1e8, 0.5), duration=10.0).contacts
-    assert log.speed_out[0] == pytest.approx(0.725241114010, rel=1e-10)
-
-
 @pytest.mark.parametrize("speed", [0.01, 1.0, 7.0])
 @pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0, 3.0])
 def test_elastic_power_law_bounce(speed, exponent):
@@ -117,15 +79,6 @@ def test_elastic_power_law_bounce(speed, exponent):
     assert log.t_out[0] - log.t_in[0] == pytest.approx(exact.duration, rel=1e-10)
     assert log.peak_indentation[0] == pytest.approx(exact.peak_indentation, rel=1e-10)
     assert log.peak_force[0] == pytest.approx(exact.peak_force, rel=1e-10)
-
-
-def test_hertz_closed_numbers():
-    K, m, v = 2.1e8, 0.037, 0.6
-    log = bounce(Hertz(K), v, m, duration=1.0).contacts
-    peak = (5 * m * v**2 / (4 * K)) ** 0.4
-    assert log.peak_indentation[0] == pytest.approx(peak, rel=1e-10)
-    assert (log.t_out[0] - log.t_in[0]) * v / peak == pytest.approx(2.943275184325, abs=2e-12)
-    assert log.peak_force[0] == pytest.approx(1.143262629818 * K**0.4 * (m * v**2) ** 0.6, rel=1e-10)
 
 
 @pytest.mark.parametrize("damping", [0.0, 20.0, 200.0, 1500.0])
@@ -160,22 +113,6 @@ def test_clamped_hysteretic_law_leaves_no_slower_than_one_over_a():
     plain, clamped = (bounce(Hysteretic(1e8, 3.0, clamp=c), duration=1.0).contacts for c in (False, True))
     assert clamped.speed_out[0] == pytest.approx(plain.speed_out[0], rel=1e-10)
     assert plain.speed_out[0] < 1.0 / 3.0
-
-
-def test_piecewise_linear_bounce_against_its_pieces():
-    k1, k2, knot, mass, speed = 1e5, 2e6, 1e-3, 3.0, 0.8
-    omega_1, omega_2 = math.sqrt(k1 / mass), math.sqrt(k2 / mass)
-    to_knot = math.asin(knot * omega_1 / speed) / omega_1
-    speed_at_knot = speed * math.cos(omega_1 * to_knot)
-    # beyond the knot: δ - knot = A cos(ω₂ t - ψ) - k1 knot/k2
-    shift = k1 * knot / k2
-    radius = math.hypot(shift, speed_at_knot / omega_2)
-    beyond = 2.0 * math.acos(shift / radius) / omega_2
-    log = bounce(PiecewiseLinear([k1, k2], [knot]), speed, mass, duration=0.1).contacts
-    assert log.t_out[0] == pytest.approx(2 * to_knot + beyond, rel=1e-11)
-    assert log.peak_indentation[0] == pytest.approx(knot + radius - shift, rel=1e-11)
-    assert log.peak_force[0] == pytest.approx(k2 * radius, rel=1e-11)
-    assert log.speed_out[0] == pytest.approx(speed, rel=1e-11)
 
 
 def test_bounce_that_turns_before_the_knot_sees_one_slope():
@@ -336,7 +273,7 @@ def test_three_slopes_against_their_pieces():
         radius = math.hypot(v / omega, force / slope)  # about the branch's own zero of force
         phase = math.asin(force / slope / radius)
         if knot == math.inf:
-            t += (math.pi / 2 - phase) / omega
+            t, peak = t + (math.pi / 2 - phase) / omega, slope * radius
             delta += radius - force / slope
             break
         there = math.asin((force / slope + knot - delta) / radius)
@@ -346,6 +283,7 @@ def test_three_slopes_against_their_pieces():
         system = free_mass(PiecewiseLinear(slopes, knots), mass)
         log = solvers.integrate(system, [0.0], [-speed], 0.1, method=method).contacts
         assert log.peak_indentation[0] == pytest.approx(delta, rel=1e-9)
+        assert log.peak_force[0] == pytest.approx(peak, rel=1e-9)
         assert log.t_out[0] == pytest.approx(2.0 * t, rel=1e-9)
         assert log.speed_out[0] == pytest.approx(speed, rel=1e-9)
 

@@ -315,21 +315,16 @@ moment = 1e-4
 """
 
 
-def test_a_rotor_in_a_scene_file(tmp_path):
-    path = tmp_path / "rotor.toml"
-    path.write_text(ROTOR, encoding="utf-8")
-    assert scene_file.read(path).scene == rotor(forces=[fb.Unbalance("B", 1e-4)])
+def test_a_rotor_in_a_scene_file(file_of):
+    assert file_of(ROTOR).scene == rotor(forces=[fb.Unbalance("B", 1e-4)])
 
 
-def test_the_table_campbell_writes_its_answer(tmp_path):
-    path = tmp_path / "rotor.toml"
-    path.write_text(f"{ROTOR}[campbell]\nspins = [0, 300]\npoints = 3\nmodes = 2\n", encoding="utf-8")
-    study = scene_file.read(path).studies["campbell"]
-    found = study.run(scene_file.read(path), tmp_path)
+def test_the_table_campbell_writes_its_answer(tmp_path, file_of):
+    file = file_of(f"{ROTOR}[campbell]\nspins = [0, 300]\npoints = 3\nmodes = 2\n")
+    found = file.studies["campbell"].run(file, tmp_path)
     np.testing.assert_allclose(found.signed, rotor().campbell(SPEEDS, modes=2).signed, rtol=1e-12)
-    path.write_text(f"{ROTOR}[campbell]\nspins = [300, 0]\n", encoding="utf-8")
     with pytest.raises(scene_file.SceneFileError, match=r"spins must be two values, ascending"):
-        scene_file.read(path)
+        file_of(f"{ROTOR}[campbell]\nspins = [300, 0]\n")
 
 
 def test_half_a_pair_of_a_shaft_at_rest_is_told_and_moves_along_x():

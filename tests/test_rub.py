@@ -81,10 +81,7 @@ def test_a_disk_in_closed_form(omega):
 
 def test_runs_from_a_rub_stay_in_it():
     """Of a shaft with its gyroscopic moments and torsion, an unbalance at an angle; of a law that grows as Hertz's."""
-    for law, body, modes in (
-        (KelvinVoigt(2e6, 300.0), SHAFT, 4),
-        (Hertz(3e8), replace(SHAFT, bending_only=False), 5),
-    ):
+    for law, body, modes in ((KelvinVoigt(2e6, 300.0), SHAFT, 4), (Hertz(3e8), replace(SHAFT, bending_only=False), 5)):
         model = overhung(law, body=body).reduce(modes=modes)
         found = model.rub()
         assert found.stable

@@ -39,14 +39,8 @@ z = 0
 """
 
 
-def read(tmp_path, text):
-    path = tmp_path / "scene.toml"
-    path.write_text(text, encoding="utf-8")
-    return scene_file.read(path)
-
-
-def test_the_example_is_the_papers_scene(tmp_path):
-    file = read(tmp_path, EXAMPLE)
+def test_the_example_is_the_papers_scene(file_of):
+    file = file_of(EXAMPLE)
     assert repr(file.scene) == repr(paper_scene(fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1)))
     assert file.reduce == {"modes": 2}
     assert file.studies["simulate"].solver is None
@@ -78,9 +72,9 @@ def test_the_example_is_the_papers_scene(tmp_path):
           for name in PUBLISHED),
     ],
 )  # fmt: skip
-def test_laws(tmp_path, text, law):
+def test_laws(tmp_path, file_of, text, law):
     (tmp_path / "curve.csv").write_text("delta,force\n1e-3,5\n2e-3,20\n")
-    file = read(tmp_path, SIMPLE + f'[[stops]]\nz = 0.5\ngap = 1e-3\nside = "above"\nlaw = {{ {text} }}')
+    file = file_of(SIMPLE + f'[[stops]]\nz = 0.5\ngap = 1e-3\nside = "above"\nlaw = {{ {text} }}')
     assert file.scene.stops == (fb.Stop(0.5, law=law, gap=1e-3, side="above"),)
 
 
@@ -105,8 +99,8 @@ def test_laws_with_memory(kind, keys, law):
     assert LAWS[kind](**keys) == law
 
 
-def test_everything_that_hangs_on_a_beam(tmp_path):
-    scene = read(tmp_path, """
+def test_everything_that_hangs_on_a_beam(file_of):
+    scene = file_of("""
 [beam]
 spans = [
   { length = 0.5, section = { shape = "rectangle", E = 2e11, rho = 7800, width = 0.02, height = 0.01 } },
@@ -141,8 +135,8 @@ modes = [0, 2]
     assert float(scene.forces[0].signal(0.0)) == 3.0
 
 
-def test_impactors_tapers_foundations_and_once_only_signals(tmp_path):
-    scene = read(tmp_path, """
+def test_impactors_tapers_foundations_and_once_only_signals(file_of):
+    scene = file_of("""
 gravity = 9.81
 [beam]
 length = 0.5
@@ -186,35 +180,35 @@ side = "above"
 
 
 @pytest.mark.filterwarnings("ignore:.*rigid-body:UserWarning")
-def test_a_mesh_is_found_beside_the_scene(tmp_path):
+def test_a_mesh_is_found_beside_the_scene(tmp_path, file_of):
     section = fb.Section.circle(2e11, 7800.0, 0.01)
     fb.Beam.of_spans([(0.2, section), (0.3, section)]).to_mesh(tmp_path / "rig.msh")
     shape = '{ shape = "circle", E = 2e11, rho = 7800, diameter = 0.01 }'
     table = f'[beam]\nmesh = "rig.msh"\n[beam.sections]\nspan_1 = {shape}\n'
-    assert read(tmp_path, table + f"span_2 = {shape}\n").scene.beam.borders == (0.0, 0.2, 0.5)
+    assert file_of(table + f"span_2 = {shape}\n").scene.beam.borders == (0.0, 0.2, 0.5)
     with pytest.raises(SceneFileError, match=r"\[beam\]: every element must have one section"):
-        read(tmp_path, table)
+        file_of(table)
     with pytest.raises(SceneFileError, match="a mesh needs its path and a table sections"):
-        read(tmp_path, '[beam]\nmesh = "rig.msh"')
+        file_of('[beam]\nmesh = "rig.msh"')
     with pytest.raises(SceneFileError, match=r"unknown key 'lenght'"):
-        read(tmp_path, '[beam]\nmesh = "rig.msh"\nlenght = 1')
+        file_of('[beam]\nmesh = "rig.msh"\nlenght = 1')
 
 
-def test_a_record_is_found_beside_the_scene(tmp_path):
+def test_a_record_is_found_beside_the_scene(tmp_path, file_of):
     rows = [f"{0.01 * i},{i % 5}" for i in range(100)]
     (tmp_path / "motion.csv").write_text("\n".join(["t,a", *rows]))
     text = '[base]\nkind = "record"\npath = "motion.csv"\nquantity = "acceleration"\nscale = 1e-3'
-    base = read(tmp_path, SIMPLE + text).scene.base
+    base = file_of(SIMPLE + text).scene.base
     assert isinstance(base, fb.Record)
     assert base.quantity == "acceleration"
     assert base.y.max() == pytest.approx(4e-3)
 
 
-def test_solvers_by_name(tmp_path):
+def test_solvers_by_name(file_of):
     simulate = "[simulate]\nduration = 1\ndt = 1e-3\nsolver = "
-    dopri = read(tmp_path, SIMPLE + simulate + '{ kind = "dormand_prince", rtol = 1e-6 }')
+    dopri = file_of(SIMPLE + simulate + '{ kind = "dormand_prince", rtol = 1e-6 }')
     assert dopri.studies["simulate"].solver == solvers.DormandPrince(rtol=1e-6)
-    heun = read(tmp_path, SIMPLE + simulate + '{ kind = "henon_rk2", dt_flight = 1e-5, dt_contact = 1e-6 }')
+    heun = file_of(SIMPLE + simulate + '{ kind = "henon_rk2", dt_flight = 1e-5, dt_contact = 1e-6 }')
     assert heun.studies["simulate"].solver == solvers.HenonRK2(1e-5, 1e-6)
 
 
@@ -261,10 +255,10 @@ def test_solvers_by_name(tmp_path):
         ("[beam]", "[beam]\nspans = 3\n#", r"spans must be a list|unknown key"),
     ],
 )
-def test_mistakes_are_named(tmp_path, old, new, message):
+def test_mistakes_are_named(file_of, old, new, message):
     assert old in EXAMPLE
     with pytest.raises(SceneFileError, match=message) as caught:
-        read(tmp_path, EXAMPLE.replace(old, new, 1))
+        file_of(EXAMPLE.replace(old, new, 1))
     assert "scene.toml" in str(caught.value)
 
 
@@ -281,11 +275,11 @@ def test_mistakes_are_named(tmp_path, old, new, message):
         ("modes = 2", "modes = 2 2", "modes ="),
     ],
 )
-def test_mistakes_are_found_by_their_line(tmp_path, old, new, line):
+def test_mistakes_are_found_by_their_line(file_of, old, new, line):
     text = EXAMPLE.replace(old, new, 1)
     number = next(i for i, found in enumerate(text.splitlines(), start=1) if found.startswith(line))
     with pytest.raises(SceneFileError, match=rf"scene\.toml:{number}: "):
-        read(tmp_path, text)
+        file_of(text)
 
 
 @pytest.mark.parametrize(
@@ -300,23 +294,21 @@ def test_mistakes_are_found_by_their_line(tmp_path, old, new, line):
         ("simulate.dt=[", "dt must be a number"),
     ],
 )
-def test_bad_overrides(tmp_path, override, message):
-    (tmp_path / "scene.toml").write_text(EXAMPLE, encoding="utf-8")
+def test_bad_overrides(file_of, override, message):
     with pytest.raises(SceneFileError, match=message):
-        scene_file.read(tmp_path / "scene.toml", [override])
+        file_of(EXAMPLE, override)
 
 
-def test_overrides(tmp_path):
-    (tmp_path / "scene.toml").write_text(EXAMPLE, encoding="utf-8")
+def test_overrides(file_of):
     overrides = ["stops[0].law.stiffness=1e9", "stops.0.side = above", "reduce.modes=[0, 2]", "gravity=9.81"]
-    file = scene_file.read(tmp_path / "scene.toml", overrides)
+    file = file_of(EXAMPLE, *overrides)
     assert file.scene.stops[0] == fb.Stop(0.24445, Hysteretic.lankarani_nikravesh(1e9, 0.5), side="above")
     assert file.reduce == {"modes": [0, 2]}
     assert file.scene.gravity == 9.81
 
 
-def test_the_mark_some_editors_begin_a_file_with_is_passed_over(tmp_path):
-    plain = read(tmp_path, SIMPLE)
+def test_the_mark_some_editors_begin_a_file_with_is_passed_over(tmp_path, file_of):
+    plain = file_of(SIMPLE)
     (tmp_path / "marked.toml").write_bytes(SIMPLE.encode("utf-8-sig"))
     marked = scene_file.read(tmp_path / "marked.toml")
     assert marked.scene == plain.scene
@@ -327,19 +319,19 @@ def test_the_mark_some_editors_begin_a_file_with_is_passed_over(tmp_path):
             scene_file.read(tmp_path / "wide.toml")
 
 
-def test_files_that_are_none(tmp_path):
+def test_files_that_are_none(tmp_path, file_of):
     with pytest.raises(SceneFileError, match="cannot be read"):
         scene_file.read(tmp_path / "nothing.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(SceneFileError, match="UTF-8"):
         scene_file.read(tmp_path / "binary.toml")
     with pytest.raises(SceneFileError, match=r"needs a table \[beam\]"):
-        read(tmp_path, "")
+        file_of("")
     with pytest.raises(SceneFileError, match=r"nothing\.csv"):
-        read(tmp_path, SIMPLE + '[base]\nkind = "record"\npath = "nothing.csv"\nquantity = "displacement"')
+        file_of(SIMPLE + '[base]\nkind = "record"\npath = "nothing.csv"\nquantity = "displacement"')
     missing = r"the key 'quantity' is missing \('displacement' or 'acceleration' or 'force'\); it needs path, quantity"
     with pytest.raises(SceneFileError, match=missing):
-        read(tmp_path, SIMPLE + '[base]\nkind = "record"\npath = "nothing.csv"')
+        file_of(SIMPLE + '[base]\nkind = "record"\npath = "nothing.csv"')
 
 
 DRIVEN = (
@@ -381,7 +373,7 @@ law = { kind = "hertz", stiffness = 1e7 }
         ),
     ],
 )
-def test_wrong_values_of_studies_are_said_before_anything_is_computed(tmp_path, table, message):
+def test_wrong_values_of_studies_are_said_before_anything_is_computed(file_of, table, message):
     name = table[: table.index("]") + 1].replace("[", r"\[").replace("]", r"\]")
     with pytest.raises(SceneFileError, match=f"{name}: .*{message}"):
-        read(tmp_path, DRIVEN + table)
+        file_of(DRIVEN + table)

@@ -343,13 +343,7 @@ def simulated(one, duration=0.06):
 
 
 @pytest.mark.parametrize(
-    ("path", "share"),
-    [
-        ("stops[valve].gap", 1e-3),
-        ("omega", 1e-5),
-        ("damping.zeta[0]", 1e-3),
-        ("beam.length", 1e-5),
-    ],
+    ("path", "share"), [("stops[valve].gap", 1e-3), ("omega", 1e-5), ("damping.zeta[0]", 1e-3), ("beam.length", 1e-5)]
 )
 def test_a_run_of_a_scene(run, path, share):
     found = run.sensitivity(path)
@@ -435,8 +429,7 @@ def test_an_orbit_with_a_slider():
 def test_chaos_is_told():
     """Between two elastic stops small changes grow over and over."""
     rattling = scene(
-        stops=[fb.Stop(0.24445, Hertz(2.1e8), 1e-4, side) for side in ("below", "above")],
-        base=fb.Harmonic(3e-3, 195.0),
+        stops=[fb.Stop(0.24445, Hertz(2.1e8), 1e-4, side) for side in ("below", "above")], base=fb.Harmonic(3e-3, 195.0)
     )
     run = rattling.reduce(modes=2).simulate(0.12)
     with pytest.warns(UserWarning, match="small changes of the start grow by"):

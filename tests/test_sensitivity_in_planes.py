@@ -199,12 +199,7 @@ def run():
 
 
 @pytest.mark.parametrize(
-    ("path", "share"),
-    [
-        ("stops[0].friction.mu", 2e-3),
-        ("forces[0].signal.amplitude", 1e-4),
-        ("damping.zeta[0]", 1e-3),
-    ],
+    ("path", "share"), [("stops[0].friction.mu", 2e-3), ("forces[0].signal.amplitude", 1e-4), ("damping.zeta[0]", 1e-3)]
 )
 def test_a_run_of_a_scene(run, path, share):
     """Every path reaches the equations; how exact derivatives are is asked above."""

@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from oscillators import Bilinear, Duffing, Tone, random_family
+from oscillators import Bilinear, Duffing, Tone, from_phase, random_family
 from problems import reference
 from scipy.special import ellipj, ellipk
 
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, Exponential, HenonRK2, OrbitError, System, integrate, orbit
-from solvers.orbits import delayed
 from solvers.orbits.open_times import latches, open_intervals
 from solvers.problem import ContactLog
 
@@ -377,8 +376,7 @@ def test_hysteretic_stop_that_never_opens():
 
 
 @pytest.mark.parametrize(
-    ("stop", "latched"),
-    [(HYSTERETIC, True), (replace(HYSTERETIC, entry_rate_floor=0.5), True), (Hertz(2.1e8), False)],
+    ("stop", "latched"), [(HYSTERETIC, True), (replace(HYSTERETIC, entry_rate_floor=0.5), True), (Hertz(2.1e8), False)]
 )
 def test_a_law_that_latches_is_known_whatever_its_floor(stop, latched):
     assert latches(Contact([1.0], stop)) is latched
@@ -391,7 +389,7 @@ def test_an_orbit_whose_contacts_lie_elsewhere_than_the_start_says_is_an_orbit_f
     system, period = make(low)
     found = orbit(system, period, np.zeros(2 * modes))
     assert not np.any(found.contacts.t_out > found.period)
-    later, x = delayed(system, found.phase), found.state
+    later, x = from_phase(found), found.state
     run = integrate(later, x[:modes], x[modes:], 4 * period, dt=period, method=found.method)
     np.testing.assert_allclose(np.hstack((run.q, run.q_dot)), np.tile(x, (5, 1)), atol=1e-9 * np.abs(x).max())
 

@@ -4,7 +4,7 @@ from dataclasses import MISSING, fields, replace
 
 import numpy as np
 import pytest
-from problems import ROD_FILE
+from problems import ROD, ROD_FILE
 
 import fembeam as fb
 from contacts import Hertz
@@ -21,14 +21,12 @@ from fembeam.scene import (
     with_value,
 )
 from fembeam.scene.signals import is_of_signal
-from fembeam.scene_file import read
 from fembeam.study import ensemble
 from fembeam.study.execution.checkpoint import identity
 from fembeam.study.measure import Plan, runs
 from fembeam.study.realisations import realisation
 from fembeam.study.segments import Segments
 
-BEAM = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
 PLAIN = {  # annotations of what is no signal
     *("float", "str", "str | None", "float | tuple[float, float, float]", "tuple[str, ...]"),
     *("Of", "Place", "Second | None", "Direction | None", "float | Sequence[float]", "bool", "float | None"),
@@ -62,7 +60,7 @@ def made(kind, key, signal):
 
 
 def scene_of(**parts):
-    return Scene(BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.05), **parts)
+    return Scene(ROD, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.05), **parts)
 
 
 def places():
@@ -187,9 +185,8 @@ def test_orbit_and_branch_of_a_beam_shaken_by_the_foot_of_a_spring_alone():
     assert {150.0, 151.0} <= set(branch.parameter)
 
 
-def test_doubts_see_feet(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(
+def test_doubts_see_feet(file_of):
+    file = file_of(
         ROD_FILE
         + """
 [[springs]]
@@ -198,7 +195,6 @@ stiffness = 100
 foot = { kind = "harmonic", amplitude = 2.0, omega = 1e5 }
 """
     )
-    file = read(path)
     said = doubts(file.scene.reduce(modes=2))
     assert any("springs[0].foot moves by 2 m" in one for one in said)
     assert any("loads reach 100000 rad/s" in one for one in said)

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from problems import ROD
 
 import fembeam as fb
 from contacts import Jenkins, KelvinVoigt, Polynomial
@@ -111,7 +112,7 @@ def test_damping_of_the_structure_counts_first():
     ({"watch": {"rate": lambda run: "x"}}, r"watch\['rate'\] must be real numbers, got 'x'"),
 ])  # fmt: skip
 def test_wrong_options_of_a_stationary_response_are_named(wrong, message):
-    beam = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+    beam = ROD
     noise = fb.BandNoise(1e-5, (0.0, 400.0), seed=1)
     model = fb.Scene(beam, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.05), base=noise).reduce(modes=1)
     with pytest.raises(ValueError, match=message):

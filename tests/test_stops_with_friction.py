@@ -11,7 +11,7 @@ import solvers
 from contacts import Hertz, KelvinVoigt, WaltonBraun
 from fembeam.model import run_csv
 from fembeam.response import backbone, states
-from fembeam.scene_file import SceneFileError, json_schema, read
+from fembeam.scene_file import SceneFileError, json_schema
 from fembeam.study.measure import cut
 
 METHOD = solvers.DormandPrince(1e-11)
@@ -279,10 +279,8 @@ law = { kind = "hertz", stiffness = 1e8 }
 """
 
 
-def test_scene_files(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(TOML)
-    first, second = read(path).scene.stops
+def test_scene_files(file_of):
+    first, second = file_of(TOML).scene.stops
     assert (first.friction, first.radius) == (fb.Friction(0.3, 5e5), 0.00955)
     assert second == fb.Stop("B", Hertz(1e8), 1e-3, direction="x", friction=fb.Friction(0.2, 1e5), tangent="y")
     for old, new, message in (
@@ -292,9 +290,8 @@ def test_scene_files(tmp_path):
         ("radius = 0.00955", "", "friction on a shaft that spins needs radius="),
         ('tangent = "y"', 'tangent = "x"', "tangent must be a displacement at right angles"),
     ):
-        path.write_text(TOML.replace(old, new))
         with pytest.raises(SceneFileError, match=message):
-            read(path)
+            file_of(TOML.replace(old, new))
     options = json_schema()["properties"]["stops"]["items"]["anyOf"]
     assert all("friction" in one["properties"] for one in options)
     assert "mu" in str(json_schema()["$defs"]["kind such as coulomb"])

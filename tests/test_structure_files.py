@@ -161,11 +161,7 @@ def test_mistakes_are_told_with_their_table(folder, old, new, message):
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
-        (
-            "K.mtx",
-            "%%MatrixMarket matrix coordinate real general\n3 3",
-            "K.mtx, line 2: expected",
-        ),
+        ("K.mtx", "%%MatrixMarket matrix coordinate real general\n3 3", "K.mtx, line 2: expected"),
         ("M.npz", "nothing", "M.npz, as a whole: expected arrays of numbers"),
         ("dofs.csv", "1, x\n2\n", "dofs.csv, line 2: expected a node and a component, got '2'"),
         ("nodes.csv", "1 0 0 0\n2 0 0 up\n", "nodes.csv, line 2: expected node, x, y, z, got '2 0 0 up'"),

@@ -44,10 +44,7 @@ def same_scene(base=True):
         beam_structure(),
         [fb.Fixed("root")],
         masses=[fb.LumpedMass("middle", 0.1, 1e-5, 0.01)],
-        springs=[
-            fb.Spring(3, 500.0, foot=fb.Harmonic(1e-4, 90.0), direction="y"),
-            fb.Spring(3, 2.0, direction="rx"),
-        ],
+        springs=[fb.Spring(3, 500.0, foot=fb.Harmonic(1e-4, 90.0), direction="y"), fb.Spring(3, 2.0, direction="rx")],
         dashpots=[fb.Dashpot(6, 0.5, direction="-y"), fb.Dashpot(7, 1e-3, direction="rx")],
         stops=[
             fb.Stop("tip", LAW, 1e-3, direction="y", name="upper"),

@@ -380,11 +380,9 @@ def test_studies_of_a_file(tmp_path, capsys):
         ("omega = 100", "omega = 0", r"\[mode_count\]: a study without duration needs a periodic response"),
     ],
 )
-def test_mistakes_in_a_file(tmp_path, old, new, message):
-    path = tmp_path / "scene.toml"
-    path.write_text(FILE.replace(old, new))
+def test_mistakes_in_a_file(file_of, old, new, message):
     with pytest.raises(scene_file.SceneFileError, match=message):
-        scene_file.read(path)
+        file_of(FILE.replace(old, new))
 
 
 def test_a_part_of_a_run_reads_as_the_run():
@@ -464,10 +462,8 @@ dt = 1e-3
 """
 
 
-def test_studies_of_a_file_use_the_mesh_that_reduce_says(tmp_path):
-    path = tmp_path / "coarse.toml"
-    path.write_text(COARSE, encoding="utf-8")
-    file = scene_file.read(path)
+def test_studies_of_a_file_use_the_mesh_that_reduce_says(tmp_path, file_of):
+    file = file_of(COARSE)
     run = {"quantity": "amplitude", "duration": 0.1, "dt": 1e-3}
     value = Amplitude()(file.scene.reduce(1, elements=4).simulate(0.1, 1e-3, solver=solvers.Exponential(ledger=False)))
     assert file.studies["mode_count"].run(file, tmp_path).row(1).value == pytest.approx(value, rel=1e-9)
@@ -477,10 +473,8 @@ def test_studies_of_a_file_use_the_mesh_that_reduce_says(tmp_path):
     assert found.model.matrices.elements == 4
 
 
-def test_a_campbell_diagram_of_a_file_uses_the_mesh_that_reduce_says(tmp_path):
-    path = tmp_path / "rotor.toml"
-    path.write_text(
-        """
+def test_a_campbell_diagram_of_a_file_uses_the_mesh_that_reduce_says(tmp_path, file_of):
+    text = """
         [frame]
         nodes = { A = [0, 0, 0], B = [0, 0, 0.5] }
         [[frame.members]]
@@ -495,12 +489,10 @@ def test_a_campbell_diagram_of_a_file_uses_the_mesh_that_reduce_says(tmp_path):
         spins = [0.0, 300.0]
         points = 2
         modes = 2
-        """,
-        encoding="utf-8",
-    )
-    file = scene_file.read(path)
+        """
+    file = file_of(text)
     found = file.studies["campbell"].run(file, tmp_path).omega
     np.testing.assert_array_equal(found, file.scene.campbell([0.0, 300.0], 2, elements=5).omega)
     assert np.abs(found / file.scene.campbell([0.0, 300.0], 2).omega - 1).max() > 1e-7
     with pytest.raises(scene_file.SceneFileError, match="modes must be at most 64, got 1000 in campbell"):
-        scene_file.read(path, ["campbell.modes=1000"])
+        file_of(text, "campbell.modes=1000")

@@ -9,7 +9,6 @@ from scipy.interpolate import BPoly
 from scipy.signal import StateSpace, chirp, lsim
 
 import fembeam as fb
-from fembeam.scene_file import read
 
 KINDS = ["linear", "logarithmic"]
 
@@ -94,14 +93,13 @@ def test_the_response_to_a_sweep_is_that_of_scipy(kind):
     np.testing.assert_allclose(run.displacement(0.4), expected, atol=1e-5 * np.abs(expected).max())
 
 
-def test_scene_file(tmp_path):
+def test_scene_file(file_of):
     text = """
     beam = {length = 0.5, section = {E = 2.1e11, rho = 7800.0, A = 1e-4, I = 1e-9}}
     supports = [{kind = "clamped", z = 0.0}]
     base = {kind = "sine_sweep", amplitude = 1e-3, omega0 = 60.0, omega1 = 200.0, duration = 5.0, rate = "logarithmic"}
     """
-    (tmp_path / "scene.toml").write_text(text, encoding="utf-8")
-    assert read(tmp_path / "scene.toml").scene.base == fb.SineSweep(1e-3, 60.0, 200.0, 5.0, "logarithmic")
+    assert file_of(text).scene.base == fb.SineSweep(1e-3, 60.0, 200.0, 5.0, "logarithmic")
 
 
 @pytest.mark.parametrize(

@@ -403,11 +403,9 @@ def test_tables_of_a_scene_file(tmp_path, capsys):
     ("[0, 2e-3]", "[2e-3, 0]", "bounds of stops[0].gap must be two finite values, ascending"),
     ("peak_force = 1e9", "peak = 1e9", "quantity must be one of"),
 ])  # fmt: skip
-def test_tables_are_checked_when_read(tmp_path, old, new, said):
-    path = tmp_path / "scene.toml"
-    path.write_text(FILE.replace(old, new))
+def test_tables_are_checked_when_read(file_of, old, new, said):
     with pytest.raises(scene_file.tables.SceneFileError, match=re.escape(said)):
-        scene_file.read(path)
+        file_of(FILE.replace(old, new))
 
 
 # --- bad input --------------------------------------------------------------------------------------------------------

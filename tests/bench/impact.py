@@ -77,13 +77,7 @@ def methods(modes: int) -> dict[str, tuple[Any, list[dict[str, Any]]]]:
 
 
 SHOWN = "rtol", "tol", "dt", "dt_flight", "dt_contact"
-RATIOS = [
-    ("heyoka", 1e-8),
-    ("DOP853, numba", 1e-8),
-    ("Heun + Hénon", 1e-5),
-    ("SciPy", 1e-5),
-    ("CVODE", 1e-5),
-]
+RATIOS = [("heyoka", 1e-8), ("DOP853, numba", 1e-8), ("Heun + Hénon", 1e-5), ("SciPy", 1e-5), ("CVODE", 1e-5)]
 
 
 @dataclass

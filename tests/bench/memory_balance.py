@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from comparison import ALLOWED, BALANCE, SAMPLES, handled
 from drawn import Scene
-from random_scenes import ALLOWED, BALANCE, SAMPLES, handled
 
 from contacts import BoucWen, Coulomb, Jenkins, Law, Sum, WaltonBraun
 from contacts.memory.friction import SLIDER_SIZE, Sliders

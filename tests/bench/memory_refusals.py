@@ -14,11 +14,10 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 import numpy as np
-from random_scenes import handled, imbalance
+from comparison import handled, imbalance, judged
 
 import fembeam as fb
 from contacts import BoucWen, Iwan, Jenkins
@@ -72,19 +71,15 @@ def judge(seed: int) -> list[tuple[str, float, float, bool]]:
 def main(count: int = 200, first: int = 0, processes: int = 2) -> int:
     """Run and print; returns the number of runs refused or off."""
     worst, kinds = {rtol: (0.0, 0.0) for rtol in RTOLS}, Counter[float]()
-    with ProcessPoolExecutor(processes) as pool:
-        for i, runs in enumerate(pool.map(judge, range(first, first + count), chunksize=4)):
-            for (words, residual, off, refused), rtol in zip(runs, RTOLS, strict=True):
-                worst[rtol] = max(worst[rtol][0], residual), max(worst[rtol][1], off)
-                kinds[rtol] += refused
-                kinds[0.0] += not max(residual, off) <= BOUND and not refused
-                if refused or not max(residual, off) <= BOUND:
-                    print(
-                        f"{words}\n    residual {residual:.3g}, loss off by {off:.3g}{', refused' * refused}",
-                        flush=True,
-                    )
-            if i % 100 == 99:
-                print(f"... {i + 1} scenes: {dict(kinds)}", flush=True)
+    for i, runs in enumerate(judged(judge, count, first, processes)):
+        for (words, residual, off, refused), rtol in zip(runs, RTOLS, strict=True):
+            worst[rtol] = max(worst[rtol][0], residual), max(worst[rtol][1], off)
+            kinds[rtol] += refused
+            kinds[0.0] += not max(residual, off) <= BOUND and not refused
+            if refused or not max(residual, off) <= BOUND:
+                print(f"{words}\n    residual {residual:.3g}, loss off by {off:.3g}{', refused' * refused}", flush=True)
+        if i % 100 == 99:
+            print(f"... {i + 1} scenes: {dict(kinds)}", flush=True)
     for rtol, (residual, off) in worst.items():
         print(
             f"rtol {rtol:g}: {kinds[rtol]} of {count} refused, residual {residual:.3g}, loss off by {off:.3g} at most"

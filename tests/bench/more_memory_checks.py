@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from comparison import ALLOWED
 from drawn import Scene
-from random_scenes import ALLOWED
 
 import fembeam as fb
 from solvers import DormandPrince, Exponential, Newmark, System, integrate

@@ -71,10 +71,7 @@ def regularised(problem: Problem, setting: Setting) -> Run:
     from regularised import regularised as solve
 
     n = problem.n
-    return lambda start: (
-        problem.phi @ solve(problem.system, start[:n], start[n:], DURATION, **setting)[0],
-        None,
-    )
+    return lambda start: (problem.phi @ solve(problem.system, start[:n], start[n:], DURATION, **setting)[0], None)
 
 
 # --- interpreted drivers with compiled right-hand sides --------------------------------------------------------------

@@ -7,51 +7,35 @@ without and with friction, with a rotation or a spin, oblique stops with frictio
 beside them; it is free or under loads of every kind, from a start in the open, pressed, under way or at rest; see
 `drawn_friction`. Compared at rtol 1e-5 to 1e-11 are the motion, the logs of contacts and of friction, the transitions
 (which, when, at which ξ, ξ̇ and F_t), every line of the energy balance and what each element has taken, of runs with
-samples and without. What a difference is worth is told as in `random_scenes`. Runs in which the spring of friction in
+samples and without. What a difference is worth is told as in `comparison`. Runs in which the spring of friction in
 a circle is drawn by half a turn must be refused by both methods.
 """
 
 from __future__ import annotations
 
-import sys
-import warnings
-from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
 import numpy as np
+from comparison import (
+    Verdict,
+    against,
+    cut_after_contacts,
+    cut_after_transitions,
+    handled,
+    main,
+    numbers_of,
+    references,
+    rounding_of_surfaces,
+    significant,
+    strictly,
+)
 from drawn import Scene
 from drawn_friction import draw
 from drawn_memory import disturbed
-from random_scenes import (
-    COARSER,
-    REFERENCE,
-    TooStiffError,
-    Verdict,
-    against,
-    handled,
-    numbers_of,
-    report,
-    rounding_of_surfaces,
-    run,
-    significant,
-)
-from random_scenes import shortened as cut_after_contacts
-
-from solvers import DormandPrince, SolverError
 
 MOST_TRANSITIONS = 30
 HALF_A_TURN = "drawn by half a turn"  # of a spring of friction in a circle: runs are refused, by all methods
 TINY = 1e-300
-
-
-def shortened(scene: Scene, seed: int) -> Scene:
-    """The system cut after a few contacts, within one, or after so many transitions, between two."""
-    scene = cut_after_contacts(scene, seed)
-    times = run(scene, DormandPrince(1e-7)).transitions.t
-    times = np.unique(times[times > 0.0])
-    if len(times) > MOST_TRANSITIONS:
-        scene.duration = 0.5 * float(times[MOST_TRANSITIONS - 1] + times[MOST_TRANSITIONS])
-    return scene
 
 
 def units(scene: Scene, solution: Any) -> dict[str, Any]:
@@ -147,27 +131,16 @@ def of_transitions(found: dict[str, Any], solution: Any, scene: Scene, unit: dic
 
 def judge(seed: int) -> tuple[str, Verdict]:
     """Draw, run and compare."""
-    with warnings.catch_warnings(), np.errstate(over="ignore"):
-        warnings.simplefilter("error", RuntimeWarning)
+    with strictly():
         scene, rtol = draw(seed)
-        words, said = f"seed {seed}: {scene.words}", ""
-        try:
-            scene = shortened(scene, seed)
-            known = run(scene, REFERENCE), run(scene, COARSER)
-        except (TooStiffError, SolverError, ValueError) as error:
-            known, said = (None, None), str(error)
-        verdict = against(scene, *known, rtol, seed, numbers, disturbed)
-        if HALF_A_TURN in verdict.kind and HALF_A_TURN in said:
+        theirs, again, why = references(
+            scene, lambda scene: cut_after_transitions(cut_after_contacts(scene, seed), MOST_TRANSITIONS)
+        )
+        verdict = against(scene, theirs, again, rtol, seed, numbers, disturbed)
+        if HALF_A_TURN in verdict.kind and HALF_A_TURN in why:
             verdict.kind = "refused by both"
-        return words, verdict
-
-
-def main(count: int = 500, first: int = 0, processes: int = 2) -> int:
-    """Run and print; returns the number of failures."""
-    with ProcessPoolExecutor(processes) as pool:
-        found = pool.map(judge, range(first, first + count), chunksize=2)
-        return report(([verdict] for verdict in found), 100, f"{count} systems")
+        return f"seed {seed}: {scene.words}", verdict
 
 
 if __name__ == "__main__":
-    sys.exit(main(*(int(x) for x in sys.argv[1:])) > 0)
+    main(judge)

@@ -11,7 +11,7 @@ laws with memory, laws of a user's own, full matrices, and starts far beyond lim
 way, or with what another run has latched; see `drawn_wider`. Compared at rtol 1e-4 to 1e-10 are the motion, the log of
 contacts, the transitions (which, when, at which place and force, after which work and impulse), work, stored energy,
 loss, slip and impulse of every element and the energy balance. What a difference is worth is told as in
-`random_scenes`, with three bounds besides, of what the motion itself does not determine better:
+`comparison`, with three bounds besides, of what the motion itself does not determine better:
 
 - Where the motion is off by e, a border with the margin b is met at a time off by |∂b/∂(δ, δ̇)| e / |db/dt|. After the
   motion has decayed, or where it grazes a border, this is long: times are compared in units of it (`patience`).
@@ -32,52 +32,36 @@ steps of two lengths. See `more_memory_checks`.
 
 from __future__ import annotations
 
-import sys
-import warnings
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from itertools import product
 from typing import Any
 
 import numpy as np
+from comparison import (
+    ALLOWED,
+    COARSER,
+    REFERENCE,
+    Verdict,
+    against,
+    cut_after_transitions,
+    main,
+    numbers_of,
+    references,
+    run,
+    strictly,
+)
 from drawn import Scene
 from drawn_memory import disturbed, draw
 from memory_balance import Integrals, accounts, integrals, pace_of
 from more_memory_checks import more_checks
-from random_scenes import (
-    ALLOWED,
-    COARSER,
-    REFERENCE,
-    TooStiffError,
-    Verdict,
-    against,
-    numbers_of,
-    references,
-    report,
-    run,
-)
 
-from solvers import DormandPrince, Exponential, SolverError, integrate
+from solvers import Exponential, integrate
 
 MOST_TRANSITIONS = 40
 VALVES = ("throttled", "relieved upwards", "relieved downwards")
-BY_RATE = (
-    "stick",
-    "reversal",
-    "unload",
-    *VALVES,
-)  # events at a certain δ̇, most at zero; others at a δ or force
+BY_RATE = ("stick", "reversal", "unload", *VALVES)  # events at a certain δ̇, most at zero; others at a δ or force
 BETWEEN = 1e-5 / ALLOWED  # rtol of the reference between its steps
 WIDER = (1.5, 3.0, 6.0)  # a pair on one side of a bound in one run may be on the other side in the other, once
-
-
-def shortened(scene: Scene) -> Scene:
-    """The system cut after so many transitions, between two."""
-    times = run(scene, DormandPrince(1e-7)).transitions.t
-    times = np.unique(times[times > 0.0])
-    if len(times) > MOST_TRANSITIONS:
-        scene.duration = 0.5 * float(times[MOST_TRANSITIONS - 1] + times[MOST_TRANSITIONS])
-    return scene
 
 
 def reach(scene: Scene, motion: Any) -> Any:
@@ -273,15 +257,11 @@ def judged(scene: Scene, rtol: float, seed: int, known: Any) -> Verdict:
     return verdict
 
 
-def judge(seed: int) -> list[tuple[str, Verdict]]:
+def judge(seed: int) -> tuple[str, Verdict]:
     """Draw, run and compare."""
-    with warnings.catch_warnings(), np.errstate(over="ignore"):
-        warnings.simplefilter("error", RuntimeWarning)
+    with strictly():
         scene, rtol = draw(seed)
-        try:
-            known = references(shortened(scene))
-        except (TooStiffError, SolverError, ValueError):  # some damped modes cannot be separated, which is refused
-            known = None, None
+        known = references(scene, lambda scene: cut_after_transitions(scene, MOST_TRANSITIONS))[:2]
         verdict = judged(scene, rtol, seed, known)
         if verdict.kind in ("fine", "ill-conditioned") and known[0] is not None:
             size = reach(scene, known[0])
@@ -290,15 +270,8 @@ def judge(seed: int) -> list[tuple[str, Verdict]]:
             verdict.kind = "; ".join(wrong) or verdict.kind
         if verdict.kind == "fine":
             verdict.kind = more_checks(scene, rtol, seed, known[0]) or "fine"
-        return [(f"seed {seed}: {scene.words}", verdict)]
-
-
-def main(count: int = 500, first: int = 0, processes: int = 2) -> int:
-    """Run and print; returns the number of failures."""
-    with ProcessPoolExecutor(processes) as pool:
-        found = pool.map(judge, range(first, first + count), chunksize=2)
-        return report(found, 100, f"{count} systems")
+        return f"seed {seed}: {scene.words}", verdict
 
 
 if __name__ == "__main__":
-    sys.exit(main(*(int(x) for x in sys.argv[1:])) > 0)
+    main(judge)
