@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -76,8 +76,9 @@ def _tangent(directions: Vector, one: ContactRow) -> Vector:
     return np.asarray(directions[1])
 
 
+@dataclass(frozen=True, eq=False)
 class ModalEquations:
-    """A scene on n coordinates, as matrices, contacts and loads: what follows from the fields of `Model`."""
+    """A scene on n coordinates, as matrices, contacts and loads; the fields are told at `Model`."""
 
     scene: Scene
     matrices: Matrices
@@ -85,7 +86,7 @@ class ModalEquations:
     modes: tuple[int, ...]
     shapes: Any  # Shapes, of a body with places by name PlacedShapes
     counts: tuple[tuple[int, int], ...]
-    others: tuple[Any, ...]
+    others: tuple[Any, ...] = ()
 
     @property
     def omega(self) -> Vector:

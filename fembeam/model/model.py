@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-import reduction
 import solvers
 from fembeam.model import initial_states
 from fembeam.model.equations import ModalEquations
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
     from fembeam.model.rub import Rub
     from fembeam.model.run import Run
     from fembeam.response import FrequencyResponse
-    from fembeam.scene import Matrices, Scene
+    from fembeam.scene import Scene
 
 Field = Callable[[Vector], Any] | None  # of displacement in m or velocity in m/s, over z (k,)
 _MOVES = 0.1  # of the mode that moves a stop most: one that moves it so far does
@@ -74,13 +73,6 @@ class Model(Printed, ModalEquations):
         force; 1 is all.
     """
 
-    scene: Scene
-    matrices: Matrices
-    basis: reduction.Basis
-    modes: tuple[int, ...]
-    shapes: Any  # Shapes, of a body with places by name PlacedShapes
-    counts: tuple[tuple[int, int], ...]
-    others: tuple[Any, ...] = ()
     reduction_options: dict[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
