@@ -9,11 +9,14 @@ from problems import PAPER_BEAM, TIP
 from scipy.integrate import solve_ivp
 from scipy.interpolate import BPoly
 from scipy.linalg import block_diag
+from scipy.special import roots_jacobi
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic
 from solvers import Contact, Exponential, SolverError, System, integrate, integrate_many
+from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy import flight_tables
+from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES, contact_table
 from solvers.integration import prepared_run
 
 FREE = [Contact([1.0, 1.0, 1.0, 0.5], Hertz(1e6), gap=1e9)]
@@ -365,3 +368,34 @@ def test_copies_of_a_structure_take_as_many_times_its_energy(tones_only):
         found, expected = getattr(many.energy, name), COPIES * getattr(one.energy, name)
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11 * size, err_msg=name)
     assert np.abs(many.energy.residual).max() < 1e-9 * np.abs(many.energy.input).max()
+
+
+@pytest.mark.parametrize(
+    ("power", "lead", "k", "c"),
+    [(1.0, 0.0, 900.0, 0.6), (2.0, 3.0, 0.0, 0.0), (2.0, 3.0, 30.0, 40.0), (4.0, 1.0, 4.0, 4.0)],
+)
+def test_tables_of_contact_steps_are_their_quadrature(power, lead, k, c):
+    """∫ L_i v dt and ∫ v² dt of a block under forces given at the nodes, all of one integration of the equation."""
+    nodes = 0.5 * (1.0 + roots_jacobi(S, 0.0, lead + power - 1.0)[0])
+    arrays = [np.array(values).tobytes() for values in ([k], [c], [0.7])]
+    table = contact_table(*arrays, power, lead, nodes.tobytes())[0, 0]
+    rng = np.random.default_rng(2)
+    start, forces = [0.3, -1.0], rng.standard_normal(S)
+    entering = rng.standard_normal(S) if lead else np.zeros(S)
+
+    def lagrange(sigma):
+        return np.array([np.prod([(sigma - b) / (a - b) for b in nodes if b != a]) for a in nodes])
+
+    def rate(sigma, z):
+        basis, pace = lagrange(sigma), 0.7 * power * sigma ** (power - 1.0)
+        weighted = (sigma / nodes) ** lead if lead else np.zeros(S)
+        force = basis @ forces + (basis * weighted) @ entering
+        v = z[1]
+        return pace * np.concatenate(([v, force - k * z[0] - c * v, v * v], basis * v))
+
+    exact = solve_ivp(rate, (0.0, 1.0), [*start, *np.zeros(1 + S)], "DOP853", rtol=3e-14, atol=1e-14).y[2:, -1]
+    sums = np.concatenate((forces, start)) @ table[:BEGAN] + entering @ table[ENTERING:SQUARES]
+    squares = sums[S:] @ forces + table[BEGAN, :3] @ [start[0] ** 2, start[0] * start[1], start[1] ** 2]
+    squares += np.concatenate((entering, start)) @ table[SQUARES:, :S] @ entering
+    np.testing.assert_allclose(sums[:S], exact[1:], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(squares, exact[0], rtol=1e-12)
