@@ -364,7 +364,8 @@ class _Run:
         """The event list; contacts under way end last, at no time."""
         state = self.engine.state
         logged, segments = state.log[: state.count[LOGGED]].copy(), state.segment.tolist()
-        self._count_held(logged)
+        if len(self.engine.problem.friction):
+            self._count_held(logged)
         if not any(segments):
             return logged
         under_way = [s for s, segment in enumerate(segments) if segment > 0]
