@@ -36,11 +36,11 @@ def test_a_mass_from_the_centre_by_the_clearance():
     np.testing.assert_allclose(found.states[-1], [*(2.0 * DIAGONAL), 0.0, 0.0], atol=1e-8)
 
 
-def test_slip_throughout_by_the_coefficient():
-    """Off an elastic wall the speed along it becomes v_t - 2 μ v_n: its derivative is -2 v_n."""
-    system = wall()
-    nearby = Nearby.of(lambda mu: changed(system, CHANGES["mu"], mu - 0.25), 0.25, 1e-3)
-    found = sensitivity(system, [-1e-3, 0.0], [0.8, 1.5], 0.004, [0.004], nearby, method=FINE)
+@pytest.mark.parametrize("mu", [0.25, 0.0])
+def test_slip_throughout_by_the_coefficient(mu):
+    """Off an elastic wall the speed along it becomes v_t - 2 μ v_n: its derivative is -2 v_n, also where μ begins."""
+    nearby = Nearby.of(lambda value: wall(mu=value), mu, 1e-3)
+    found = sensitivity(wall(mu=mu), [-1e-3, 0.0], [0.8, 1.5], 0.004, [0.004], nearby, method=FINE)
     np.testing.assert_allclose(found.states[-1][2:], [0.0, -1.6], atol=1e-9)
 
 

@@ -110,8 +110,16 @@ class Slider:
 
     def friction_by_normal(self, normal: Array) -> Array:
         """∂F_t/∂N (k,): ±μ in slip, else 0."""
-        code = 0.0 if self.free else self.numbers[CODE]
-        return np.where(normal > 0.0, code * self.numbers[MU], 0.0)
+        return np.where(normal > 0.0, self._side * self.numbers[MU], 0.0)
+
+    def friction_by_mu(self, normal: Array) -> Array:
+        """∂F_t/∂μ (k,): ±N in slip, also of μ = 0, else 0."""
+        return self._side * np.maximum(normal, 0.0)
+
+    @property
+    def _side(self) -> float:
+        """The way of slip, 0 in stick and where the slider is free."""
+        return 0.0 if self.free else float(self.numbers[CODE])
 
     def stretch(self, xi: Array) -> Array:
         """ξ - s (k,), in a circle to the nearest turn."""

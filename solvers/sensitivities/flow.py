@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from solvers.problem import Array, System, dense
-from solvers.problem.friction import MU, SLIDER, STIFFNESS
+from solvers.problem.friction import SLIDER, STIFFNESS
 from solvers.sensitivities import laws
 from solvers.sensitivities.elements import (
     ElementMotion,
@@ -187,10 +187,7 @@ class Flow:
         stiffness = slider.numbers[STIFFNESS] if slider.sticks else 0.0
         found.other[...] -= stiffness * motion.xi_slopes[..., None] * self.latched[s][1]
         one, contact = self.by.elements[s], self.system.contacts[s]
-        changed = np.outer(
-            slider.friction_by_normal(normal) * normal,
-            one.mu / slider.numbers[MU] if slider.numbers[MU] else 0.0 * one.mu,
-        )
+        changed = np.outer(slider.friction_by_mu(normal), one.mu)
         if slider.sticks:
             changed = np.outer(stretch, one.stiffness) + stiffness * np.outer(
                 np.broadcast_to(t, stretch.shape), one.surface
