@@ -23,8 +23,11 @@ from solvers import (
     integrate_many,
     orbit,
 )
+from solvers.compiled.decorators import kernel
+from solvers.compiled.friction import angle_at, latch_angle
 
 SHARP = DormandPrince(1e-12)
+TILTS = np.linspace(0.02, 0.9, 12)
 METHODS = [SHARP, Exponential(1e-12)]
 NAMES = ["dormand", "exponential"]
 EYE = np.eye(3)
@@ -550,6 +553,32 @@ def test_many_starts_are_single_runs_bit_for_bit():
         one = integrate(system, [-1e-3, 0.0], speed, 0.006)
         assert many.q[i].tolist() == one.q[-1].tolist()
         assert many.q_dot[i].tolist() == one.q_dot[-1].tolist()
+
+
+def test_a_border_takes_few_law_values():
+    """140 more than the contact without friction: a step that crosses it, a landing, the step after it."""
+    runs = [integrate(wall(Hertz(1e7), mu, 8e6), [-1e-3, 0.0], [0.8, v], 0.006) for mu in (0.0, 0.4) for v in TILTS]
+    without, rubs = runs[: len(TILTS)], runs[len(TILTS) :]
+    borders = sum(len(run.transitions.t) for run in rubs)
+    assert borders > 2 * len(rubs)
+    assert sum(run.cost.law_calls for run in rubs) < sum(run.cost.law_calls for run in without) + 155 * borders
+
+
+@kernel
+def latched_angle(slider, along, across, u, w):
+    """Angle of (u, w), measured from another direction."""
+    latch_angle(slider, along, across)
+    return angle_at(slider, u, w)
+
+
+def test_angles_from_a_latched_direction_are_those_of_the_arctangent():
+    """Near it by a series, else by the arctangent, both to rounding, up to whole turns."""
+    rng, slider = np.random.default_rng(1), np.zeros(19)
+    for near in (1e-9, 1e-3, 0.09, 0.11, 3.0):
+        for at, off in zip(rng.uniform(-np.pi, np.pi, 50), near * rng.uniform(-1.0, 1.0, 50), strict=True):
+            u, w = 0.7 * np.cos(at + off), 0.7 * np.sin(at + off)
+            found = latched_angle(slider, 0.3 * np.cos(at), 0.3 * np.sin(at), u, w) - np.arctan2(w, u)
+            assert abs(np.remainder(found + np.pi, 2.0 * np.pi) - np.pi) < 2e-15
 
 
 @every_method

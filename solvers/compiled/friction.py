@@ -6,7 +6,8 @@ place to the centre and, where there is a third, -|R| φ, which is ``turned`` wi
 
     ξ = c θ + R (φ + Ω t),   ξ̇ = c (u × u̇)/r² + R (φ̇ + Ω),   forces F_t (c/r) (-u_y, u_x)/r and, on |R| φ, -F_t R/|R|
 
-The angle θ is known up to whole turns. The spring of a slider that sticks stretches by far less than half a turn, so
+The angle θ is known up to whole turns. It is that from a direction near the place, latched at entry, to which a series
+is quicker than the arctangent. The spring of a slider that sticks stretches by far less than half a turn, so
 that ξ - s is taken at the nearest turn.
 """
 
@@ -15,9 +16,35 @@ from __future__ import annotations
 import math
 
 from solvers.compiled.decorators import inlined
-from solvers.problem.friction import ARM, CODE, FREE, MU, SLIDER, SPIN, STIFFNESS
+from solvers.problem.friction import ACROSS, ALONG, ANGLE, ARM, CODE, FREE, MU, SLIDER, SPIN, STIFFNESS
 
 TURN = 2.0 * math.pi
+SMALL_ANGLE = 0.1  # tangent up to which the series of the arctangent to the fifteenth power is exact to rounding
+
+
+@inlined
+def angle_between(product, along):
+    """Angle, rad, between two vectors from their products, the crossed one and the scalar one."""
+    tangent = product / along
+    if not (along > 0.0 and abs(tangent) <= SMALL_ANGLE):
+        return math.atan2(product, along)
+    square, total = tangent * tangent, 0.0
+    for odd in (15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0):
+        total = square * (1.0 / odd - total)
+    return tangent - tangent * total
+
+
+@inlined
+def angle_at(slider, u, w):
+    """Angle θ, rad, of the vector (u, w)."""
+    along, across = slider[ALONG], slider[ACROSS]
+    return slider[ANGLE] + angle_between(along * w - across * u, along * u + across * w)
+
+
+@inlined
+def latch_angle(slider, u, w):
+    """Latch a direction (u, w), from which angles of others near it are measured."""
+    slider[ALONG], slider[ACROSS], slider[ANGLE] = u, w, math.atan2(w, u)
 
 
 @inlined
@@ -25,7 +52,9 @@ def xi_of(radius, slider, t, u, w, turned):
     """ξ, m, from the displacements u, w of the first two rows, and of the third with its sign changed, ``turned``."""
     if radius == 0.0:
         return -w
-    return abs(radius) * math.atan2(w, u) + math.copysign(1.0, slider[ARM]) * turned + slider[ARM] * slider[SPIN] * t
+    return (
+        abs(radius) * angle_at(slider, u, w) + math.copysign(1.0, slider[ARM]) * turned + slider[ARM] * slider[SPIN] * t
+    )
 
 
 @inlined

@@ -36,6 +36,7 @@ from solvers.compiled.friction import friction_force, slip_sign, xi_and_rate_of,
 from solvers.compiled.packed import PackedType
 from solvers.compiled.parts import RADIAL_ACCELERATION, RADIAL_MOTION, RADIAL_PUSH, part
 from solvers.compiled.shortcuts import known_by_type
+from solvers.compiled.simd import WIDTH, load8, splat8, store8
 from solvers.problem.friction import ACCOUNTS, ARM, CODE
 
 
@@ -477,23 +478,30 @@ def add_friction(problem, s, t, rows, normal, rate):
     rate[account], rate[account + 1], rate[account + 2] = force * xi_rate, force, slip_sign(slider) * xi_rate
 
 
-@inner
+@inlined
+def _add_rows(rate, first, first_force, second, second_force, size):
+    """Add two rows of numbers, each times a force, to the state's rate."""
+    one, two, whole = splat8(first_force), splat8(second_force), size - size % WIDTH
+    for i in range(0, whole, WIDTH):
+        store8(rate, i, load8(rate, i) + one * load8(first, i) + two * load8(second, i))
+    for i in range(whole, size):
+        rate[i] += first_force * first[i] + second_force * second[i]
+
+
+@inlined
 def _add_to_rows(problem, s, u, w, normal, tangential, rate):
     """Add N and F_t of a stop with friction, whose first two rows are at u and w, to the state's rate."""
     first, size, radius = row_of(problem, s), 2 * problem.k.size, radius_of(problem, s)
-    if radius == 0.0:
-        for i in range(size):
-            rate[i] += problem.push[first, i] * normal - problem.push[first + 1, i] * tangential
-        return
-    square = u * u + w * w
-    share_t, share_n = tangential * abs(radius) / square, math.copysign(normal, normal * radius) / math.sqrt(square)
-    first_force, second_force = share_n * u - share_t * w, share_n * w + share_t * u
-    for i in range(size):
-        rate[i] += problem.push[first, i] * first_force + problem.push[first + 1, i] * second_force
-    if first + 2 < row_of(problem, s + 1):
+    push, first_force, second_force = problem.push, normal, -tangential
+    if radius != 0.0:
+        square = u * u + w * w
+        share_t, share_n = tangential * abs(radius) / square, math.copysign(normal, normal * radius) / math.sqrt(square)
+        first_force, second_force = share_n * u - share_t * w, share_n * w + share_t * u
+    _add_rows(rate, push[first], first_force, push[first + 1], second_force, size)
+    if radius != 0.0 and first + 2 < row_of(problem, s + 1):
         third_force = math.copysign(1.0, slider_of(problem, s)[ARM]) * tangential
         for i in range(size):
-            rate[i] -= problem.push[first + 2, i] * third_force
+            rate[i] -= push[first + 2, i] * third_force
 
 
 @inner

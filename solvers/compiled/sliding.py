@@ -19,6 +19,7 @@ import math
 from solvers.compiled.friction import (
     TURN,
     friction_force,
+    latch_angle,
     spring_stretch,
     xi_acceleration_of,
     xi_of,
@@ -212,6 +213,9 @@ def begin_slider(problem, s, t, x, entry_rate, under_way):
     A contact ``under_way`` as the run begins sticks or is free.
     """
     slider, growth = slider_of(problem, s), math.inf
+    if is_circle(problem, s):
+        u, _, w, _, _, _ = rows_at(problem, s, x)
+        latch_angle(slider, u, w)
     (xi, xi_rate), rate = xi_and_rate_at(problem, s, t, x), indentation_rate(problem, s, x)
     slider[PEAK] = 0.0
     normal = normal_force(problem, s, 1, entry_rate, indentation(problem, s, x) if under_way else 0.0, rate)

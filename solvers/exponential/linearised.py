@@ -259,7 +259,7 @@ def _land(problem, ahead, behind, tables, past, scratch, derivatives, variation,
     _update_sides(problem, tables, past, scratch, past.x)
     while True:
         landing_step(
-            *(problem, tables, False, False, variable, stop, span, w, past.segment, past.entry_rate),
+            *(problem, tables, False, np.int64(STAGES), variable, stop, span, w, past.segment, past.entry_rate),
             *(scratch.unresolved, scratch.stages),
         )
         if not _update_sides(problem, tables, past, scratch, scratch.stages[LANDED]):

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from solvers.problem.matrices import Array, number
 
-(MU, STIFFNESS, ARM, SPIN, CODE, SLIDER, PEAK, BEGUN, CUT, SCRATCH) = range(10)
+(MU, STIFFNESS, ARM, SPIN, CODE, SLIDER, PEAK, BEGUN, CUT, ALONG, ACROSS, ANGLE, SCRATCH) = range(13)
 """Places of a contact's friction behind its law's parameters: μ; k_t, N/m; R, m, negative where the place runs around a
 post; Ω, rad/s; code of the segment; s, m; largest |F_t| of the contact under way and F_t as the run began, N; place of
-the law's switch that cuts N at zero, or -1."""
-SIZE = 16  # the rest is scratch
+the law's switch that cuts N at zero, or -1; a direction in the circle and its angle, rad, near the place."""
+SIZE = 19  # the rest is scratch
 ACCOUNTS = 3  # numbers in the state behind the energy balance: ∫F_t ξ̇ dt, ∫F_t dt, and the way of the slider
 STICK, FREE = 0.0, 2.0  # codes; those of slip are -1 and 1, FREE is that of a contact that is open, or pulls
 SLIDES, PRESSES = range(2)  # borders: the slider's own, and N = 0, where slip ends
@@ -112,7 +112,7 @@ class Rubbing:
         numbers[: own.size] = own
         known = self.friction.mu, self.friction.stiffness, self.arm, self.spin, FREE
         numbers[self.place : self.place + SLIDER] = known
-        numbers[self.place + CUT] = self._switch(own)
+        numbers[self.place + CUT], numbers[self.place + ALONG] = self._switch(own), 1.0
         return numbers
 
     def _switch(self, own: Array) -> int:

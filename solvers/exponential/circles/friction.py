@@ -14,7 +14,16 @@ import math
 
 from numba import types
 
-from solvers.compiled.friction import TURN, slip_sign, spring_stretch, xi_of, xi_rate_of
+from solvers.compiled.friction import (
+    SMALL_ANGLE,
+    TURN,
+    angle_at,
+    angle_between,
+    slip_sign,
+    spring_stretch,
+    xi_of,
+    xi_rate_of,
+)
 from solvers.compiled.kernels import (
     REAL,
     copy,
@@ -35,11 +44,10 @@ from solvers.compiled.sums import above, combine
 from solvers.exponential.circles.contact import radial_forces, work_in_circle
 from solvers.exponential.contact.many_stops import pair_response
 from solvers.exponential.contact.nodes import S
-from solvers.problem.friction import ARM, CODE, MU, SPIN, STIFFNESS
+from solvers.problem.friction import ACROSS, ALONG, ANGLE, ARM, CODE, MU, SPIN, STIFFNESS
 
 NODE_XI, NODE_XI_RATE, TANGENTIAL, SPARE = range(4)  # rows of `Scratch.slid`: ξ, ξ̇ and F_t at the nodes, scratch
 _TINY = 1e-300  # m²
-_SMALL = 0.1  # tangent up to which the series of the arctangent to the fifteenth power is exact to rounding
 _BRIEF = 1.0  # radians of the fastest block up to which nodes resolve rates
 
 
@@ -47,18 +55,6 @@ _BRIEF = 1.0  # radians of the fastest block up to which nodes resolve rates
 def count_of(problem, s):
     """Number of rows of an element."""
     return row_of(problem, s + 1) - row_of(problem, s)
-
-
-@inlined
-def _angle_between(product, along):
-    """Angle, rad, between two vectors from their products, the crossed one and the scalar one."""
-    tangent = product / along
-    if not (along > 0.0 and abs(tangent) <= _SMALL):
-        return math.atan2(product, along)
-    square, total = tangent * tangent, 0.0
-    for odd in (15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0):  # as `_small_arctangents`
-        total = square * (1.0 / odd - total)
-    return tangent - tangent * total
 
 
 @inlined
@@ -86,7 +82,7 @@ def xi_continued(problem, scratch, s, t, x, i):
     u_i, w_i = scratch.motion[first, 0, i], scratch.motion[first + 1, 0, i]
     turned_at_node = -scratch.motion[first + 2, 0, i] if count_of(problem, s) > 2 else 0.0
     rotation = surface_part(slider, t, turned) - surface_part(slider, scratch.node_time[i], turned_at_node)
-    angle = _angle_between(u_i * w - w_i * u, u_i * u + w_i * w)
+    angle = angle_between(u_i * w - w_i * u, u_i * u + w_i * w)
     return scratch.slid[s, NODE_XI, i] + abs(radius_of(problem, s)) * angle + rotation
 
 
@@ -103,7 +99,7 @@ def xi_and_rate_at_nodes(problem, scratch, s):
 
 @inlined
 def _small_arctangents(tangent):
-    """Arctangents of eight numbers up to `_SMALL` by their series, to rounding."""
+    """Arctangents of eight numbers up to `SMALL_ANGLE` by their series, to rounding."""
     square, total = tangent * tangent, splat8(-1.0 / 15.0)
     total = splat8(1.0 / 13.0) + square * total
     total = splat8(-1.0 / 11.0) + square * total
@@ -115,16 +111,16 @@ def _small_arctangents(tangent):
 
 
 @inlined
-def _xi_by_small_angles(problem, scratch, s):
-    """Write ξ at the nodes of a circle by angles from the first node, if these are small; returns whether they are."""
+def _xi_by_small_angles(problem, scratch, s, u_0, w_0, angle):
+    """Write ξ at the nodes of a circle by the angles from a direction, if these are small; returns whether they are."""
     first, slider, out = row_of(problem, s), slider_of(problem, s), scratch.slid[s, NODE_XI]
     x, y = scratch.motion[first, 0], scratch.motion[first + 1, 0]
-    u, w, u_0, w_0 = load8(x, 0), load8(y, 0), splat8(x[0]), splat8(y[0])
-    along = u_0 * u + w_0 * w
-    tangent = (u_0 * w - w_0 * u) / along
-    if not (largest8(size8(tangent)) <= _SMALL and least8(along) > 0.0):
+    u, w = load8(x, 0), load8(y, 0)
+    along = splat8(u_0) * u + splat8(w_0) * w
+    tangent = (splat8(u_0) * w - splat8(w_0) * u) / along
+    if not (largest8(size8(tangent)) <= SMALL_ANGLE and least8(along) > 0.0):
         return False
-    xi = splat8(abs(radius_of(problem, s))) * (splat8(math.atan2(y[0], x[0])) + _small_arctangents(tangent))
+    xi = splat8(abs(radius_of(problem, s))) * (splat8(angle) + _small_arctangents(tangent))
     xi = xi + splat8(slider[ARM] * slider[SPIN]) * load8(scratch.node_time, 0)
     if count_of(problem, s) > 2:
         xi = xi - splat8(math.copysign(1.0, slider[ARM])) * load8(scratch.motion[first + 2, 0], 0)
@@ -134,11 +130,14 @@ def _xi_by_small_angles(problem, scratch, s):
 
 @inlined
 def _xi_at_nodes(problem, scratch, s):
-    """ξ at the nodes; mostly one arctangent is enough for all of them."""
-    if is_circle(problem, s) and _xi_by_small_angles(problem, scratch, s):
-        return
+    """ξ at the nodes, by the latched direction if it is near, else by that of the first node."""
     first, slider, radius = row_of(problem, s), slider_of(problem, s), radius_of(problem, s)
     u, w, out = scratch.motion[first, 0], scratch.motion[first + 1, 0], scratch.slid[s, NODE_XI]
+    if is_circle(problem, s):
+        if _xi_by_small_angles(problem, scratch, s, slider[ALONG], slider[ACROSS], slider[ANGLE]):
+            return
+        if _xi_by_small_angles(problem, scratch, s, u[0], w[0], angle_at(slider, u[0], w[0])):
+            return
     third, rotation_before = count_of(problem, s) > 2, 0.0
     for i in range(S):
         turned = -scratch.motion[first + 2, 0, i] if third else 0.0

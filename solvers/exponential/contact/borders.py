@@ -52,6 +52,7 @@ _MISSED = 1e-5  # the most, in units of its largest, by which a margin may be ne
 _SHORTLY = 1e-3  # part of a step or landing over which a margin is extrapolated by the rates at its end
 _FIRST_SHARE, _SHORTER, _MOST_SHARES = 0.1, 1e-2, 6  # shares of the time to the first node: first, ratio, number
 _LONGER = 8.0  # factor of the time of extrapolation until it is clear whether a margin rises
+_ROOT_FOUND = 1e-6  # value of the polynomial, in units of the largest margin, that ends the search for its root
 _MOST_ILLINOIS = 6  # iterations for a root of the polynomial through the nodes
 _REST = 1e-14  # rate, in units of the reference speed, below which a rate at rest is rounding
 _WATCHED_BELOW = 0.2  # margin at a node, in units of the largest, below which the motion around the node is evaluated
@@ -196,14 +197,16 @@ def _root_before_node(tables, scratch, s, j, node_set, h, i, linear):
     """
     left = tables.nodes[node_set, i - 1] if i > 0 else 0.0
     right = tables.nodes[node_set, i] if i < S else 1.0
-    above = _polynomial(tables, scratch, s, j, node_set, left)
-    below = _polynomial(tables, scratch, s, j, node_set, right)
+    above = scratch.margin[S * j + i - 1] if i > 0 else _polynomial(tables, scratch, s, j, node_set, left)
+    below = scratch.margin[S * j + i] if i < S else _polynomial(tables, scratch, s, j, node_set, right)
     if not below < 0.0 < above:
         return linear
     middle, last = right, 0.0
     for _ in range(_MOST_ILLINOIS):
         middle = right - (right - left) * below / (below - above)
         value = _polynomial(tables, scratch, s, j, node_set, middle)
+        if abs(value) <= _ROOT_FOUND * scratch.largest[s, j]:
+            break
         if value > 0.0:
             left, above, below = middle, value, below * (0.5 if last > 0.0 else 1.0)
         else:
@@ -337,17 +340,15 @@ def _may_dip(problem, state, scratch, s, landed, w, x):
 
     It is estimated by the cubic through both values and rates, which is coarse: a minimum near zero counts.
     """
-    count, width, values = problem.border_count[s], state.x.size, scratch.ends
-    d = x[width] - w[width]
-    for end in range(2):
-        y, time = x if end else w, _SHORTLY * (-d if end else d)
-        margins_of(problem, state, scratch, s, y[width], y, values[2 * end * count :])
-        margins_later(problem, state, scratch, s, y[width], y, time, values[(2 * end + 1) * count :])
+    count, width = problem.border_count[s], state.x.size
+    d, begin, end = x[width] - w[width], scratch.margin_begin[s], scratch.margin_end[s]
+    after, before = scratch.ends[:count], scratch.ends[count : 2 * count]
+    margins_later(problem, state, scratch, s, w[width], w, _SHORTLY * d, after)
+    margins_later(problem, state, scratch, s, x[width], x, -_SHORTLY * d, before)
     for j in range(count):
-        a, b = values[j], values[2 * count + j]
-        fall, rise = (values[count + j] - a) / (_SHORTLY * d), (b - values[3 * count + j]) / (_SHORTLY * d)
+        fall, rise = (after[j] - begin[j]) / (_SHORTLY * d), (end[j] - before[j]) / (_SHORTLY * d)
         known = j != landed and scratch.largest[s, j] > scratch.noise[s, j]
-        if known and fall < 0.0 < rise and extremum(d, a, fall, b, rise) < _CLEAR * scratch.largest[s, j]:
+        if known and fall < 0.0 < rise and extremum(d, begin[j], fall, end[j], rise) < _CLEAR * scratch.largest[s, j]:
             return True
     return False
 
@@ -357,24 +358,27 @@ def passed(problem, state, scratch, element, border, w, x):
     """(element, border) of the margin that is furthest below zero in x, relative to its value in w, or (-1, -1).
 
     Left out are the border that is landed on, and margins negative by rounding only. (`UNRESOLVED`, -1) is returned if
-    a margin may have been negative in between, or is so in w: then its border is crossed before any step.
+    a margin may have been negative in between, or is so in w: then its border is crossed before any step. The margins
+    in w and x go to ``scratch.margin_begin`` and ``scratch.margin_end``; those of an
+    ``element`` whose border is landed on are there already.
     """
     worst, found, number, may_dip = -_TOGETHER, -1, -1, False
     for s in range(problem.law.size):
-        count, size = problem.border_count[s], state.x.size
+        count, size, begin, end = problem.border_count[s], state.x.size, scratch.margin_begin[s], scratch.margin_end[s]
         if _has_no_borders(problem, state, s) or (s == element and count == 1):
             continue
-        margins_of(problem, state, scratch, s, w[size], w, scratch.ends)
-        margins_of(problem, state, scratch, s, x[size], x, scratch.margin)
+        if s != element or border < 0:
+            margins_of(problem, state, scratch, s, w[size], w, begin)
+            margins_of(problem, state, scratch, s, x[size], x, end)
         close = False
         for j in range(count):
             if s == element and j == border:
                 continue
-            close |= min(scratch.ends[j], scratch.margin[j]) < _CHECKED_BELOW * scratch.largest[s, j]
-            may_dip |= scratch.ends[j] < -max(scratch.noise[s, j], _MISSED * scratch.largest[s, j])
-            if scratch.margin[j] >= -scratch.noise[s, j]:
+            close |= min(begin[j], end[j]) < _CHECKED_BELOW * scratch.largest[s, j]
+            may_dip |= begin[j] < -max(scratch.noise[s, j], _MISSED * scratch.largest[s, j])
+            if end[j] >= -scratch.noise[s, j]:
                 continue
-            share = scratch.margin[j] / max(scratch.ends[j], scratch.noise[s, j])
+            share = end[j] / max(begin[j], scratch.noise[s, j])
             if share < worst:
                 worst, found, number = share, s, j
         may_dip |= close and _may_dip(problem, state, scratch, s, border if s == element else -1, w, x)
@@ -383,15 +387,15 @@ def passed(problem, state, scratch, element, border, w, x):
 
 @inlined
 def _update_rate(problem, state, scratch, s):
-    """Update ``state.rate`` where renewal needs it: a slider that sticks at rest begins to slip by its acceleration."""
-    if rubs(problem, s) and slider_of(problem, s)[CODE] == 0.0:
+    """Update ``state.rate`` where renewal needs it: slip from rest begins by ξ̈, and what was free by Ṅ."""
+    if rubs(problem, s) and abs(slider_of(problem, s)[CODE]) != 1.0:
         rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, scratch.trial)
 
 
 @inner
 def renew_border(problem, state, scratch, element, border):
     """Latch in the present state what one border of an element asks for."""
-    delta, rate = margins_of(problem, state, scratch, element, state.now[T], state.x, scratch.margin)
+    delta, rate = indentation_and_rate(problem, element, state.x)
     _update_rate(problem, state, scratch, element)
     renew(problem, state, element, border, delta, rate)
     count_event(state)
@@ -401,34 +405,32 @@ def renew_border(problem, state, scratch, element, border):
 def renew_all(problem, state, scratch, element, border):
     """Latch in the present state what the border landed on, and all borders reached together with it, ask for.
 
-    Reached are those whose margins were positive in ``scratch.stages[START]``, or shortly before the end, and are zero
+    Reached are those whose margins were positive at the start of the landing, or shortly before its end, and are zero
     now. This is judged by the state before anything is latched. After each renewal the margins of the same law are
     evaluated again: another border of its old segment may not exist in the new one.
     """
-    size = state.x.size
-    delta, rate = margins_of(problem, state, scratch, element, state.now[T], state.x, scratch.margin)
-    missed = 2.0 * abs(scratch.margin[border]) / scratch.largest[element, border]
-    time = _SHORTLY * (state.now[T] - scratch.stages[START, size])
+    missed = 2.0 * abs(scratch.margin_end[element, border]) / scratch.largest[element, border]
+    time, x = _SHORTLY * (state.now[T] - scratch.stages[START, state.x.size]), state.x
     for s in range(problem.law.size):
         count = problem.border_count[s]
         if _has_no_borders(problem, state, s):
             continue
+        delta, rate = indentation_and_rate(problem, s, x)
         _update_rate(problem, state, scratch, s)
         if s == element and count == 1:
             renew(problem, state, s, border, delta, rate)
             continue
-        begun, just_before = scratch.ends[:count], scratch.ends[count : 2 * count]
-        margins_of(problem, state, scratch, s, scratch.stages[START, size], scratch.stages[START], begun)
-        margins_later(problem, state, scratch, s, state.now[T], state.x, -time, just_before)
-        depth, speed = margins_of(problem, state, scratch, s, state.now[T], state.x, scratch.margin)
+        begun, just_before, margin = scratch.margin_begin[s], scratch.margin_before, scratch.margin_end[s]
+        if s != element:
+            margins_later(problem, state, scratch, s, state.now[T], x, -time, just_before)
         for j in range(count):
             before, rounding = max(begun[j], just_before[j]), max(scratch.noise[s, j], missed * scratch.largest[s, j])
             rounding = max(rounding, _TOGETHER * before)
-            landed = (s == element and j == border) or (before > rounding and scratch.margin[j] <= rounding)
-            scratch.fired[j] = max(rounding, scratch.margin[j]) if landed else -np.inf
+            landed = (s == element and j == border) or (before > rounding and margin[j] <= rounding)
+            scratch.fired[j] = max(rounding, margin[j]) if landed else -np.inf
         for j in range(count):
-            if scratch.fired[j] >= scratch.margin[j]:
-                renew(problem, state, s, j, depth, speed)
+            if scratch.fired[j] >= margin[j]:
+                renew(problem, state, s, j, delta, rate)
                 if not rubs(problem, s):
-                    margins_of(problem, state, scratch, s, state.now[T], state.x, scratch.margin)
+                    margins_of(problem, state, scratch, s, state.now[T], x, margin)
     count_event(state)

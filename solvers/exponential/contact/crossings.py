@@ -25,6 +25,7 @@ from solvers.compiled.kernels import (
     copy,
     dot,
     indentation,
+    indentation_and_rate,
     indentation_rate,
     inlined,
     inner,
@@ -179,10 +180,9 @@ def leaves_segment(problem, tables, state, scratch, node_set, level):
         else:
             lower = problem.knots[s, segment - 1]
         motion = motion_of(problem, scratch, s)
-        delta, within = indentation(problem, s, scratch.x_new), load8(motion[0], 0)
+        (delta, end), within = indentation_and_rate(problem, s, scratch.x_new), load8(motion[0], 0)
         lowest, highest = min(delta, least8(within)), max(delta, largest8(within))
-        begin, end = scratch.start_motion[s, 1], indentation_rate(problem, s, scratch.x_new)
-        sign_changes = _rate_changes_sign(motion[1], begin, end, segment > 0, upper < np.inf)
+        sign_changes = _rate_changes_sign(motion[1], scratch.start_motion[s, 1], end, segment > 0, upper < np.inf)
         if not sign_changes and lower <= lowest and highest + ripple <= upper:
             continue
         tolerance = 8.0 * surface_tolerance(problem, s, state.x)

@@ -91,7 +91,7 @@ def _first_step(problem, tables, state, scratch, stop):
     duration = _contact_time(problem, tables, scratch, stop, max(speed, 1e-3 * scratch.reference_speed[stop]))
     if scratch.first_step_share[stop] == 0.0:
         scratch.first_step_share[stop] = min(0.1, 4.0 / (tables.fastest * duration))
-    scratch.duration[0] = duration
+    scratch.duration[stop] = duration
     return level_of(tables, scratch.first_step_share[stop] * duration)
 
 

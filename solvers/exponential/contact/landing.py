@@ -10,8 +10,8 @@ It is a step of DOP853 with t among the unknowns. The independent variable is on
 with κ as at entry. The first two know the length of the step beforehand. The others iterate for a zero of the *event
 function* of a bend or border (`_event_function`); forces are continuous there. A border of friction just before δ = 0
 is located in the variable of `ROOT` too. The polynomial through the nodes of the step tried before gives the time to
-about 1e-5 of its length; the correction is one step of the midpoint rule, so that most landings take one Runge–Kutta
-step.
+about 1e-5 of its length; the correction is a short step of the midpoint rule or the classical one, so that most
+landings take one step of DOP853.
 
 The unknowns are [p, v, energy balance, t, u]. A landing lasts at most `landing_reach` radians of the fastest block, up
 to which DOP853 is exact to the tolerance for every block. The error by the forces is estimated by a tenth of the
@@ -49,7 +49,7 @@ from solvers.compiled.kernels import (
     slider_of,
 )
 from solvers.compiled.parts import PASSED
-from solvers.compiled.sliding import XI, slider_force, xi_tolerances
+from solvers.compiled.sliding import XI, XI_RATE, slider_force, xi_tolerances
 from solvers.compiled.state import (
     CALLS,
     LANDING,
@@ -80,18 +80,23 @@ from solvers.exponential.contact.node_response import (
     error_of_work,
 )
 from solvers.exponential.contact.peaks import state_peaks
-from solvers.problem.friction import CODE, PEAK, STIFFNESS
+from solvers.problem.friction import CODE, FREE, PEAK, SLIDES, STIFFNESS
 
+OPENED = 2  # place in `Scratch.landed`: stop whose opening the step in ``scratch.stages`` ends at, or -1
 _MOST_TRIALS = 8  # iterations for the step that ends at an output time, or on a bend
 _MIDPOINT_UP_TO = 1e-4  # change of a landing's length, relative, that the midpoint rule makes: its error is the cube
+_CLASSICAL_UP_TO = 4e-3  # the same by the classical rule, of order 4
 _ON_BORDER = 1e-6  # margin, in units of its largest, below which a landing begins on the border that it ends on
 _STAGNATION = 1e-10  # margin, in units of its largest, below which trials that do not halve it show its rounding
+_HALVINGS, _LEAST_SHARE = 30, 1e-3  # of an interval that contains a root; least share of the way to it
 _MOST_VERTICES = 6  # parabolas to the maximum of |F_t| inside a landing
 _MOST_BORDER_TRIALS = 40  # the same on a border: its margin may change only near the start, which bisection must find
 _ERROR_SHARE = 0.1  # part of the embedded difference that counts as the error
 _ERROR_SHARE_FOURTH_ROOT = 1e-2  # the same with u = δ^{1/4}: terms t² = u⁸, exact in the step, make up the difference
 _DERIVATIVE_SHARE, _MOST_FACTOR = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
 _ROUNDING = 1e-11  # rounding of a margin, in units of its largest
+_SHARE_OF_CONTACT = 0.2  # longest landing in time on a border of friction, in units of the contact's duration × reach
+_SHARE_SINCE_ENTRY = 0.04  # the same of one from the entry on
 _LEAST_RATE = 0.5  # δ̇ at the end of a landing, in units of that at its start, below which it is too long
 _LAST_STEP = 0.09  # indentation, in units of the deepest, below which a landing on δ = 0 is tried
 _LAST_STEP_ROOT, _MOST_ROOT = 0.2, 0.25  # the same with u = δ^{1/2}, over reach², and at most: errors grow like u⁹
@@ -199,18 +204,18 @@ def _time_increases(scratch, size):
 def _step(problem, tables, state, scratch, variable, stop, span):
     """Take a DOP853 step of length ``span`` from ``scratch.stages[START]`` to ``scratch.stages[LANDED]``."""
     state.count[CALLS] += landing_step(
-        *(problem, tables, scratch.control[BALANCED] > 0, np.bool_(0), variable, stop, span, scratch.stages[START]),
-        *(state.segment, state.entry_rate, scratch.side, scratch.stages),
+        *(problem, tables, scratch.control[BALANCED] > 0, np.int64(STAGES), variable, stop, span),
+        *(scratch.stages[START], state.segment, state.entry_rate, scratch.side, scratch.stages),
     )
 
 
 @inner
-def _midpoint_step(problem, tables, state, scratch, variable, stop, span):
-    """Continue from ``scratch.stages[LANDED]`` by a short step of the midpoint rule; the stages stay as they are."""
+def _short_step(problem, tables, state, scratch, variable, stop, span, count):
+    """Continue from ``scratch.stages[LANDED]`` by a short step of ``count`` stages; those of DOP853 stay."""
     copy(scratch.stages[LANDED], scratch.stages[WITHIN], scratch.stages.shape[1])
     state.count[CALLS] += landing_step(
-        *(problem, tables, scratch.control[BALANCED] > 0, np.bool_(1), variable, stop, span, scratch.stages[WITHIN]),
-        *(state.segment, state.entry_rate, scratch.side, scratch.stages),
+        *(problem, tables, scratch.control[BALANCED] > 0, np.int64(count), variable, stop, span),
+        *(scratch.stages[WITHIN], state.segment, state.entry_rate, scratch.side, scratch.stages),
     )
 
 
@@ -428,7 +433,7 @@ def land(problem, tables, state, scratch, stop, direction, time_to_border):
     a law with memory that is crossed before, ``scratch.landed`` holds its element and number.
     """
     size, t, rate = state.x.size, state.now[T], scratch.start_motion[stop, 1]
-    scratch.landed[0] = -1
+    scratch.landed[0] = scratch.landed[OPENED] = -1
     if not may_land(problem, tables, state, scratch, stop, direction, time_to_border):
         return -1
     longest, kappa = _longest_time(problem, tables, state, scratch), tables.time_exponent[1 + stop]
@@ -449,6 +454,7 @@ def land(problem, tables, state, scratch, stop, direction, time_to_border):
         scratch.landed[0], scratch.landed[1] = passed(problem, state, scratch, -1, -1, w, x)
         if scratch.landed[0] != -1:
             other = TOO_LONG
+            scratch.landed[OPENED] = stop if scratch.landed[0] == stop and variable == ROOT else -1
     if other != CLEAR:
         return max(other, -1)
     level = _knot(problem, state, stop, direction)
@@ -457,8 +463,8 @@ def land(problem, tables, state, scratch, stop, direction, time_to_border):
 
 
 @inlined
-def _event_function(problem, tables, state, scratch, stop, border, x, sign):
-    """(value, sign) of the event function whose zero a landing locates, in the state x.
+def _event_function(problem, tables, state, scratch, stop, border, x, sign, margins):
+    """(value, sign) of the event function whose zero a landing locates, in the state x; all ``margins`` are written.
 
     It is the margin of a border, or with ``border`` -1 the side of a bend. A slider that sticks, given a sign σ that is
     not 0, has μN - σF_t, which is smooth where F_t changes sign, unlike its margin μN - |F_t|. A negative margin sets σ
@@ -466,8 +472,8 @@ def _event_function(problem, tables, state, scratch, stop, border, x, sign):
     """
     if border < 0:
         return side_at(problem, tables, state, stop, x, scratch.trial), sign
-    margins_of(problem, state, scratch, stop, x[state.x.size], x, scratch.margin)
-    value = scratch.margin[border]
+    margins_of(problem, state, scratch, stop, x[state.x.size], x, margins)
+    value = margins[border]
     if is_planar(problem) and sign != 0.0:
         slider = slider_of(problem, stop)
         force = slider[STIFFNESS] * spring_stretch(radius_of(problem, stop), slider, scratch.point[1, XI])
@@ -481,8 +487,8 @@ def _event_function(problem, tables, state, scratch, stop, border, x, sign):
 def _was_below(problem, state, scratch, s, border, value, time):
     """Whether a margin was below its present ``value`` a ``time`` before the landing: then it has risen to zero."""
     x = scratch.stages[LANDED]
-    margins_later(problem, state, scratch, s, x[state.x.size], x, -time, scratch.ends)
-    return scratch.ends[border] < value
+    margins_later(problem, state, scratch, s, x[state.x.size], x, -time, scratch.margin_before)
+    return scratch.margin_before[border] < value
 
 
 @inlined
@@ -495,40 +501,84 @@ def _may_end_at_opening(problem, tables, state, scratch, stop):
 
 
 @inlined
-def _margin_power(tables, stop):
-    """Power of u in which the margin of a slider that sticks is taken as linear before its stop opens, where N → 0."""
-    return tables.time_exponent[1 + stop] + 1.0
+def _margin_before_opening(problem, scratch, stop, kappa, sign, begin, end, force):
+    """Coefficients of 1, r, r^κ, r^{κ+1} and r^{2κ} of a margin before the opening, r = 1 at the start and 0 there.
+
+    N is proportional to r^{κ+1}, the time to r^κ. A slider that sticks has μN - σF_t with F_t of second order in time,
+    by its values at start and opening and its rate at the start; one that slips has σξ̇ - μṄ/k_t with ξ̇ linear in time.
+    ``scratch.point`` is that of the start.
+    """
+    slider, rate = slider_of(problem, stop), scratch.point[1, XI_RATE]
+    if slider[CODE] == 0.0:
+        change = sign * force + end
+        slope = sign * slider[STIFFNESS] * rate * scratch.start_motion[stop, 0] / scratch.start_motion[stop, 1]
+        return end, 0.0, slope - 2.0 * change, begin + abs(force), change - slope
+    xi_rate = slider[CODE] * rate
+    return end, begin - xi_rate, xi_rate - end, 0.0, 0.0
+
+
+@inlined
+def _root_before_opening(coefficients, kappa):
+    """(r, slope by r) of the root of such a margin by bisection; r is 1 if there is none."""
+    constant, linear, timely, normal, second = coefficients
+    low, high, r, power, rest = 0.0, 1.0, 0.5, 0.25, 0.0
+    for _ in range(_HALVINGS):
+        power = r * r if kappa == 2.0 else (r * r) * (r * r)
+        rest = linear * r + power * (timely + normal * r + second * power)
+        if constant + rest > 0.0:
+            high = r
+        else:
+            low = r
+        r = 0.5 * (low + high)
+    slope = linear + power / r * (kappa * timely + (kappa + 1.0) * normal * r + 2.0 * kappa * second * power)
+    return (r, slope) if high < 1.0 else (1.0, slope)
 
 
 @merged
-def _guess_before_opening(problem, tables, state, scratch, stop, border, guess):
-    """(length in u, sign) of the first trial of a landing on a border of friction before its stop opens.
+def _guess_before_opening(problem, tables, state, scratch, stop, border, guess, opened):
+    """(length in u, sign, slope by the length) of the first trial of a landing on a border before its stop opens.
 
-    A slider that sticks has its margin taken at the start and at the opening, with the sign of the slip that begins.
-    Otherwise, and where the margin begins at zero, the length follows from the ``guess`` of the time with δ̇ constant,
-    and the sign is 0. Largest margin and rounding up to the opening go to ``scratch``.
+    They follow from a model of the margin by the motion at the start and at the opening; the sign is that of the slip
+    that begins, if the slider sticks. A margin of the model without a root has its length from the ``guess`` of the
+    time with δ̇ constant, and sign and slope 0. Largest margin and rounding up to the opening go to ``scratch``.
+    ``opened`` tells that the step to the opening has been made.
     """
     u, delta, slider = scratch.stages[START, state.x.size + 1], scratch.start_motion[stop, 0], slider_of(problem, stop)
     w, kappa, sticks = scratch.stages[START], tables.time_exponent[1 + stop], 1.0 if slider[CODE] == 0.0 else 0.0
-    begin, _ = _event_function(problem, tables, state, scratch, stop, border, w, 0.0)
-    _step(problem, tables, state, scratch, np.int64(ROOT), stop, -u)
-    end, sign = _event_function(problem, tables, state, scratch, stop, border, scratch.stages[LANDED], sticks)
-    largest = max(abs(begin), abs(scratch.margin[border]))
+    margins, x, radius = scratch.margin_end[stop], scratch.stages[LANDED], radius_of(problem, stop)
+    if not opened:
+        _step(problem, tables, state, scratch, np.int64(ROOT), stop, -u)
+    end, sign = _event_function(problem, tables, state, scratch, stop, border, x, sticks, margins)
+    largest = abs(margins[border])
+    begin, _ = _event_function(problem, tables, state, scratch, stop, border, w, 0.0, margins)
+    force = slider[STIFFNESS] * spring_stretch(radius, slider, scratch.point[1, XI]) if sticks > 0.0 else 0.0
+    largest = max(abs(begin), largest)
     rounding = slider[STIFFNESS] * xi_tolerances(problem, stop, state.now[T], state.x)[0]
     scratch.largest[stop, border], scratch.noise[stop, border] = largest, max(_ROUNDING * largest, 2.0 * rounding)
-    if sticks > 0.0 and end < 0.0 and begin > _ON_BORDER * largest:
-        begin, _ = _event_function(problem, tables, state, scratch, stop, border, w, sign)
-        return u * (1.0 - (end / (end - begin)) ** (1.0 / _margin_power(tables, stop))), sign
+    if end < 0.0 and border == SLIDES and slider[CODE] != FREE:
+        coefficients = _margin_before_opening(problem, scratch, stop, kappa, sign, begin, end, force)
+        r, slope = _root_before_opening(coefficients, kappa)
+        if r < 1.0 - _LEAST_SHARE:
+            return u * (1.0 - r), sign, -slope / u
     remaining = max(1.0 + guess * scratch.start_motion[stop, 1] / delta, 0.0) if delta > 0.0 else 0.0
-    return u * (1.0 - remaining ** (1.0 / kappa)), 0.0
+    return u * (1.0 - remaining ** (1.0 / kappa)), 0.0, 0.0
+
+
+@inlined
+def _promising(problem, scratch, variable, stop):
+    """Length, s, of a landing in time above which it would hardly be within the tolerance, by a contact's duration."""
+    if not rubs(problem, stop) or scratch.duration[stop] == 0.0:
+        return np.inf
+    share = _SHARE_SINCE_ENTRY if variable == SINCE else _SHARE_OF_CONTACT
+    return share * scratch.accuracy[REACH] * scratch.duration[stop]
 
 
 @merged
 def _within_tolerance(problem, tables, state, scratch, variable, stop, time):
     """Whether the error of the landing just taken, of length ``time`` s, is within the tolerance."""
-    if variable != ROOT:
-        return _error_in_time(problem, state, scratch, time) <= 1.0
-    return _is_resolved(problem, tables, state, scratch, variable, stop)
+    if variable == ROOT:
+        return _is_resolved(problem, tables, state, scratch, variable, stop)
+    return _error_in_time(problem, state, scratch, time) <= 1.0
 
 
 @inlined
@@ -537,40 +587,36 @@ def _bisect(low, high):
     return math.sqrt(low * high) if low > 0.0 else 1e-3 * high
 
 
-@inlined
-def _secant(span, margin, span_before, margin_before, end, power):
-    """Zero of a margin from two trials by the secant rule, with the margin linear in (end - span)^power."""
-    if power == 1.0:
-        return span - margin * (span - span_before) / (margin - margin_before)
-    root, root_before = (end - span) ** power, (end - span_before) ** power
-    return end - max(root - margin * (root - root_before) / (margin - margin_before), 0.0) ** (1.0 / power)
-
-
 @merged
 def _locate(problem, tables, state, scratch, stop, border, search):
     """Locate a zero of the event function by the secant rule, safeguarded by a bracket; (length, remaining value).
 
-    The value is NaN if there is no zero up to ``longest``. Trials that differ little are steps of the midpoint rule
-    from the last one. ``search`` is (variable, sign of its direction, first trial, longest, scale of the event
-    function, tolerance, sign of `_event_function`).
+    The value is NaN if there is no zero up to ``longest``. Trials that differ little are short steps from the last one.
+    ``search`` is (variable, sign of its direction, first trial, longest, scale of the event
+    function, tolerance, sign of `_event_function`, slope at the first trial or 0).
     """
-    variable, forward, span, longest, largest, tolerance, sign = search
-    x, span_before, power = scratch.stages[LANDED], 0.0, _margin_power(tables, stop) if sign != 0.0 else 1.0
-    value_before, sign = _event_function(problem, tables, state, scratch, stop, border, scratch.stages[START], sign)
+    variable, forward, span, longest, largest, tolerance, sign, slope = search
+    x, span_before = scratch.stages[LANDED], 0.0
+    w, begin, end = scratch.stages[START], scratch.margin_begin[stop], scratch.margin_end[stop]
+    value_before, sign = _event_function(problem, tables, state, scratch, stop, border, w, sign, begin)
     begins_on_border = (value_before if border >= 0 else abs(value_before)) <= _ON_BORDER * largest
     shortest = 0.0 if border >= 0 and not begins_on_border else 0.1 * span
-    if begins_on_border:  # the secant needs another point
+    if begins_on_border and slope == 0.0:  # the secant needs another point
         span_before = 0.9 * span
         _step(problem, tables, state, scratch, variable, stop, forward * span_before)
-        value_before, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign)
+        value_before, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
     low, high = span_before if value_before > 0.0 else 0.0, longest
     for _ in range(_MOST_TRIALS if border < 0 else _MOST_BORDER_TRIALS):
-        if abs(span - span_before) <= _MIDPOINT_UP_TO * span:
-            _midpoint_step(problem, tables, state, scratch, variable, stop, forward * (span - span_before))
+        change = span - span_before
+        if abs(change) <= _CLASSICAL_UP_TO * span:
+            count = 2 if abs(change) <= _MIDPOINT_UP_TO * span else 4
+            _short_step(problem, tables, state, scratch, variable, stop, forward * change, count)
         else:
             _step(problem, tables, state, scratch, variable, stop, forward * span)
-        value, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign)
-        next_span = _secant(span, value, span_before, value_before, longest, power)
+        value, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
+        if slope == 0.0:
+            slope = (value - value_before) / (span - span_before)
+        next_span, slope = span - value / slope, 0.0
         stagnates = abs(next_span - span) <= 1e-15 * span and border >= 0
         if stagnates or abs(value) <= tolerance or 0.5 * abs(value_before) <= abs(value) <= _STAGNATION * largest:
             break
@@ -594,23 +640,24 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
     is none, `UNRESOLVED` if a shorter step must tell.
     """
     limit, largest = _longest_time(problem, tables, state, scratch), scratch.bend_values[scratch.bend_values.size - 1]
-    tolerance, sign = 1e-10 * largest, 0.0
+    tolerance, sign, slope = 1e-10 * largest, 0.0, 0.0
+    opened = scratch.landed[OPENED] == stop
     if border >= 0:  # if it were missed by more, the next step might cross it in the wrong direction
         largest, tolerance = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
-    scratch.landed[0] = -1
-    if not 0.0 < guess <= limit:
-        return False
+    scratch.landed[0] = scratch.landed[OPENED] = -1
     variable, exponent, forward = np.int64(TIME), 1.0, 1.0  # a literal would be compiled for itself
     if border >= 0 and scratch.control[NEW] and scratch.control[NODE_SET] == stop + 1:
         variable, exponent = np.int64(SINCE), 1.0 / tables.time_exponent[stop + 1]
+    if not 0.0 < guess <= min(limit, _promising(problem, scratch, variable, stop)):
+        return False
     start_landing(problem, tables, state, scratch, stop, variable)
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
     limit, span = limit**exponent, guess**exponent
     if border >= 0 and variable == TIME and _may_end_at_opening(problem, tables, state, scratch, stop):
         variable, forward, limit = np.int64(ROOT), -1.0, w[size + 1]
-        span, sign = _guess_before_opening(problem, tables, state, scratch, stop, border, guess)
+        span, sign, slope = _guess_before_opening(problem, tables, state, scratch, stop, border, guess, opened)
         largest, tolerance = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
-    search = variable, forward, span, limit, largest, tolerance, sign
+    search = variable, forward, span, limit, largest, tolerance, sign, slope
     span, value = _locate(problem, tables, state, scratch, stop, border, search)
     time = span if variable == TIME else x[size] - w[size]
     if not (abs(value) <= 1e-6 * largest and _within_tolerance(problem, tables, state, scratch, variable, stop, time)):

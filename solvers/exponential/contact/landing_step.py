@@ -34,16 +34,18 @@ from solvers.compiled.kernels import (
     width_of,
 )
 from solvers.compiled.parts import LANDING_STEP, part
+from solvers.compiled.simd import WIDTH, load8, splat8, store8
 from solvers.compiled.state import T
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.crossings import FORCE
-from solvers.exponential.contact.node_response import BATCH, LANDED, START
+from solvers.exponential.contact.node_response import BATCH, LANDED, SHORT, START
 from solvers.exponential.energy.quadrature import powers
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 
 INDENTATION, ROOT, TIME, SINCE = range(4)
 MIDPOINT = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 1.0]])
-_CHOICE = types.boolean, types.boolean, types.int64, types.int64  # with_energy, short, variable, stop
+CLASSICAL = np.array([np.zeros(4), [0.5, 0, 0, 0], [0, 0.5, 0, 0], [0, 0, 1.0, 0], np.array([1, 2, 2, 1]) / 6.0])
+_CHOICE = types.boolean, types.int64, types.int64, types.int64  # with_energy, count, variable, stop
 
 
 @inner
@@ -110,21 +112,23 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
         factor = factor * kappa * raised(w[t + 1], kappa - 1.0)
     if variable in (INDENTATION, ROOT):
         factor /= pace if segment[stop] > 0 else indentation_rate(problem, stop, w)
-    for e in range(t):
-        out[e] *= factor
+    for e in range(0, t, WIDTH):
+        store8(out, e, load8(out, e) * splat8(factor))
     out[t] = factor
     out[t + 1] = span if variable in (ROOT, SINCE) else 0.0
     return calls
 
 
 @part(LANDING_STEP, types.int64, *_CHOICE, REAL, VECTOR, INTEGERS, VECTOR, VECTOR, MATRIX)
-def landing_step(problem, tables, with_energy, short, variable, stop, span, w, segment, entry_rate, side, work):
-    """One DOP853 step of length ``span`` in the variable from ``w`` to ``work[LANDED]``; number of law calls.
+def landing_step(problem, tables, with_energy, count, variable, stop, span, w, segment, entry_rate, side, work):
+    """One step of ``count`` stages and length ``span`` in the variable from ``w`` to ``work[LANDED]``; law calls.
 
-    The stages stay in ``work``. A ``short`` step is one of the midpoint rule, which leaves them as they are.
+    Its order is 8 with the stages of DOP853, which stay in ``work``; 2 with two of the midpoint rule or 4 with four of
+    the classical method, which leave those as they are.
     """
     batch, trial, calls = work[BATCH], work[LANDED], 0
-    stages, tableau, count = (work[STAGES:], MIDPOINT, 2) if short else (work, A, STAGES)
+    stages = work if count == STAGES else work[SHORT:]
+    tableau = A if count == STAGES else CLASSICAL if count == 4 else MIDPOINT
     for i in range(count):
         combine(stages, tableau[i], i, w, trial)
         calls += _rate(

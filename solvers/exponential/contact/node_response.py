@@ -37,10 +37,11 @@ from solvers.exponential.contact.many_stops import (
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.flight import quintic
 
-DIFFERENCE, BATCH, LANDED, WITHIN, START = range(STAGES + 1, STAGES + 6)
-"""Rows of `Scratch.stages` behind the stages of a landing's Runge–Kutta step and the rate at its end: the embedded
-difference; numbers for one law call; trial states, at last the one landed on; a state within a step, for the energy
-balance; the state at the start of a landing, or at the end of a run within a step."""
+SHORT = STAGES
+DIFFERENCE, BATCH, LANDED, WITHIN, START = STAGES + 1, *range(STAGES + 4, STAGES + 8)
+"""Rows of `Scratch.stages` behind the stages of a landing's Runge–Kutta step: four of a short step, the second of them
+before that the embedded difference; numbers for one law call; trial states, at last the one landed on; a state within a
+step, for the energy balance; the state at the start of a landing, or at the end of a run within a step."""
 DELTAS, RATES, FORCES, KNOWN = range(4)
 """Rows of `Scratch.local_motion`: m, m/s, N at points around a node, and the values they are interpolated from."""
 RTOL, REACH = range(2)  # places in Scratch.accuracy
@@ -94,7 +95,7 @@ class Scratch(NamedTuple):
     bend_values: Annotated[Any, "S+2"]  # event function of a bend at the nodes and at the end, then its largest size
     accuracy: Annotated[Any, "2"]  # rtol; radians of the fastest block that a landing may take
     stiffened: Annotated[Any, "1"]  # rad/s: frequency of the structure as stiffened by the contacts, for derivatives
-    duration: Annotated[Any, "1"]  # s: estimate for the contact begun last, as if nothing else acted on the body
+    duration: Annotated[Any, "E"]  # s: estimate for the last contact of a stop, as if nothing else acted on the body
     energy_sums: Annotated[Any, "2+L, numbers"]  # see `energy.flight_balance` and `contact_balance`
     energy: Annotated[Any, "3"]  # J, see `energy.check`
     control: Annotated[Any, "int 7"]  # integers of the step control, places named in `first_step`
@@ -108,10 +109,15 @@ class Scratch(NamedTuple):
     margin: Annotated[Any, "B*S"]  # margins of an element's borders at points, row by row; see `borders`
     ends: Annotated[Any, "6*B"]  # margins of an element's borders at the ends of a step or landing; see `borders`
     fired: Annotated[Any, "B"]  # margins of an element's borders in one state
+    ahead: Annotated[Any, "1"]  # s: when a border is reached that a step has crossed and not landed on, else 0
+    ahead_of: Annotated[Any, "int 2"]  # its element and number
+    margin_begin: Annotated[Any, "E, B"]  # margins at the start of a landing, then at its end and shortly before it
+    margin_end: Annotated[Any, "E, B"]
+    margin_before: Annotated[Any, "B"]  # of the element whose border is landed on
     largest: Annotated[Any, "E, B"]  # largest margins on the step tried last
     noise: Annotated[Any, "E, B"]  # their rounding
     border: Annotated[Any, "int 1"]  # border that the step tried last crosses first, -1 if it is a bend
-    landed: Annotated[Any, "int 2"]  # element and border that a landing would cross first, see `landing`; else -1
+    landed: Annotated[Any, "int 3"]  # element and border that a landing would cross first, see `landing`; else -1
     block_motion: Annotated[Any, "2*M, S"]  # p and v at the nodes; as the next two see `many_stops`
     block_force: Annotated[Any, "2*M, S"]  # state rates of the blocks by the forces at the nodes
     pair_weights: Annotated[Any, "M8"]  # products of a read row with the push of another row

@@ -25,7 +25,7 @@ from solvers.compiled.kernels import (
     xi_and_rate_at,
 )
 from solvers.compiled.parts import RUB_AROUND, RUB_IN, RUB_MARGINS, RUB_PEAK, part
-from solvers.compiled.simd import largest8, load8, size8, splat8, store8
+from solvers.compiled.simd import largest8, least8, load8, size8, splat8, sqrt8, store8
 from solvers.compiled.sliding import (
     ACCELERATION,
     POINT,
@@ -48,10 +48,12 @@ from solvers.exponential.circles.friction import (
     xi_and_rate_at_nodes,
     xi_continued,
 )
+from solvers.exponential.contact.first_step import NEW
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL_SLOPES, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
-from solvers.exponential.tables import EXPONENT
+from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR
+from solvers.exponential.tables import STIFFNESS as ELASTICITY
 from solvers.problem.friction import CODE, CUT, FREE, MU, PEAK, PRESSES, SLIDES, STIFFNESS
 
 ENDS = 6  # margins in `Scratch.ends` for a border: at start, end; at the start with rounding, then ripple, in δ and δ̇
@@ -60,6 +62,7 @@ _SLOPE_ROUNDING = 1e-8  # the same of a margin that contains the slope of a poly
 _REST = 1e-14  # rate, in units of the reference speed, below which a rate at rest is rounding
 _TINY = 1e-300  # m, keeps N/δ finite
 _DIFFERENCE_STEP = 1e-6  # relative step in δ and δ̇ for differences of the slopes of N
+_LEFT_OUT, _CLEAR_OF_ZERO = 4.0, 0.05  # see `_ends_by_polynomial`
 _ON_BEND = 1e-9  # δ̇, in units of the reference speed, that a landing on a bend at δ̇ = 0 may leave
 
 
@@ -110,13 +113,17 @@ def _node_accelerations(tables, scratch, node_set, h, s, rates, out):
 
 
 @inlined
-def _slopes(problem, tables, state, s, delta, rate, normal, slope):
-    """N_δ and N_δ̇ at S points; of a power law that only pushes N_δ = p N/δ, N_δ̇ = 0."""
-    if _rate_dependent(problem, s):
+def _slopes(problem, tables, state, s, delta, rate, slope):
+    """N_δ and N_δ̇ at S points with δ >= 0; of N = K δ^p (1 + a δ̇) + c δ̇ with p = 1 or 1.5 without a call of the law."""
+    law = tables.power_law[s]
+    if not law[EXPONENT] > 0.0:
         normal_slopes(problem, s, S, delta, rate, state.entry_rate[s], slope[0], slope[1], slope[2])
         return
-    for i in range(S):
-        slope[0, i], slope[1, i] = tables.power_law[s, EXPONENT] * normal[i] / max(delta[i], _TINY), 0.0
+    factor, deep, steep = law[FACTOR] / state.entry_rate[s], load8(delta, 0), splat8(law[ELASTICITY])
+    if law[EXPONENT] == 1.5:
+        steep = steep * sqrt8(deep)
+    store8(slope[0], 0, splat8(law[EXPONENT]) * steep * (splat8(1.0) + splat8(factor) * load8(rate, 0)))
+    store8(slope[1], 0, splat8(factor) * steep * deep + splat8(law[DAMPING]))
 
 
 @inner
@@ -125,7 +132,7 @@ def _margins_at(problem, tables, state, scratch, s, delta, rate, xi_rates, force
     slider, margin, normal, slope = slider_of(problem, s), scratch.margin, scratch.numbers, scratch.slope[s]
     slips, mu = _slips(slider), slider[MU]
     if slips and mu > 0.0:
-        _slopes(problem, tables, state, s, delta, rate, normal, slope)
+        _slopes(problem, tables, state, s, delta, rate, slope)
     for i in range(S):
         if _rate_dependent(problem, s):
             margin[S + i] = normal[i] if slips else 1.0
@@ -200,39 +207,82 @@ def _margin_slopes(problem, tables, state, scratch, s):
     return share * first, share * second, by_delta, by_rate
 
 
+@inlined
+def _ends_by_polynomial(problem, tables, scratch, s):
+    """Ends of a smooth step's margins by the polynomials through their nodes, into ``scratch.ends``.
+
+    Returns whether these tell both margins at the start, whether at the end, and whether they are far from zero all
+    over the step. A value is told if it is larger than what the polynomial may leave out.
+    """
+    begin_told, end_told, far, summary = True, True, True, scratch.local_motion[KNOWN, :S]
+    for j in range(problem.border_count[s]):
+        end, margin = scratch.ends[ENDS * j : ENDS * j + 2], scratch.margin[S * j : S * j + S]
+        combine(tables.summary[0], margin, S, None, summary)
+        end[0], end[1], values = summary[4], summary[5], load8(margin, 0)
+        zero = max(_LEFT_OUT * max(abs(summary[2]), abs(summary[3])), _CLEAR_OF_ZERO * largest8(size8(values)))
+        begin_told &= abs(end[0]) > zero
+        end_told &= abs(end[1]) > zero
+        far &= min(end[0], end[1], least8(values)) > zero
+    return begin_told, end_told, begin_told and end_told and far
+
+
+@inlined
+def _ends_in_states(problem, state, scratch, s, h, begin_told, end_told):
+    """Margins at the start and the end of the step, in the states there, unless they are told already."""
+    if not end_told:
+        slider_margins_in(problem, state, scratch, s, state.now[T] + h, scratch.x_new, 0.0, scratch.fired)
+        for j in range(problem.border_count[s]):
+            scratch.ends[ENDS * j + 1] = scratch.fired[j]
+    if not begin_told:
+        slider_margins_in(problem, state, scratch, s, state.now[T], state.x, 0.0, scratch.fired)
+        for j in range(problem.border_count[s]):
+            scratch.ends[ENDS * j] = scratch.fired[j]
+
+
 @part(RUB_MARGINS, types.void, *[types.int64] * 3)
 def slider_margins_on_step(problem, tables, state, scratch, s, node_set, level):
     """Margins at the nodes and ends of the step just tried, their largest values and rounding, as in `borders`.
 
-    The motion at the start stays in ``scratch.point[0]``.
+    Far from zero their rounding is that of the last step that was not. The motion at the start of a step from an entry
+    stays in ``scratch.point[0]``.
     """
-    h, ends, slider, t = tables.contact_step[level], scratch.ends, slider_of(problem, s), state.now[T]
+    h, far = tables.contact_step[level], False
     xi_and_rate_at_nodes(problem, scratch, s)
     slider_margins_at_nodes(problem, tables, state, scratch, s, node_set, h)
-    of_delta, of_rate, of_normal, of_its_rate = _margin_slopes(problem, tables, state, scratch, s)
-    slider_margins_in(problem, state, scratch, s, t + h, scratch.x_new, 0.0, scratch.fired)
-    for j in range(problem.border_count[s]):
-        ends[ENDS * j + 1] = scratch.fired[j]
-    slider_margins_in(problem, state, scratch, s, t, state.x, 0.0, scratch.fired)
-    xi, xi_rate = xi_tolerances(problem, s, t, state.x)
-    rest = _REST * scratch.reference_speed[s]
-    delta, rate = surface_tolerance(problem, s, state.x), max(rate_tolerance(problem, s, state.x), rest)
     ripple, faster = _ripples(problem, tables, state, s, tables.alias[tables.kind[node_set], level])
-    slips, of_way = _slips(slider), slider[STIFFNESS] if slider[CODE] == 0.0 else 0.0
+    begin_told, end_told, by = False, False, (0.0, 0.0, 0.0, 0.0)
+    if node_set == 0 and ripple == 0.0 and faster == 0.0 and tables.bend[s] == 0.0:  # beyond a bend nothing is smooth
+        begin_told, end_told, far = _ends_by_polynomial(problem, tables, scratch, s)
+    far &= scratch.control[NEW] == 0
+    if not far:
+        by = _margin_slopes(problem, tables, state, scratch, s)
+    _ends_in_states(problem, state, scratch, s, h, begin_told, end_told)
+    for j in range(problem.border_count[s]):
+        end = scratch.ends[ENDS * j : ENDS * (j + 1)]
+        end[2], end[3], end[4], end[5] = end[0], end[0], end[0], end[0]
+        scratch.largest[s, j] = max(abs(end[0]), abs(end[1]), largest8(size8(load8(scratch.margin[S * j :], 0))))
+    if not far:
+        _add_rounding(problem, state, scratch, s, by, ripple, faster)
+
+
+@merged
+def _add_rounding(problem, state, scratch, s, by, ripple, faster):
+    """Rounding of the margins by that of δ, δ̇, ξ and ξ̇, and at the start the ripple of fast blocks."""
+    of_delta, of_rate, of_normal, of_its_rate = by
+    slider, slips = slider_of(problem, s), _slips(slider_of(problem, s))
+    xi, xi_rate = xi_tolerances(problem, s, state.now[T], state.x)
+    rest, of_way = _REST * scratch.reference_speed[s], slider[STIFFNESS] if slider[CODE] == 0.0 else 0.0
+    delta, rate = surface_tolerance(problem, s, state.x), max(rate_tolerance(problem, s, state.x), rest)
     for j in range(problem.border_count[s]):
         by, of_speed = (of_delta, of_rate, of_way), 1.0 if slips else 0.0
         if j == PRESSES:
             by, of_speed = (of_normal, of_its_rate, 0.0), 0.0
-        end = ends[ENDS * j : ENDS * (j + 1)]
-        end[0] = scratch.fired[j]
-        end[2], end[3], end[4], end[5] = end[0], end[0], end[0], end[0]
         if j == SLIDES or slips:
-            end[4] += (by[0] + by[2]) * ripple + of_speed * faster
-        largest = max(abs(end[0]), abs(end[1]), largest8(size8(load8(scratch.margin[S * j :], 0))))
+            scratch.ends[ENDS * j + 4] += (by[0] + by[2]) * ripple + of_speed * faster
         noise = by[0] * delta + by[1] * rate + by[2] * xi + of_speed * max(xi_rate, rest)
         differenced = j == SLIDES and slips and _rate_dependent(problem, s)
-        scratch.largest[s, j] = largest
-        scratch.noise[s, j] = max((_SLOPE_ROUNDING if differenced else _ROUNDING) * largest, 2.0 * noise)
+        share = _SLOPE_ROUNDING if differenced else _ROUNDING
+        scratch.noise[s, j] = max(share * scratch.largest[s, j], 2.0 * noise)
 
 
 @inlined

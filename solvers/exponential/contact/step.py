@@ -190,6 +190,20 @@ def _try_friction_border(problem, tables, state, scratch, time_to_border):
 
 
 @merged
+def _try_border_ahead(problem, tables, state, scratch):
+    """Land on the border that a step crossed which was then made shorter; returns whether it was done."""
+    time, level = scratch.ahead[0] - state.now[T], scratch.control[NEXT_LEVEL]
+    scratch.ahead[0] = 0.0
+    if not time > 0.0 or scratch.control[NEW]:
+        return False
+    scratch.border[0] = scratch.ahead_of[1]
+    stop, landed = land_in_time(problem, tables, state, scratch, scratch.ahead_of[0], time)
+    if landed:
+        _continue_after(problem, tables, state, scratch, stop, level, False)
+    return landed
+
+
+@merged
 def _continue_after(problem, tables, state, scratch, stop, level, alone):
     """Go on after a landing on a bend or border: what it ends is renewed, the next step is the first of a segment."""
     control = scratch.control
@@ -261,6 +275,8 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
         and _try_landing(problem, tables, state, scratch, stop, direction, time_to_border)
     ):
         return RUNNING
+    if scratch.ahead[0] > 0.0 and _try_border_ahead(problem, tables, state, scratch):
+        return RUNNING
     node_set = control[NODE_SET] if control[NEW] else 0
     longest = 0.8 * time_to_border
     if problem.table_dt.size:
@@ -285,6 +301,8 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
         copy(scratch.side_at_begin, scratch.side, scratch.side.size)
         state.count[REJECTED] += 1
         if crossing >= 0:  # end a step shortly before, so that the next one can land
+            scratch.ahead[0] = state.now[T] + first if scratch.border[0] >= 0 else 0.0
+            scratch.ahead_of[0], scratch.ahead_of[1] = crossing, scratch.border[0]
             level = min(max(level + 1, level_of(tables, 0.9 * first)), level + _CROSSING_KNOWN)
             continue
         level = min(shortest, level + (1 + int(2.0 / _ORDER * math.log2(error / _ERROR_GOAL)) if error < np.inf else 2))
@@ -320,7 +338,7 @@ def _adapt(tables, scratch, level, node_set, wanted, error):
     if control[NEW] == ENTRY:  # the next contact of this stop begins with the step that proved right in this one
         s, levels = control[STOP], 2.0 / _ORDER * math.log2(_ERROR_GOAL / max(error, 1e-30))
         if level != control[NEXT_LEVEL]:
-            scratch.first_step_share[s] = tables.contact_step[level] / scratch.duration[0]
+            scratch.first_step_share[s] = tables.contact_step[level] / scratch.duration[s]
         scratch.first_step_share[s] *= 2.0 ** (0.5 * min(max(levels, -1.0), 0.5))
     suggested = min(max(level - _levels_longer(error), 0), tables.contact_step.size - 1)
     control[NEXT_LEVEL] = suggested if level == wanted else min(suggested, wanted)
