@@ -447,3 +447,18 @@ def test_bad_input(tmp_path):
         ensemble(small_model(), 2, lambda model: np.ones(next(lengths)))
     with pytest.raises(RuntimeError, match="must be a number or an array of numbers, got str"):
         ensemble(small_model(), 2, lambda model: "much")
+
+
+def stopped(model):
+    """What a run gives that Ctrl-C ends: a user's quantity sees nothing of it."""
+    stop = lambda t: signal.raise_signal(signal.SIGINT)  # noqa: E731
+    start = np.zeros(len(model.omega))
+    return float(solvers.integrate(model.for_duration(1e3).system, start, start, 1e3, progress=stop).t[-1])
+
+
+def test_ctrl_c_in_a_run_of_the_quantity_ends_the_ensemble(tmp_path):
+    """The run ends there with what it has, which is no value of the quantity."""
+    with pytest.raises(KeyboardInterrupt):
+        ensemble(small_model(), 2, stopped, checkpoint=tmp_path / "kept.npz")
+    assert list(tmp_path.iterdir()) == []
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -24,6 +24,7 @@ import solvers
 from fembeam.model import Model, Run, load_period
 from fembeam.response import latched_before
 from fembeam.scene import Scene, signals_of
+from fembeam.study.execution.executors import finished
 from fembeam.study.quantities import Quantity, label
 from fembeam.study.realisations import child, renewed
 from fembeam.support import require, require_non_negative, require_positive
@@ -146,7 +147,7 @@ def runs(model: Model, plan: Plan, quantity: Quantity, solver: Any) -> list[Run]
     if plan.duration is None:
         return periodic(model, start, solver, getattr(quantity, "sampled", True))
     models = [_seeded(model, seed) for seed in plan.seeds] if plan.seeds else [model]
-    whole = [each.simulate(plan.duration, plan.dt, start, solver) for each in models]
+    whole = [finished(each.simulate(plan.duration, plan.dt, start, solver)) for each in models]
     return [cut(run, plan.discard, plan.duration) for run in whole]
 
 
@@ -154,7 +155,7 @@ def periodic(model: Model, start: Any, solver: Any, sampled: bool) -> list[Run]:
     """Groups of drive periods of the settled response; a simulation rather than shooting, as it may be chaotic."""
     period = load_period(model.scene)
     dt = period / SAMPLES if sampled else None
-    run = model.simulate((SETTLING + GROUPS * GROUP) * period, dt, start, solver)
+    run = finished(model.simulate((SETTLING + GROUPS * GROUP) * period, dt, start, solver))
     borders = (SETTLING + GROUP * np.arange(GROUPS + 1)) * period
     parts = [cut(run, a, b) for a, b in pairwise(borders)]
     share = replace(run.cost, seconds=run.cost.seconds / GROUPS)
@@ -220,7 +221,6 @@ def values_of(quantity: Quantity, parts: list[Run], where: str) -> Vector:
 
 def _value(quantity: Quantity, run: Run, where: str) -> Any:
     """The quantity of one run, checked."""
-    require(run.complete, "every run of a study must reach its end", run.status, where, "run again")
     value = np.asarray(quantity(run), dtype=float)
     require(value.size > 0, "quantity must return a number or an array", value, where, "check the function")
     return value

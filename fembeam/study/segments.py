@@ -16,6 +16,7 @@ from fembeam.model import Model, Run
 from fembeam.scene import signals_of
 from fembeam.statistics.initial_transient import FEWEST_BATCHES
 from fembeam.study.decay import correlation_time
+from fembeam.study.execution.executors import finished
 from fembeam.study.realisations import child, continued, noises, renewed
 
 Vector = NDArray[np.float64]
@@ -107,9 +108,7 @@ class Segments:
         model, later = self.model, partial(continued, time=self.time, duration=duration)
         if self.repeats:  # all changes at once: each makes another scene and system
             model = renewed(model, lambda _, seed: child(seed, i), later)
-        run = model.go_on(duration, self.dt, self.state, self.solver)
-        if not run.complete:
-            raise KeyboardInterrupt
+        run = finished(model.go_on(duration, self.dt, self.state, self.solver))
         self.seconds += run.cost.seconds
         return run
 
@@ -150,10 +149,7 @@ class Segments:
 
 def _pilot(model: Model, duration: float, dt: float, state: Vector, solver: Any) -> Run:
     """A run by which the level of the motion is seen."""
-    run = model.go_on(math.ceil(duration / dt - 1e-9) * dt, dt, state, solver)
-    if not run.complete:
-        raise KeyboardInterrupt
-    return run
+    return finished(model.go_on(math.ceil(duration / dt - 1e-9) * dt, dt, state, solver))
 
 
 def _longest(found: list[Any], tau: float, dt: float) -> float:
