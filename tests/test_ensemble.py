@@ -21,7 +21,8 @@ from problems import ROD
 import fembeam as fb
 import solvers
 from contacts import Hertz, Hysteretic, law
-from fembeam.study import characteristics, ensemble
+from fembeam.statistics import Estimate
+from fembeam.study import Ensemble, characteristics, ensemble
 
 HERE = Path(__file__).parent
 
@@ -328,6 +329,17 @@ def test_numbers_that_some_realisations_lack():
     assert (len(found), found.enough) == (16, True)  # 1, 3, … 15: 8 ± 1.73; of 1, 3, 5, 7 it is 4 ± 1.29
     assert (found["sometimes"].value, found["sometimes"].batches) == (8.0, 8)
     assert np.isnan(found["never"].value)
+
+
+def test_values_that_other_realisations_lack_are_not_paired():
+    """Of 1, 2 and of 2, 4 by twos: the ratio of what the same two realisations have is 2 without scatter."""
+    values = {"a": np.array([1.0, np.nan, 2.0]), "b": np.array([2.0, 4.0, np.nan]), "twice": np.array([2.0, 5.0, 4.0])}
+    found = Ensemble((7, 8, 9), values)
+    with pytest.raises(ValueError, match="must have the same parts in one order, but some lack 8, 9; make each"):
+        Estimate.joint(np.divide, found["b"], found["a"])
+    other = Ensemble((7, 9), {"twice": values["twice"][[0, 2]]})
+    ratio = Estimate.joint(np.divide, other["twice"], found["a"])
+    assert (ratio.value, ratio.standard_error) == (2.0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,7 @@ class Estimate:
     batches : independent parts behind it.
     without : (batches, ...) values with one part left out each; None when they were not kept.
     scale : on which the estimate scatters like a Gaussian; `interval` is symmetric there.
+    parts : names of the parts, such as the seeds of an ensemble; () when they go by their order.
 
     Examples
     --------
@@ -46,6 +47,7 @@ class Estimate:
     batches: int
     without: Any = field(default=None, repr=False)
     scale: Scale = field(default=LINEAR, repr=False)
+    parts: tuple[str, ...] = field(default=(), repr=False)
 
     @classmethod
     def of_mean(cls, values: ArrayLike) -> Estimate:
@@ -70,7 +72,7 @@ class Estimate:
 
         Raises
         ------
-        ValueError : their numbers of parts differ, or are below 2.
+        ValueError : their parts differ, or are below 2: of an ensemble, when values are missing for other seeds.
 
         Examples
         --------
@@ -81,8 +83,15 @@ class Estimate:
         parts = {estimate.batches if estimate.without is not None else 0 for estimate in estimates}
         if len(parts) != 1 or min(parts) < 2:
             raise ValueError(f"estimates must have the same parts, at least 2, got {[e.batches for e in estimates]}")
+        named = list({estimate.parts for estimate in estimates if estimate.parts})
+        if len(named) > 1:
+            odd = sorted(set(named[0]).union(*named) - set(named[0]).intersection(*named))
+            lack = f", but some lack {', '.join(odd[:8])}" * bool(odd)
+            raise ValueError(f"estimates must have the same parts in one order{lack}; make each of the values that all "
+                             "have: Estimate.of_mean(ensemble.values[name][both])")  # fmt: skip
         without = [function(*row) for row in zip(*(estimate.without for estimate in estimates), strict=True)]
-        return _jackknife(function(*(estimate.value for estimate in estimates)), np.array(without))
+        found = _jackknife(function(*(estimate.value for estimate in estimates)), np.array(without))
+        return replace(found, parts=next(iter(named), ()))
 
     @property
     def relative(self) -> float:

@@ -70,7 +70,9 @@ class Ensemble(Result):
             raise KeyError(f"the quantity has no {name!r}; it has {', '.join(map(repr, self.values))}")
         values = self.values[name]
         known = ~np.isnan(values) if values.ndim == 1 else np.full(len(values), True)
-        return Estimate.of_mean(values[known] if known.any() else values)
+        known |= not known.any()
+        parts = tuple(seed_key(seed) for seed, kept in zip(self.seeds, known, strict=True) if kept)
+        return replace(Estimate.of_mean(values[known]), parts=parts)
 
     def __repr__(self) -> str:
         failed = f", {len(self.failures)} failed" if self.failures else ""
