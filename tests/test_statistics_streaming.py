@@ -430,6 +430,7 @@ def test_it_stops_when_enough_is_known():
     by_mean = stationary(model, 300.0, 2e-3, until=0.001, of=lambda r: r["tip u"].kurtosis)
     assert by_mean.enough is False
     assert by_mean.duration == pytest.approx(300.0)
+    assert stationary(model, 20.0, 2e-3, until=0.5).enough  # known from four batches, all there are
 
 
 def test_the_same_seed_gives_the_same_bits_and_the_model_is_left_alone():
@@ -444,6 +445,22 @@ def test_a_record_is_one_segment():
     record = fb.Record(t, 1e-5 * coloured(3, t.size), band=(5.0, 600.0))
     found = stationary(cantilever(1, base=record), 60.0, 2e-3)
     assert found.duration + found.discarded == pytest.approx(60.0)
+
+
+def test_a_record_is_not_all_left_out():
+    record = fb.Record(np.linspace(0.0, 8.0, 801), 1e-5 * coloured(3, 801), band=(5.0, 600.0))
+    with pytest.raises(ValueError, match=r"discard must leave at least 64 samples of the duration of 6 s, got 5.9 s"):
+        stationary(cantilever(1, base=record), 6.0, 2e-3, discard=5.9)
+
+
+def test_few_samples_under_tones():
+    """What is left after the last free flight may be a few samples, and a lead-in longer than the rest of the run."""
+    stop = fb.Stop(0.5, KelvinVoigt(1e5, 50.0))
+    model = cantilever(2, base=fb.Harmonic(2e-4, 160.0), stops=[stop])
+    for samples in range(100, 112):
+        for discard in (0.0, 3.0):
+            found = stationary(model, samples * 2e-3, 2e-3, discard=discard)
+            assert found.duration == pytest.approx(samples * 2e-3, abs=3e-3)
 
 
 def test_a_transient_that_lasts_is_warned_of():
