@@ -123,6 +123,8 @@ def law(
         raise TypeError(f"@law decorates a plain function, got {function!r}")
     who = function.__name__
     names = _checked_names(function, f"law {who!r}")
+    if not (derivative is None or inspect.isfunction(derivative)):
+        raise TypeError(f"derivative of law {who!r} must be a plain function, got {derivative!r}")
     if derivative is not None and _checked_names(derivative, f"derivative of law {who!r}") != names:
         raise TypeError(f"derivative of law {who!r} must take the law's arguments, ({', '.join(names)})")
     if not isinstance(jump, bool):

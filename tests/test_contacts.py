@@ -277,6 +277,26 @@ def test_table_from_a_file(tmp_path):
         Tabulated.from_csv(path)
 
 
+@pytest.mark.parametrize(("text", "message"), [
+    ("delta;force\n0,0;0,0\n1,5;7,5\n2,5;9,5\n", "line 2: column 1 must be a number, got '0,0'"),
+    ("delta,force\n0,0,0,0\n1,5,7,5\n", "line 2: 4 entries, but the first line names 2 columns; write decimal points"),
+    ("delta\tforce\n1\t7,5\n", "line 2: column 2 must be a number, got '7,5'"),
+])  # fmt: skip
+def test_decimal_commas_are_no_columns(tmp_path, text, message):
+    """Each was read as a table of other points: 1,5 and 7,5 as δ = 1 and F = 5."""
+    path = tmp_path / "curve.csv"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=message):
+        Tabulated.from_csv(path)
+
+
+def test_a_table_that_is_no_text(tmp_path):
+    path = tmp_path / "curve.xls"
+    path.write_bytes(b"\xd0\xcf\x11\xe0")
+    with pytest.raises(ValueError, match=r"curve.xls is no text file in UTF-8"):
+        Tabulated.from_csv(path)
+
+
 @pytest.mark.parametrize(
     ("one", "words"),
     [
@@ -454,6 +474,7 @@ def test_a_law_that_pulls_at_rest_is_refused():
     ("make", "message"),
     [
         (lambda: law(3.0), "decorates a plain function"),
+        (lambda: law(derivative=3.0)(lambda delta, delta_dot, entry_rate: delta), "derivative of law .* got 3.0"),
         (lambda: law(lambda delta, delta_dot, entry_rate, *more: delta), r"plain arguments only, got '\*more'"),
         (lambda: law(lambda delta, delta_dot, entry_rate=1.0: delta), "have no default"),
     ],
@@ -523,6 +544,7 @@ REFUSED = [  # what is made of a value, the values that are refused, and in whic
         (([1e-3, 2e-3], [10.0]), "as many forces as indentations, got 1 and 2"),
         (([2e-3, 1e-3], [10.0, 20.0]), "must be >= 0 and ascend, got 0.002 m, then 0.001 m"),
         (([-1e-3, 1e-3], [0.0, 20.0]), "must be >= 0 and ascend"),
+        (([-1e-3], [1.0]), "must be >= 0 and ascend, got -0.001 m first"),
         (([1e-3, 2e-3], [20.0, 10.0]), "must not fall with indentation .* got 20 then 10 N; smooth"),
         (([0.0, 1e-3], [1.0, 10.0]), "force 0 at indentation 0, got 1 N; subtract the offset"),
         (([1e-3], [0.0]), "must end above 0"),
