@@ -331,6 +331,18 @@ def test_numbers_that_some_realisations_lack():
     assert np.isnan(found["never"].value)
 
 
+def test_complex_values_keep_their_imaginary_part():
+    """Of the parts' means and errors: the squares of the errors add up."""
+    values = np.array([1.0 + 2.0j, 2.0 - 1.0j, 4.0 + 0.5j])
+    found, parts = Ensemble((1, 2, 3), {"": values}).mean, [Estimate.of_mean(one) for one in (values.real, values.imag)]
+    assert found.value == pytest.approx(parts[0].value + 1j * parts[1].value)
+    assert found.standard_error == pytest.approx(np.hypot(*(one.standard_error for one in parts)))
+    assert Estimate.joint(lambda x: 2.0 * x, found).standard_error == pytest.approx(2.0 * found.standard_error)
+    assert repr(found) == "2.33333+0.5j ± 1.24"
+    with pytest.raises(ValueError, match="an interval must be of real values"):
+        found.interval()
+
+
 def test_values_that_other_realisations_lack_are_not_paired():
     """Of 1, 2 and of 2, 4 by twos: the ratio of what the same two realisations have is 2 without scatter."""
     values = {"a": np.array([1.0, np.nan, 2.0]), "b": np.array([2.0, 4.0, np.nan]), "twice": np.array([2.0, 5.0, 4.0])}

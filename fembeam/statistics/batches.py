@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.statistics.scales import LINEAR, Scale
-from fembeam.support import is_finite
+from fembeam.support import is_finite, require
 
 MOST = 64  # batches kept; beyond it neighbours are merged, so that memory stays constant
 
@@ -51,8 +51,8 @@ class Estimate:
 
     @classmethod
     def of_mean(cls, values: ArrayLike) -> Estimate:
-        """The mean of independent values (n, ...) over the first axis."""
-        samples = np.asarray(values, dtype=np.float64)
+        """The mean of independent values (n, ...) over the first axis; of complex ones s.e.² = Σ|x - x̄|²/((n-1) n)."""
+        samples = np.asarray(values) if np.iscomplexobj(values) else np.asarray(values, dtype=np.float64)
         n = len(samples)
         mean = samples.mean(axis=0)
         if n < 2:
@@ -122,6 +122,8 @@ class Estimate:
         """
         if not (is_finite(confidence) and 0.0 < confidence < 1.0):
             raise ValueError(f"confidence must lie between 0 and 1, got {confidence!r}")
+        real = not np.iscomplexobj(self.value)
+        require(real, "an interval must be of real values", self.value, "Estimate", "take real, imaginary part or size")
         from scipy.special import stdtrit
 
         reach = float(stdtrit(max(self.batches - 1, 1), 0.5 + confidence / 2))
@@ -143,7 +145,7 @@ class Estimate:
     def __repr__(self) -> str:
         if np.ndim(self.value):
             return f"Estimate(shape {np.shape(self.value)}, {self.batches} batches)"
-        return f"{float(self.value):.6g} ± {float(self.standard_error):.3g}"
+        return f"{np.asarray(self.value)[()]:.6g} ± {float(self.standard_error):.3g}"
 
 
 class Batches:
@@ -202,5 +204,5 @@ class Batches:
 def _jackknife(value: Any, without: NDArray[np.float64], scale: Scale = LINEAR) -> Estimate:
     """A value with the standard error that follows from those with one part left out."""
     n = len(without)
-    spread = np.sqrt((n - 1) / n * ((without - without.mean(axis=0)) ** 2).sum(axis=0))
+    spread = np.sqrt((n - 1) / n * (np.abs(without - without.mean(axis=0)) ** 2).sum(axis=0))
     return Estimate(value, spread[()], n, without, scale)

@@ -95,8 +95,8 @@ class Ensemble(Result):
         return [dict(zip(columns, (seed_key(seed), *row), strict=True)) for seed, *row in rows]
 
     def plain(self) -> dict[str, Any]:
-        """Means with their standard errors, and what failed, as JSON has it."""
-        means = {name: self[name] for name in self._numbers}
+        """Means with their standard errors, and what failed, as JSON has it, which has no complex numbers."""
+        means = {name: self[name] for name in self._numbers if not np.iscomplexobj(self.values[name])}
         return {
             "realisations": len(self),
             "enough": self.enough,
