@@ -460,6 +460,14 @@ def test_bad_seeds(seeds, message):
 
 
 def test_bad_input(tmp_path):
+    with pytest.raises(ValueError, match=r"model must be a Model, got Scene.* scene.reduce\(modes=…\) makes one"):
+        ensemble(small_model().scene, 2, base_at)
+    with pytest.raises(ValueError, match="quantity must be a function of a model, got 'peak_force'"):
+        ensemble(small_model(), 2, "peak_force")
+    with pytest.raises(ValueError, match="values must be several, got 3"):
+        Estimate.of_mean(3.0)
+    with pytest.raises(ValueError, match=r"estimates must be of Estimate, got \[2.0\]"):
+        Estimate.joint(np.divide, Estimate.of_mean([1.0, 2.0]), 2.0)
     with pytest.raises(ValueError, match="needs a BandNoise"):
         ensemble(small_model(fb.Harmonic(1e-3, 100.0)), 2, base_at)
     with pytest.raises(ValueError, match="until must be"):

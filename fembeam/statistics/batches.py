@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.statistics.scales import LINEAR, Scale
-from fembeam.support import is_finite, require
+from fembeam.support import is_finite, numbers, require
 
 MOST = 64  # batches kept; beyond it neighbours are merged, so that memory stays constant
 
@@ -52,7 +52,9 @@ class Estimate:
     @classmethod
     def of_mean(cls, values: ArrayLike) -> Estimate:
         """The mean of independent values (n, ...) over the first axis; of complex ones s.e.² = Σ|x - x̄|²/((n-1) n)."""
-        samples = np.asarray(values) if np.iscomplexobj(values) else np.asarray(values, dtype=np.float64)
+        given = values if np.iscomplexobj(values) else numbers("values", values, "Estimate.of_mean", "give an array")
+        samples = np.asarray(given)
+        require(samples.ndim > 0, "values must be several", values, "Estimate.of_mean", "give an array (n, …) of them")
         n = len(samples)
         mean = samples.mean(axis=0)
         if n < 2:
@@ -80,6 +82,8 @@ class Estimate:
         >>> Estimate.joint(np.divide, b, a), round(float(b.value / a.value), 4)  # twice as much, part by part
         (2.01429 ± 0.0124, 2.0143)
         """
+        wrong = [one for one in estimates if not isinstance(one, Estimate)]
+        require(not wrong, "estimates must be of Estimate", wrong[:1], "Estimate.joint", 'e.g. response["δ"].variance')
         parts = {estimate.batches if estimate.without is not None else 0 for estimate in estimates}
         if len(parts) != 1 or min(parts) < 2:
             raise ValueError(f"estimates must have the same parts, at least 2, got {[e.batches for e in estimates]}")

@@ -172,6 +172,9 @@ def ensemble(
     >>> len(found), found.mean.relative < 0.2
     (8, True)
     """
+    require(isinstance(model, Model), "model must be a Model", model, "ensemble", "scene.reduce(modes=…) makes one")
+    require(callable(quantity), "quantity must be a function of a model", quantity, "ensemble",
+            "e.g. lambda model: model.simulate(50.0).contacts.peak_force.max()")  # fmt: skip
     chosen = _seeds(model, seeds)
     if until is not None and not 0.0 < number("until", until, above=0.0) < 1.0:
         raise ValueError(f"until must be a relative standard error below 1, got {until!r}")

@@ -10,7 +10,7 @@ Three kinds of run give them:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import pairwise
@@ -26,8 +26,8 @@ from fembeam.response import latched_before
 from fembeam.scene import Scene, signals_of
 from fembeam.study.execution.executors import finished
 from fembeam.study.quantities import Quantity, label
-from fembeam.study.realisations import child, renewed
-from fembeam.support import require, require_non_negative, require_positive
+from fembeam.study.realisations import child, renewed, seed_key
+from fembeam.support import is_whole, require, require_non_negative, require_positive
 
 Vector = NDArray[np.float64]
 Start = Callable[[Model], Any]
@@ -44,12 +44,14 @@ class Plan:
     duration: float | None = None
     dt: float | None = None
     discard: float = 0.0
-    seeds: tuple[int, ...] = ()
+    seeds: Sequence[int] = ()
     start: Start | None = None
     solver: Any = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "seeds", tuple(self.seeds))
+        object.__setattr__(self, "seeds", _checked_seeds(self.seeds))
+        require(self.start is None or callable(self.start), "start must be a function of a model", self.start, "study",
+                "e.g. lambda m: m.state(velocity=…)")  # fmt: skip
         if self.duration is not None:
             require_positive("duration", self.duration, "study", "give s, or None for a periodic response")
             require_non_negative("discard", self.discard, "study", "give s")
@@ -63,6 +65,7 @@ class Plan:
 
     def check(self, scene: Scene, quantity: Quantity) -> None:
         """Raise ValueError when the scene cannot be run like this."""
+        require(isinstance(scene, Scene), "scene must be a Scene", scene, "study", "of a model, give model.scene")
         if self.duration is None:
             try:
                 load_period(scene)
@@ -78,6 +81,17 @@ class Plan:
             signals = signals_of(scene)
             require(any(hasattr(signal, "seed") for signal in signals.values()), "seeds need noise", signals, "study",
                     "use BandNoise as base, force or foot, or leave out seeds")  # fmt: skip
+
+
+def _checked_seeds(seeds: Any) -> tuple[int, ...]:
+    """Seeds of realisations, none twice: equal ones have no scatter."""
+    listed = hasattr(seeds, "__iter__") and not isinstance(seeds, (str, bytes, dict))
+    require(listed, "seeds must be a list of seeds", seeds, "study", "e.g. range(8)")
+    chosen = tuple(seeds)
+    right = all(isinstance(one, np.random.SeedSequence) or (is_whole(one) and one >= 0) for one in chosen)
+    require(right, "seeds must be whole numbers of at least 0", chosen, "study", "e.g. range(8)")
+    require(len({*map(seed_key, chosen)}) == len(chosen), "seeds must differ", chosen, "study", "e.g. range(8)")
+    return chosen
 
 
 @dataclass(frozen=True, eq=False)

@@ -359,6 +359,7 @@ def _enough(response: Response, of: Callable[[Response], Any] | None, until: flo
 
 def check(model: Model, duration: float, dt: float, until: float | None, discard: float | None) -> None:
     """Bad input, before any computing."""
+    require(isinstance(model, Model), "model must be a Model", model, "stationary", "scene.reduce(modes=…) makes one")
     number("duration (s)", duration, above=0.0)
     number("dt (s)", dt, above=0.0)
     if not dt < duration / FEWEST_SAMPLES:

@@ -11,7 +11,7 @@ from concurrent.futures import Executor, as_completed
 from typing import TypeVar
 
 from fembeam.model import Run
-from fembeam.support import counting, interrupts
+from fembeam.support import counting, interrupts, require
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -49,6 +49,8 @@ def spread(
     ...     spread(abs, [-3, 2, -1], pool)
     [3, 2, 1]
     """
+    require(executor is None or hasattr(executor, "submit"), "executor must be one of concurrent.futures", executor,
+            "study", "e.g. ProcessPoolExecutor(4)")  # fmt: skip
     work = list(items)
     tell = seen or (lambda index, result: None)
     with counting(progress is not None, total=len(work), desc=progress) as bar:
