@@ -404,6 +404,8 @@ def test_a_part_of_a_run_reads_as_the_run():
     }
     run = fb.Scene(PAPER_BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.02), **parts).reduce(2).simulate(0.3, 1e-3)
     part, kept = cut(run, 0.1234, 0.2888), slice(124, 289)
+    np.testing.assert_allclose(part.end, run.model.simulate(0.288).end, rtol=1e-6, atol=1e-9)
+    assert np.array_equal(cut(run, 0.1, 0.3).end, run.end)
     np.testing.assert_allclose(part.t + 0.1234, run.t[kept], rtol=1e-12)
     for read in (
         lambda one: one.force(0),

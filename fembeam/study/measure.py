@@ -192,12 +192,20 @@ def cut(run: Run, start: float, end: float) -> Run:
         contacts=of_log("contacts", "t_in", "t_out"), ledger=partial(_ledger_of, run, kept),
         lost=partial(_lost_of, run, kept), rubbing=partial(of_log, "friction_log", "t_in", "t_out"),
         borders=partial(of_log, "transitions", "t"), reached=end - start,
-        began=latched_before(run, start),
+        began=latched_before(run, start), end=_end_of(run, kept),
         kept={"forces": run._forces[:, kept], "t": run.t[kept]},  # signals have the times of the run
     )  # fmt: skip
     if run.rubs.any() and run.sampled:
         part.__dict__["friction_loss"] = run.friction_loss[kept] - run.friction_loss[kept][:1]
     return part
+
+
+def _end_of(run: Run, kept: slice) -> Any:
+    """The state that a part of a run ends with, which without samples is not known but that of the run."""
+    if len(run.t) == 1 or kept.stop == len(run.t):
+        return run.end
+    last = kept.stop - 1
+    return np.concatenate((run.q[last], run.q_dot[last], *latched_before(run, run.t[last])))
 
 
 def _lost_of(run: Run, kept: slice) -> Any:
