@@ -421,6 +421,25 @@ def wrong_slope(delta, delta_dot, entry_rate, stiffness, damping=0.0):
     return stiffness * delta**2 + damping * delta * delta_dot
 
 
+def kinked(delta, delta_dot, entry_rate, stiffness):
+    return stiffness * max(delta, 5.0 * delta - 4e-4)
+
+
+def kinked_slopes(delta, delta_dot, entry_rate, stiffness):
+    return stiffness * (5.0 if delta > 1e-4 else 1.0), 0.0, 0.0
+
+
+LAW_OF_A_FUNCTION = law(kinked, knots=(1e-4,), derivative=kinked_slopes)
+
+
+def test_a_law_made_without_a_decorator():
+    """Its function keeps its own name; and a knot lies where derivatives are usually compared."""
+    one = LAW_OF_A_FUNCTION(stiffness=1e5) + Hertz(1e6)
+    again = pickle.loads(pickle.dumps(one))
+    assert (again, again.knots) == (one, (1e-4,))
+    assert again.force(3e-4) == one.force(3e-4)
+
+
 def test_a_given_derivative_is_used_and_checked():
     one = cubic(stiffness=1e9, damping=20.0)
     assert one.exponent == 3.0
