@@ -193,6 +193,7 @@ def cut(run: Run, start: float, end: float) -> Run:
         lost=partial(_lost_of, run, kept), rubbing=partial(of_log, "friction_log", "t_in", "t_out"),
         borders=partial(of_log, "transitions", "t"), reached=end - start,
         began=latched_before(run, start), end=_end_of(run, kept),
+        made=run.made if start == 0.0 and end >= run.reached else None,
         kept={"forces": run._forces[:, kept], "t": run.t[kept]},  # signals have the times of the run
     )  # fmt: skip
     if run.rubs.any() and run.sampled:
