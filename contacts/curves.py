@@ -163,10 +163,13 @@ class Tabulated(Law):
             raise ValueError(
                 f"Tabulated needs as many forces as indentations, got {len(points[1])} and {len(points[0])}"
             )
+        if points[0] and points[0][0] < 0.0:
+            first = f"got {points[0][0]:g} m first; leave out what was measured in the gap"
+            raise ValueError(f"indentation of Tabulated must be >= 0 and ascend, {first}")
         if not points[0] or points[0][0] > 0.0:
             points = (0.0, *points[0]), (0.0, *points[1])
         steps, rises = np.diff(points[0]), np.diff(points[1])
-        if points[0][0] != 0.0 or not np.all(steps > 0.0):
+        if not np.all(steps > 0.0):
             row = int(np.argmin(steps > 0.0))
             raise ValueError(
                 f"indentation of Tabulated must be >= 0 and ascend, got {points[0][row]:g} m, "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from importlib import import_module
 from typing import Any, ClassVar
 
@@ -59,16 +59,24 @@ class CustomLaw(Law):
         return doc.splitlines()[0] if doc else f"F = {self.name}{inspect.signature(self.function)}"
 
     def __reduce__(self) -> tuple:
-        """Pickle by the decorated function's name, so that laws travel to worker processes."""
-        return _rebind, (self.function.__module__, self.function.__qualname__, self.values)
+        """Pickle by the function's name, so that laws travel to worker processes; it stands for what was decorated."""
+        place = self.function.__module__, self.function.__qualname__
+        if "<locals>" not in place[1] and _named(*place) is self.function:  # ``law(function)`` has another name
+            return CustomLaw, tuple(getattr(self, one.name) for one in fields(self))
+        return _rebind, (*place, self.values)
 
 
 def _rebind(module: str, qualname: str, values: tuple[tuple[str, float], ...]) -> CustomLaw:
     """Find the decorated function again and bind its parameters."""
+    return _named(module, qualname)(**dict(values))  # type: ignore[no-any-return]
+
+
+def _named(module: str, qualname: str) -> Any:
+    """What a module has under a name."""
     found: Any = import_module(module)
     for part in qualname.split("."):
         found = getattr(found, part)
-    return found(**dict(values))
+    return found
 
 
 def law(
@@ -123,6 +131,8 @@ def law(
         raise TypeError(f"@law decorates a plain function, got {function!r}")
     who = function.__name__
     names = _checked_names(function, f"law {who!r}")
+    if not (derivative is None or inspect.isfunction(derivative)):
+        raise TypeError(f"derivative of law {who!r} must be a plain function, got {derivative!r}")
     if derivative is not None and _checked_names(derivative, f"derivative of law {who!r}") != names:
         raise TypeError(f"derivative of law {who!r} must take the law's arguments, ({', '.join(names)})")
     if not isinstance(jump, bool):
@@ -231,7 +241,7 @@ def _check_derivative(made: CustomLaw) -> None:
     import ctypes
 
     pointer = ctypes.POINTER(ctypes.c_double)
-    delta, delta_dot = np.array([1e-4, 3e-4]), np.array([0.3, -0.2])
+    delta, delta_dot = np.array([_off_knots(made, place) for place in (1e-4, 3e-4)]), np.array([0.3, -0.2])
     kernels = (made.gradient, difference_kernel(made.function, len(made.values)))
     found = np.empty((2, 3, 2))
     for kernel, out in zip(kernels, found, strict=True):
@@ -241,6 +251,13 @@ def _check_derivative(made: CustomLaw) -> None:
         scale = np.max(np.abs(expected)) + 1e-9 * np.max(np.abs(made.force(delta, delta_dot, 0.7)))
         if not np.all(np.abs(given - expected) <= 1e-3 * scale):
             raise ValueError(
-                f"derivative of law {made.name!r} by {name} is {given[0]:g} at delta = 1e-4 m, delta_dot = 0.3 m/s, "
-                f"entry_rate = 0.7 m/s, but differences of the force give {expected[0]:g}"
+                f"derivative of law {made.name!r} by {name} is {given[0]:g} at delta = {delta[0]:g} m, "
+                f"delta_dot = 0.3 m/s, entry_rate = 0.7 m/s, but differences of the force give {expected[0]:g}"
             )
+
+
+def _off_knots(made: CustomLaw, place: float) -> float:
+    """An indentation from a place on at which the law has no kink."""
+    while any(abs(knot - place) < 1e-3 * place for knot in made.knots):
+        place *= 1.01
+    return place

@@ -57,9 +57,10 @@ def _shown(value: Any) -> str:
 
 
 def _cycle(law: Law) -> str:
-    """Loss of the second slow cycle, large enough for all of the memory."""
+    """Loss of the second slow cycle, large enough for all of the memory; parts without one lose nothing."""
     X = law.reach
-    lost = work(law, [0.0, X, -X, X, -X, X]) - work(law, [0.0, X, -X, X])
+    one, two = [0.0, X, -X, X], [0.0, X, -X, X, -X, X]
+    lost = sum(work(part, two) - work(part, one) for part in parts_of(law) if part.memory)
     return f"a slow cycle between δ = ±{X:.4g} m loses {lost:.6g} J"
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Sequence
 from numbers import Real
 from pathlib import Path
@@ -99,15 +98,23 @@ def check_restitution(value: Any, who: str, low_open: bool, why: str = "") -> fl
 def read_columns(path: str | Path, names: Sequence[str], optional: Sequence[str] = ()) -> dict[str, Vector]:
     """Columns of a text file by the names in its first line, separated by comma, semicolon, tab or blanks.
 
-    Empty lines and lines that begin with # are skipped; other columns are ignored. Raises ValueError for a missing
-    column (with those there) and for an entry that is no number (with its line).
+    A semicolon or tab wins over a comma, a comma over blanks. Empty lines and lines that begin with # are skipped,
+    other columns ignored. Raises ValueError for a missing column (with those there), for an entry that is no number and
+    for a line of more entries than names (with its line), and for a file that is no text.
     """
-    lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+    try:
+        lines = Path(path).read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{path} is no text file in UTF-8: {error}") from None
     rows = [(n, _cells(line)) for n, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")]
     header = [cell.lower() for cell in rows[0][1]] if rows else []
     missing = [name for name in names if name not in header]
     if missing:
         raise ValueError(f"{path}: no column {missing[0]!r}; its first line names {', '.join(header) or 'nothing'}")
+    for n, cells in rows[1:]:
+        if any(cells[len(header) :]):
+            raise ValueError(f"{path}, line {n}: {len(cells)} entries, but the first line names {len(header)} columns; "
+                             "write decimal points, not commas")  # fmt: skip
     wanted = [name for name in (*names, *optional) if name in header]
     places = [header.index(name) for name in wanted]
     values = [[_value(path, n, cells, place) for place in places] for n, cells in rows[1:]]
@@ -116,9 +123,9 @@ def read_columns(path: str | Path, names: Sequence[str], optional: Sequence[str]
 
 
 def _cells(line: str) -> list[str]:
-    """Cells of a line."""
-    parts = re.split(r"[,;\t]", line) if re.search(r"[,;\t]", line) else line.split()
-    return [part.strip().strip('"') for part in parts]
+    """Cells of a line; a semicolon or tab wins over a comma, so that decimal commas are seen."""
+    mark = next((mark for mark in ";\t," if mark in line), None)
+    return [part.strip().strip('"') for part in line.split(mark)]
 
 
 def _value(path: str | Path, line: int, cells: list[str], place: int) -> float:

@@ -277,6 +277,26 @@ def test_table_from_a_file(tmp_path):
         Tabulated.from_csv(path)
 
 
+@pytest.mark.parametrize(("text", "message"), [
+    ("delta;force\n0,0;0,0\n1,5;7,5\n2,5;9,5\n", "line 2: column 1 must be a number, got '0,0'"),
+    ("delta,force\n0,0,0,0\n1,5,7,5\n", "line 2: 4 entries, but the first line names 2 columns; write decimal points"),
+    ("delta\tforce\n1\t7,5\n", "line 2: column 2 must be a number, got '7,5'"),
+])  # fmt: skip
+def test_decimal_commas_are_no_columns(tmp_path, text, message):
+    """Each was read as a table of other points: 1,5 and 7,5 as δ = 1 and F = 5."""
+    path = tmp_path / "curve.csv"
+    path.write_text(text)
+    with pytest.raises(ValueError, match=message):
+        Tabulated.from_csv(path)
+
+
+def test_a_table_that_is_no_text(tmp_path):
+    path = tmp_path / "curve.xls"
+    path.write_bytes(b"\xd0\xcf\x11\xe0")
+    with pytest.raises(ValueError, match=r"curve.xls is no text file in UTF-8"):
+        Tabulated.from_csv(path)
+
+
 @pytest.mark.parametrize(
     ("one", "words"),
     [
@@ -401,6 +421,25 @@ def wrong_slope(delta, delta_dot, entry_rate, stiffness, damping=0.0):
     return stiffness * delta**2 + damping * delta * delta_dot
 
 
+def kinked(delta, delta_dot, entry_rate, stiffness):
+    return stiffness * max(delta, 5.0 * delta - 4e-4)
+
+
+def kinked_slopes(delta, delta_dot, entry_rate, stiffness):
+    return stiffness * (5.0 if delta > 1e-4 else 1.0), 0.0, 0.0
+
+
+LAW_OF_A_FUNCTION = law(kinked, knots=(1e-4,), derivative=kinked_slopes)
+
+
+def test_a_law_made_without_a_decorator():
+    """Its function keeps its own name; and a knot lies where derivatives are usually compared."""
+    one = LAW_OF_A_FUNCTION(stiffness=1e5) + Hertz(1e6)
+    again = pickle.loads(pickle.dumps(one))
+    assert (again, again.knots) == (one, (1e-4,))
+    assert again.force(3e-4) == one.force(3e-4)
+
+
 def test_a_given_derivative_is_used_and_checked():
     one = cubic(stiffness=1e9, damping=20.0)
     assert one.exponent == 3.0
@@ -454,6 +493,7 @@ def test_a_law_that_pulls_at_rest_is_refused():
     ("make", "message"),
     [
         (lambda: law(3.0), "decorates a plain function"),
+        (lambda: law(derivative=3.0)(lambda delta, delta_dot, entry_rate: delta), "derivative of law .* got 3.0"),
         (lambda: law(lambda delta, delta_dot, entry_rate, *more: delta), r"plain arguments only, got '\*more'"),
         (lambda: law(lambda delta, delta_dot, entry_rate=1.0: delta), "have no default"),
     ],
@@ -523,6 +563,7 @@ REFUSED = [  # what is made of a value, the values that are refused, and in whic
         (([1e-3, 2e-3], [10.0]), "as many forces as indentations, got 1 and 2"),
         (([2e-3, 1e-3], [10.0, 20.0]), "must be >= 0 and ascend, got 0.002 m, then 0.001 m"),
         (([-1e-3, 1e-3], [0.0, 20.0]), "must be >= 0 and ascend"),
+        (([-1e-3], [1.0]), "must be >= 0 and ascend, got -0.001 m first"),
         (([1e-3, 2e-3], [20.0, 10.0]), "must not fall with indentation .* got 20 then 10 N; smooth"),
         (([0.0, 1e-3], [1.0, 10.0]), "force 0 at indentation 0, got 1 N; subtract the offset"),
         (([1e-3], [0.0]), "must end above 0"),

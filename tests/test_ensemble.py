@@ -21,7 +21,8 @@ from problems import ROD
 import fembeam as fb
 import solvers
 from contacts import Hertz, Hysteretic, law
-from fembeam.study import characteristics, ensemble
+from fembeam.statistics import Estimate
+from fembeam.study import Ensemble, characteristics, ensemble
 
 HERE = Path(__file__).parent
 
@@ -330,6 +331,29 @@ def test_numbers_that_some_realisations_lack():
     assert np.isnan(found["never"].value)
 
 
+def test_complex_values_keep_their_imaginary_part():
+    """Of the parts' means and errors: the squares of the errors add up."""
+    values = np.array([1.0 + 2.0j, 2.0 - 1.0j, 4.0 + 0.5j])
+    found, parts = Ensemble((1, 2, 3), {"": values}).mean, [Estimate.of_mean(one) for one in (values.real, values.imag)]
+    assert found.value == pytest.approx(parts[0].value + 1j * parts[1].value)
+    assert found.standard_error == pytest.approx(np.hypot(*(one.standard_error for one in parts)))
+    assert Estimate.joint(lambda x: 2.0 * x, found).standard_error == pytest.approx(2.0 * found.standard_error)
+    assert repr(found) == "2.33333+0.5j ± 1.24"
+    with pytest.raises(ValueError, match="an interval must be of real values"):
+        found.interval()
+
+
+def test_values_that_other_realisations_lack_are_not_paired():
+    """Of 1, 2 and of 2, 4 by twos: the ratio of what the same two realisations have is 2 without scatter."""
+    values = {"a": np.array([1.0, np.nan, 2.0]), "b": np.array([2.0, 4.0, np.nan]), "twice": np.array([2.0, 5.0, 4.0])}
+    found = Ensemble((7, 8, 9), values)
+    with pytest.raises(ValueError, match="must have the same parts in one order, but some lack 8, 9; make each"):
+        Estimate.joint(np.divide, found["b"], found["a"])
+    other = Ensemble((7, 9), {"twice": values["twice"][[0, 2]]})
+    ratio = Estimate.joint(np.divide, other["twice"], found["a"])
+    assert (ratio.value, ratio.standard_error) == (2.0, 0.0)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -436,6 +460,14 @@ def test_bad_seeds(seeds, message):
 
 
 def test_bad_input(tmp_path):
+    with pytest.raises(ValueError, match=r"model must be a Model, got Scene.* scene.reduce\(modes=…\) makes one"):
+        ensemble(small_model().scene, 2, base_at)
+    with pytest.raises(ValueError, match="quantity must be a function of a model, got 'peak_force'"):
+        ensemble(small_model(), 2, "peak_force")
+    with pytest.raises(ValueError, match="values must be several, got 3"):
+        Estimate.of_mean(3.0)
+    with pytest.raises(ValueError, match=r"estimates must be of Estimate, got \[2.0\]"):
+        Estimate.joint(np.divide, Estimate.of_mean([1.0, 2.0]), 2.0)
     with pytest.raises(ValueError, match="needs a BandNoise"):
         ensemble(small_model(fb.Harmonic(1e-3, 100.0)), 2, base_at)
     with pytest.raises(ValueError, match="until must be"):
@@ -447,3 +479,18 @@ def test_bad_input(tmp_path):
         ensemble(small_model(), 2, lambda model: np.ones(next(lengths)))
     with pytest.raises(RuntimeError, match="must be a number or an array of numbers, got str"):
         ensemble(small_model(), 2, lambda model: "much")
+
+
+def stopped(model):
+    """What a run gives that Ctrl-C ends: a user's quantity sees nothing of it."""
+    stop = lambda t: signal.raise_signal(signal.SIGINT)  # noqa: E731
+    start = np.zeros(len(model.omega))
+    return float(solvers.integrate(model.for_duration(1e3).system, start, start, 1e3, progress=stop).t[-1])
+
+
+def test_ctrl_c_in_a_run_of_the_quantity_ends_the_ensemble(tmp_path):
+    """The run ends there with what it has, which is no value of the quantity."""
+    with pytest.raises(KeyboardInterrupt):
+        ensemble(small_model(), 2, stopped, checkpoint=tmp_path / "kept.npz")
+    assert list(tmp_path.iterdir()) == []
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -18,7 +18,9 @@ from contacts import (
     Iwan,
     Jenkins,
     KelvinVoigt,
+    PiecewiseLinear,
     Polynomial,
+    Tabulated,
     WaltonBraun,
     bounce,
     kernels,
@@ -301,6 +303,9 @@ def test_what_a_law_says():
     assert "grows without bound" in BoucWen(1e4, 0.1, 1.0, 1.0, -2.0).describe()
     assert "Jenkins" in SUM.describe()
     assert "loses" in SUM.describe()
+    sliders = Jenkins(2e4, 1.0) + Jenkins(1e4, 4.0)  # 4 f (X - f/k) of each at X = 0.8 mm, whatever is beside them
+    for beside in (Hertz(1e8), PiecewiseLinear([1e3, 1e6], knots=[4e-5]), Tabulated([1e-5, 1e-4], [0.01, 80.0])):
+        assert "δ = ±0.0008 m loses 0.0094 J" in (sliders + beside).describe()
     assert STOPS.describe().count("\n") == 3
 
 

@@ -11,6 +11,7 @@ from oscillators import Tone
 import fembeam as fb
 from contacts import Hertz, Hysteretic, Iwan, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
 from fembeam.scene import with_value
+from fembeam.study.measure import cut
 from solvers import Contact, Exponential, Nearby, NoDerivativeError, System, integrate, sensitivity
 
 FINE = Exponential(1e-11)
@@ -451,5 +452,7 @@ def test_refusals_of_runs(run, tmp_path):
         run.sensitivity("stops[0].gap", start=np.zeros(4))
     with pytest.raises(ValueError, match=r"\(4,\) finite numbers"):
         run.sensitivity(start=[1.0])
+    with pytest.raises(ValueError, match="nor has a part of a run, which studies look at"):
+        cut(run, 0.5 * run.reached, run.reached).sensitivity(start=np.ones(2 * len(run.model.omega)))
     with pytest.raises(ValueError, match="read from a file"):
         fb.load(run.save(tmp_path / "run.npz")).sensitivity("stops[0].gap")

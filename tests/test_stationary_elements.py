@@ -110,6 +110,10 @@ def test_damping_of_the_structure_counts_first():
     ({"watch": {"rate": 5}}, r"watch\['rate'\] must be a function of a run, got 5"),
     ({"watch": {"rate": lambda run: 1.0}}, r"watch\['rate'\] must return a value for each of the \d+ samples"),
     ({"watch": {"rate": lambda run: "x"}}, r"watch\['rate'\] must be real numbers, got 'x'"),
+    ({"watch": {3: lambda run: run.t}}, "names of watch must be text, got 3"),
+    ({"until": 0.1, "of": 3}, "of must be a function of a response, got 3"),
+    ({"until": 0.1, "of": lambda r: r["rate"].std.value}, "of must return an Estimate, or several, got "),
+    ({"start": "x"}, "start must be real numbers, got 'x'"),
 ])  # fmt: skip
 def test_wrong_options_of_a_stationary_response_are_named(wrong, message):
     beam = ROD

@@ -8,7 +8,7 @@ import pytest
 
 import fembeam as fb
 import solvers
-from contacts import Hertz
+from contacts import Hertz, Jenkins, KelvinVoigt
 from fembeam.statistics import Batches, Estimate, Impacts, Signal, moments, psd, settling
 from fembeam.statistics.batches import MOST
 from fembeam.statistics.scales import KURTOSIS, LEVEL, LINEAR, SKEWNESS
@@ -205,13 +205,13 @@ def test_powers_of_several_bands_are_those_of_each():
 def test_crossings_with_rates_are_those_of_the_cubics():
     rng = np.random.default_rng(6)
     x, rate = np.round(rng.standard_normal(1000)), 30.0 * rng.standard_normal(1000)  # zeros among them
-    a, b, u, v = x[:-1], x[1:], 0.1 * rate[:-1], 0.1 * rate[1:]
-    part = np.linspace(0.0, 1.0, 2001)[:-1, None]
-    cubics = a + part * (u + part * (3 * (b - a) - 2 * u - v + part * (2 * (a - b) + u + v)))
-    peak = (a <= 0) & (b <= 0) & (u > 0) & (v < 0) & (cubics.max(axis=0) > 0)
-    trough = (a > 0) & (b > 0) & (u < 0) & (v > 0) & (cubics.min(axis=0) < 0)
-    true = np.count_nonzero(peak | trough | ((a <= 0) & (b > 0)))
-    assert abs(up_crossings(x, rate, 0.1) - true) <= 2  # peaks lower than the fine grid shows
+    true = 0
+    for a, b, u, v in zip(x[:-1], x[1:], 0.1 * rate[:-1], 0.1 * rate[1:], strict=True):
+        cubic = np.polynomial.Polynomial([a, u, 3 * (b - a) - 2 * u - v, 2 * (a - b) + u + v])
+        extrema = np.sort([root.real for root in cubic.deriv().roots() if root.imag == 0.0 and 0.0 < root.real < 1.0])
+        values = np.array([a, *cubic(extrema), b])
+        true += np.count_nonzero((values[:-1] <= 0.0) & (values[1:] > 0.0))
+    assert abs(up_crossings(x, rate, 0.1) - true) <= 2  # extrema of 0 are above it or not by rounding
 
 
 def test_estimates_say_when_they_know_nothing():
@@ -247,6 +247,21 @@ def test_impacts_by_batch_are_those_of_the_log():
     assert impacts.largest["peak_force"] == 4.0
     with pytest.raises(ValueError, match="no quantity 'speed'"):
         impacts.mean("speed")
+
+
+def test_a_contact_that_one_segment_hands_to_the_next_began_once(monkeypatch):
+    """Under tones: what always presses never enters, and with memory segments are cut wherever they end."""
+    pressed = cantilever(1, base=fb.Harmonic(2e-4, 160.0), stops=[fb.Stop(0.3, law=KelvinVoigt(1e5, 10.0), gap=-1e-3)])
+    slider = replace(
+        pressed.scene, elements=[fb.Element(0.3, Jenkins(1e5, 2.0))], stops=[fb.Stop(0.5, KelvinVoigt(1e5, 50.0))]
+    )
+    for model in (pressed, slider.reduce(modes=1)):
+        whole = stationary(model, 8.0, 1e-3, discard=1.0)
+        with monkeypatch.context() as short:
+            short.setattr(segments, "SEGMENT", 34.0)
+            parts = stationary(model, 8.0, 1e-3, discard=1.0)
+        assert parts.impacts[0].number == whole.impacts[0].number
+        assert parts.impacts[0].probability.value == pytest.approx(whole.impacts[0].probability.value, rel=1e-3)
 
 
 @pytest.mark.drawn
@@ -415,6 +430,7 @@ def test_it_stops_when_enough_is_known():
     by_mean = stationary(model, 300.0, 2e-3, until=0.001, of=lambda r: r["tip u"].kurtosis)
     assert by_mean.enough is False
     assert by_mean.duration == pytest.approx(300.0)
+    assert stationary(model, 20.0, 2e-3, until=0.5).enough  # known from four batches, all there are
 
 
 def test_the_same_seed_gives_the_same_bits_and_the_model_is_left_alone():
@@ -429,6 +445,22 @@ def test_a_record_is_one_segment():
     record = fb.Record(t, 1e-5 * coloured(3, t.size), band=(5.0, 600.0))
     found = stationary(cantilever(1, base=record), 60.0, 2e-3)
     assert found.duration + found.discarded == pytest.approx(60.0)
+
+
+def test_a_record_is_not_all_left_out():
+    record = fb.Record(np.linspace(0.0, 8.0, 801), 1e-5 * coloured(3, 801), band=(5.0, 600.0))
+    with pytest.raises(ValueError, match=r"discard must leave at least 64 samples of the duration of 6 s, got 5.9 s"):
+        stationary(cantilever(1, base=record), 6.0, 2e-3, discard=5.9)
+
+
+def test_few_samples_under_tones():
+    """What is left after the last free flight may be a few samples, and a lead-in longer than the rest of the run."""
+    stop = fb.Stop(0.5, KelvinVoigt(1e5, 50.0))
+    model = cantilever(2, base=fb.Harmonic(2e-4, 160.0), stops=[stop])
+    for samples in range(100, 112):
+        for discard in (0.0, 3.0):
+            found = stationary(model, samples * 2e-3, 2e-3, discard=discard)
+            assert found.duration == pytest.approx(samples * 2e-3, abs=3e-3)
 
 
 def test_a_transient_that_lasts_is_warned_of():

@@ -239,6 +239,16 @@ def growing(run):
         ((SCENE, [1], "peak_force", 1.0, None, 0.0, [1, 2, 3]), "seeds need noise"),
         ((SCENE, [1], "peak_force", 1.0, None, 0.0, [1]), "seeds must be at least 3"),
         ((SCENE, [1], "peak_force", None, None, 0.0, [1, 2, 3]), "seeds need a duration"),
+        ((SCENE, [1], "peak_force", 1.0, None, 0.0, 8), "seeds must be a list of seeds, got 8"),
+        ((SCENE, [1], "peak_force", 1.0, None, 0.0, [1, 2, 1]), "seeds must differ, got "),
+        ((SCENE, [1], "peak_force", 1.0, None, 0.0, [1.5, 2, 3]), "seeds must be whole numbers"),
+        ((SCENE, 3, "peak_force", 1.0), "counts must be a list of numbers of modes, got 3"),
+        ((SCENE.reduce(modes=1), [1], "peak_force", 1.0), "scene must be a Scene, got .* of a model, give model.scene"),
+        ((SCENE, [1], "peak_force", 1.0, None, 0.0, (), None, None, [0.0, 0.0]), "start must be a function of a model"),
+        (
+            (SCENE, [1], "peak_force", 1.0, None, 0.0, (), None, None, None, None, 4),
+            "executor must be one of concurrent",
+        ),
         ((STIFF, [1], "peak_force"), "study without duration needs a periodic response: an orbit"),
         ((STIFF, [1], "peak_force", 0.01), "reference value must be finite and not zero"),
         ((FREE, [1], "contact_time", 0.01), "reference value must be finite and not zero"),
@@ -394,6 +404,8 @@ def test_a_part_of_a_run_reads_as_the_run():
     }
     run = fb.Scene(PAPER_BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.02), **parts).reduce(2).simulate(0.3, 1e-3)
     part, kept = cut(run, 0.1234, 0.2888), slice(124, 289)
+    np.testing.assert_allclose(part.end, run.model.simulate(0.288).end, rtol=1e-6, atol=1e-9)
+    assert np.array_equal(cut(run, 0.1, 0.3).end, run.end)
     np.testing.assert_allclose(part.t + 0.1234, run.t[kept], rtol=1e-12)
     for read in (
         lambda one: one.force(0),

@@ -436,6 +436,7 @@ def test_tables_are_checked_when_read(file_of, old, new, said):
     ({"quantity": "density"}, "density must be one number at every point"),
     ({"dt": None}, "rms needs samples"),
     ({"seeds": range(4)}, "seeds need noise"),
+    ({"checkpoint": 3}, "checkpoint must be the path of a file, got 3"),
     ({"duration": -1.0}, "duration must be finite and positive"),
 ])  # fmt: skip
 def test_bad_input(change, said):
@@ -461,6 +462,8 @@ def test_bad_bounds(change, said):
 
 
 def test_what_is_no_such_thing():
+    with pytest.raises(ValueError, match="scene must be a Scene or a function that makes one, got 3"):
+        fb.study.vary(3, {"gap": [0.0]}, "rms", 0.1)
     with pytest.raises(TypeError, match="quantity must be a name or a function of a run"):
         fb.study.vary(paper_scene(), {"gap": [0.0]}, 3, 0.1)
     found = fb.study.vary(paper_scene(), {"gap": [0.0]}, "peak_force", 0.05)

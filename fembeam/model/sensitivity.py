@@ -345,7 +345,10 @@ def _made(run: Run) -> tuple[Model, tuple[Vector, Vector, float], dict[str, Any]
     """The model of a run, its q, q̇ and duration, and how it was made."""
     made, model = run.made, run.model
     if model is None or made is None:
-        raise ValueError("a run read from a file has no model to be derived from; simulate it again")
+        raise ValueError(
+            "a run read from a file has no model to be derived from, nor has a part of a run, which studies look at "
+            "with discard= or without duration=; simulate it again"
+        )
     q, q_dot = np.split(made.start[: 2 * len(model.omega)], 2)
     times = run.t if run.sampled else np.array([made.duration])
     return model, (q, q_dot, made.duration), {"times": times, "method": made.solver, "memory": run.began or None}

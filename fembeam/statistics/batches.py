@@ -12,14 +12,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.statistics.scales import LINEAR, Scale
-from fembeam.support import is_finite
+from fembeam.support import is_finite, numbers, require
 
 MOST = 64  # batches kept; beyond it neighbours are merged, so that memory stays constant
 
@@ -34,6 +34,7 @@ class Estimate:
     batches : independent parts behind it.
     without : (batches, ...) values with one part left out each; None when they were not kept.
     scale : on which the estimate scatters like a Gaussian; `interval` is symmetric there.
+    parts : names of the parts, such as the seeds of an ensemble; () when they go by their order.
 
     Examples
     --------
@@ -46,11 +47,14 @@ class Estimate:
     batches: int
     without: Any = field(default=None, repr=False)
     scale: Scale = field(default=LINEAR, repr=False)
+    parts: tuple[str, ...] = field(default=(), repr=False)
 
     @classmethod
     def of_mean(cls, values: ArrayLike) -> Estimate:
-        """The mean of independent values (n, ...) over the first axis."""
-        samples = np.asarray(values, dtype=np.float64)
+        """The mean of independent values (n, ...) over the first axis; of complex ones s.e.² = Σ|x - x̄|²/((n-1) n)."""
+        given = values if np.iscomplexobj(values) else numbers("values", values, "Estimate.of_mean", "give an array")
+        samples = np.asarray(given)
+        require(samples.ndim > 0, "values must be several", values, "Estimate.of_mean", "give an array (n, …) of them")
         n = len(samples)
         mean = samples.mean(axis=0)
         if n < 2:
@@ -70,7 +74,7 @@ class Estimate:
 
         Raises
         ------
-        ValueError : their numbers of parts differ, or are below 2.
+        ValueError : their parts differ, or are below 2: of an ensemble, when values are missing for other seeds.
 
         Examples
         --------
@@ -78,11 +82,20 @@ class Estimate:
         >>> Estimate.joint(np.divide, b, a), round(float(b.value / a.value), 4)  # twice as much, part by part
         (2.01429 ± 0.0124, 2.0143)
         """
+        wrong = [one for one in estimates if not isinstance(one, Estimate)]
+        require(not wrong, "estimates must be of Estimate", wrong[:1], "Estimate.joint", 'e.g. response["δ"].variance')
         parts = {estimate.batches if estimate.without is not None else 0 for estimate in estimates}
         if len(parts) != 1 or min(parts) < 2:
             raise ValueError(f"estimates must have the same parts, at least 2, got {[e.batches for e in estimates]}")
+        named = list({estimate.parts for estimate in estimates if estimate.parts})
+        if len(named) > 1:
+            odd = sorted(set(named[0]).union(*named) - set(named[0]).intersection(*named))
+            lack = f", but some lack {', '.join(odd[:8])}" * bool(odd)
+            raise ValueError(f"estimates must have the same parts in one order{lack}; make each of the values that all "
+                             "have: Estimate.of_mean(ensemble.values[name][both])")  # fmt: skip
         without = [function(*row) for row in zip(*(estimate.without for estimate in estimates), strict=True)]
-        return _jackknife(function(*(estimate.value for estimate in estimates)), np.array(without))
+        found = _jackknife(function(*(estimate.value for estimate in estimates)), np.array(without))
+        return replace(found, parts=next(iter(named), ()))
 
     @property
     def relative(self) -> float:
@@ -113,6 +126,8 @@ class Estimate:
         """
         if not (is_finite(confidence) and 0.0 < confidence < 1.0):
             raise ValueError(f"confidence must lie between 0 and 1, got {confidence!r}")
+        real = not np.iscomplexobj(self.value)
+        require(real, "an interval must be of real values", self.value, "Estimate", "take real, imaginary part or size")
         from scipy.special import stdtrit
 
         reach = float(stdtrit(max(self.batches - 1, 1), 0.5 + confidence / 2))
@@ -134,7 +149,7 @@ class Estimate:
     def __repr__(self) -> str:
         if np.ndim(self.value):
             return f"Estimate(shape {np.shape(self.value)}, {self.batches} batches)"
-        return f"{float(self.value):.6g} ± {float(self.standard_error):.3g}"
+        return f"{np.asarray(self.value)[()]:.6g} ± {float(self.standard_error):.3g}"
 
 
 class Batches:
@@ -193,5 +208,5 @@ class Batches:
 def _jackknife(value: Any, without: NDArray[np.float64], scale: Scale = LINEAR) -> Estimate:
     """A value with the standard error that follows from those with one part left out."""
     n = len(without)
-    spread = np.sqrt((n - 1) / n * ((without - without.mean(axis=0)) ** 2).sum(axis=0))
+    spread = np.sqrt((n - 1) / n * (np.abs(without - without.mean(axis=0)) ** 2).sum(axis=0))
     return Estimate(value, spread[()], n, without, scale)

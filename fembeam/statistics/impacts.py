@@ -31,7 +31,8 @@ class Impacts:
     Notes
     -----
     Entries count where they fall, time in contact where it passes, so neither is biased by where batches end. A contact
-    counts for the means in the batch it began in, unless it has not ended when a segment of the run ends.
+    counts for the means in the batch it began in, unless it has not ended when a segment of the run ends. One that is
+    under way when a run begins counts as time in contact only: it began before.
     """
 
     def __init__(self) -> None:
@@ -42,7 +43,7 @@ class Impacts:
         """One batch: what the log says of a stop between two times (s)."""
         t_out = np.where(np.isnan(log.t_out), end, log.t_out)
         mine = (log.stop == stop) & (log.t_in < end) & (t_out > start)
-        entered = mine & (log.t_in >= start)
+        entered = mine & (log.t_in >= start) & (log.t_in > 0.0)
         whole = entered & np.isfinite(log.t_out)
         row = np.zeros(self.batches.rows.shape[1])
         row[TIME] = end - start

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -155,27 +156,36 @@ class Signal:
 
 
 def up_crossings(x: Vector, rate: Vector | None, dt: float) -> int:
-    """How often samples x (k,) go from below to above 0; with rates, by the cubic between two samples.
+    """How often samples x (k,) go from below to above 0; with rates, the cubics between two samples.
 
-    A pair of crossings between two samples on one side shows when the cubic's extremum lies on the other.
+    A cubic changes its sign no more often than its Bézier points x, x + ẋ dt/3, x - ẋ dt/3, x do. Where these do so
+    more than once, its extrema decide.
     """
-    below, above = x <= 0.0, x > 0.0
-    count = int(np.count_nonzero(below[:-1] & above[1:]))
+    count = _rises(x[:-1], x[1:])
     if rate is None:
         return count
-    rising, falling = rate > 0.0, rate < 0.0
-    peaks = np.flatnonzero(below[:-1] & below[1:] & rising[:-1] & falling[1:])
-    troughs = np.flatnonzero(above[:-1] & above[1:] & falling[:-1] & rising[1:])
-    ends = [(x[at], x[at + 1], rate[at] * dt, rate[at + 1] * dt) for at in (peaks, troughs)]
-    return count + _peeks(*ends[0]) + _peeks(*(-values for values in ends[1]))
+    above, second, third = x > 0.0, (x + dt / 3 * rate)[:-1] > 0.0, (x - dt / 3 * rate)[1:] > 0.0
+    changes = above[:-1] != second, second != third, third != above[1:]
+    several = np.flatnonzero(changes[0] & changes[1] | changes[1] & changes[2] | changes[2] & changes[0])
+    a, b = x[several], x[several + 1]
+    on_the_way = (a, *_extrema(a, b, dt * rate[several], dt * rate[several + 1]), b)
+    return count - _rises(a, b) + sum(_rises(*pair) for pair in pairwise(on_the_way))
 
 
-def _peeks(a: Vector, b: Vector, u: Vector, v: Vector) -> int:
-    """How many cubics from a <= 0 to b <= 0, with slopes u > 0 and v < 0 per step, rise above 0."""
+def _rises(before: Vector, after: Vector) -> int:
+    """How many pairs go from below to above 0."""
+    return int(np.count_nonzero((before <= 0.0) & (after > 0.0)))
+
+
+def _extrema(a: Vector, b: Vector, u: Vector, v: Vector) -> Vector:
+    """(2, k) extrema of cubics from a to b with slopes u and v per step, in order; a for one that is none."""
     c2, c3 = 3 * (b - a) - 2 * u - v, 2 * (a - b) + u + v  # a + uθ + c2 θ² + c3 θ³
-    # the maximum: 3 c3 θ² + 2 c2 θ + u = 0, in the form without cancellation
-    theta = u / (-c2 + np.sqrt(np.maximum(c2 * c2 - 3 * c3 * u, 0.0)))
-    return int(np.count_nonzero(a + theta * (u + theta * (c2 + theta * c3)) > 0.0))
+    # 3 c3 θ² + 2 c2 θ + u = 0, in the form without cancellation
+    root = -c2 - np.copysign(np.sqrt(np.maximum(c2 * c2 - 3 * c3 * u, 0.0)), c2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        theta = np.stack((u / root, root / (3 * c3)))
+    theta = np.sort(np.where((theta > 0.0) & (theta < 1.0), theta, 0.0), axis=0)
+    return np.asarray(a + theta * (u + theta * (c2 + theta * c3)))
 
 
 def _central(s: Vector) -> tuple[float, float, float]:

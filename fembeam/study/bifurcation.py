@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam import plot
-from fembeam.model import Model, load_period, observed
+from fembeam.model import Model, extremes_of, load_period, observed
 from fembeam.scene import Place, changes_structure, path_of, with_value
 from fembeam.study.execution.executors import spread
 from fembeam.study.result import Result
@@ -33,7 +33,7 @@ class Bifurcation(Result):
     Attributes
     ----------
     parameter : (k,) values. strobes : (k, p, 2n) states at t = 0 of p successive periods: the Poincaré map.
-    peaks : (k, p) largest |u(z)| in each of these periods, m.
+    peaks : (k, p) largest |u(z)| in each of these periods, m; between samples by cubics.
     """
 
     name: str
@@ -116,15 +116,16 @@ def _settled(
     """States and peaks of the periods kept."""
     scene = with_value(model.scene, path, value)
     if changes_structure(path):
-        model = scene.reduce(modes=list(model.modes))
+        model = model.again(scene)
         system = model.system
     else:
         system = model.system_like(scene)
     T, n = load_period(scene), len(model.omega)
     method = solvers.Exponential(1e-8, ledger=False)
     # settling needs no samples; but it is one run: a restart would forget the entry rate of a contact under way
-    looks = np.arange(settle * LOOKS, (settle + keep) * LOOKS) * (T / LOOKS)
+    looks = np.linspace(settle * T, (settle + keep) * T, keep * LOOKS + 1)
     run = solvers.integrate(system, start[:n], start[n:], (settle + keep) * T, looks, method)
-    states = np.concatenate((run.q, run.q_dot), axis=1)[::LOOKS]
-    u = np.abs(run.q @ model.phi(z))
-    return states, u.reshape(keep, LOOKS).max(axis=1)
+    states = np.concatenate((run.q, run.q_dot), axis=1)[:-1:LOOKS]
+    u, v = run.q @ model.phi(z), run.q_dot @ model.phi(z)
+    periods = [slice(i, i + LOOKS + 1) for i in range(0, keep * LOOKS, LOOKS)]
+    return states, np.array([np.abs(extremes_of(run.t[one], u[one], v[one])).max() for one in periods])

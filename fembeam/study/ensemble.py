@@ -70,7 +70,9 @@ class Ensemble(Result):
             raise KeyError(f"the quantity has no {name!r}; it has {', '.join(map(repr, self.values))}")
         values = self.values[name]
         known = ~np.isnan(values) if values.ndim == 1 else np.full(len(values), True)
-        return Estimate.of_mean(values[known] if known.any() else values)
+        known |= not known.any()
+        parts = tuple(seed_key(seed) for seed, kept in zip(self.seeds, known, strict=True) if kept)
+        return replace(Estimate.of_mean(values[known]), parts=parts)
 
     def __repr__(self) -> str:
         failed = f", {len(self.failures)} failed" if self.failures else ""
@@ -93,8 +95,8 @@ class Ensemble(Result):
         return [dict(zip(columns, (seed_key(seed), *row), strict=True)) for seed, *row in rows]
 
     def plain(self) -> dict[str, Any]:
-        """Means with their standard errors, and what failed, as JSON has it."""
-        means = {name: self[name] for name in self._numbers}
+        """Means with their standard errors, and what failed, as JSON has it, which has no complex numbers."""
+        means = {name: self[name] for name in self._numbers if not np.iscomplexobj(self.values[name])}
         return {
             "realisations": len(self),
             "enough": self.enough,
@@ -170,6 +172,9 @@ def ensemble(
     >>> len(found), found.mean.relative < 0.2
     (8, True)
     """
+    require(isinstance(model, Model), "model must be a Model", model, "ensemble", "scene.reduce(modes=…) makes one")
+    require(callable(quantity), "quantity must be a function of a model", quantity, "ensemble",
+            "e.g. lambda model: model.simulate(50.0).contacts.peak_force.max()")  # fmt: skip
     chosen = _seeds(model, seeds)
     if until is not None and not 0.0 < number("until", until, above=0.0) < 1.0:
         raise ValueError(f"until must be a relative standard error below 1, got {until!r}")

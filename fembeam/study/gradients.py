@@ -19,6 +19,7 @@ import solvers
 from fembeam.model import Model, Orbit, Run
 from fembeam.model.sensitivity import Sensitivity, by_each, of_orbit_by_each
 from fembeam.scene import Place, Scene
+from fembeam.study.execution.executors import finished
 from fembeam.study.measure import cut, runs, values_of
 from fembeam.study.quantities import mean_in_time, place_of
 from fembeam.study.trial import Trial
@@ -136,7 +137,8 @@ def _of_run(trial: Trial, model: Model) -> Vector:
     """Of a run, from `discard` on."""
     plan = trial.plan
     assert plan.duration is not None
-    run = model.simulate(plan.duration, plan.dt, None if plan.start is None else plan.start(model), trial.method)
+    start = None if plan.start is None else plan.start(model)
+    run = finished(model.simulate(plan.duration, plan.dt, start, trial.method))
     part = cut(run, plan.discard, plan.duration)
     mine = (run.contacts.t_in >= plan.discard) & (run.contacts.t_in < plan.duration)
     kept = slice(len(run.t) - len(part.t), None)

@@ -10,7 +10,7 @@ Three kinds of run give them:
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import pairwise
@@ -24,9 +24,10 @@ import solvers
 from fembeam.model import Model, Run, load_period
 from fembeam.response import latched_before
 from fembeam.scene import Scene, signals_of
+from fembeam.study.execution.executors import finished
 from fembeam.study.quantities import Quantity, label
-from fembeam.study.realisations import child, renewed
-from fembeam.support import require, require_non_negative, require_positive
+from fembeam.study.realisations import child, renewed, seed_key
+from fembeam.support import is_whole, require, require_non_negative, require_positive
 
 Vector = NDArray[np.float64]
 Start = Callable[[Model], Any]
@@ -43,12 +44,14 @@ class Plan:
     duration: float | None = None
     dt: float | None = None
     discard: float = 0.0
-    seeds: tuple[int, ...] = ()
+    seeds: Sequence[int] = ()
     start: Start | None = None
     solver: Any = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "seeds", tuple(self.seeds))
+        object.__setattr__(self, "seeds", _checked_seeds(self.seeds))
+        require(self.start is None or callable(self.start), "start must be a function of a model", self.start, "study",
+                "e.g. lambda m: m.state(velocity=…)")  # fmt: skip
         if self.duration is not None:
             require_positive("duration", self.duration, "study", "give s, or None for a periodic response")
             require_non_negative("discard", self.discard, "study", "give s")
@@ -62,6 +65,7 @@ class Plan:
 
     def check(self, scene: Scene, quantity: Quantity) -> None:
         """Raise ValueError when the scene cannot be run like this."""
+        require(isinstance(scene, Scene), "scene must be a Scene", scene, "study", "of a model, give model.scene")
         if self.duration is None:
             try:
                 load_period(scene)
@@ -77,6 +81,17 @@ class Plan:
             signals = signals_of(scene)
             require(any(hasattr(signal, "seed") for signal in signals.values()), "seeds need noise", signals, "study",
                     "use BandNoise as base, force or foot, or leave out seeds")  # fmt: skip
+
+
+def _checked_seeds(seeds: Any) -> tuple[int, ...]:
+    """Seeds of realisations, none twice: equal ones have no scatter."""
+    listed = hasattr(seeds, "__iter__") and not isinstance(seeds, (str, bytes, dict))
+    require(listed, "seeds must be a list of seeds", seeds, "study", "e.g. range(8)")
+    chosen = tuple(seeds)
+    right = all(isinstance(one, np.random.SeedSequence) or (is_whole(one) and one >= 0) for one in chosen)
+    require(right, "seeds must be whole numbers of at least 0", chosen, "study", "e.g. range(8)")
+    require(len({*map(seed_key, chosen)}) == len(chosen), "seeds must differ", chosen, "study", "e.g. range(8)")
+    return chosen
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +161,7 @@ def runs(model: Model, plan: Plan, quantity: Quantity, solver: Any) -> list[Run]
     if plan.duration is None:
         return periodic(model, start, solver, getattr(quantity, "sampled", True))
     models = [_seeded(model, seed) for seed in plan.seeds] if plan.seeds else [model]
-    whole = [each.simulate(plan.duration, plan.dt, start, solver) for each in models]
+    whole = [finished(each.simulate(plan.duration, plan.dt, start, solver)) for each in models]
     return [cut(run, plan.discard, plan.duration) for run in whole]
 
 
@@ -154,7 +169,7 @@ def periodic(model: Model, start: Any, solver: Any, sampled: bool) -> list[Run]:
     """Groups of drive periods of the settled response; a simulation rather than shooting, as it may be chaotic."""
     period = load_period(model.scene)
     dt = period / SAMPLES if sampled else None
-    run = model.simulate((SETTLING + GROUPS * GROUP) * period, dt, start, solver)
+    run = finished(model.simulate((SETTLING + GROUPS * GROUP) * period, dt, start, solver))
     borders = (SETTLING + GROUP * np.arange(GROUPS + 1)) * period
     parts = [cut(run, a, b) for a, b in pairwise(borders)]
     share = replace(run.cost, seconds=run.cost.seconds / GROUPS)
@@ -177,12 +192,21 @@ def cut(run: Run, start: float, end: float) -> Run:
         contacts=of_log("contacts", "t_in", "t_out"), ledger=partial(_ledger_of, run, kept),
         lost=partial(_lost_of, run, kept), rubbing=partial(of_log, "friction_log", "t_in", "t_out"),
         borders=partial(of_log, "transitions", "t"), reached=end - start,
-        began=latched_before(run, start),
+        began=latched_before(run, start), end=_end_of(run, kept),
+        made=run.made if start == 0.0 and end >= run.reached else None,
         kept={"forces": run._forces[:, kept], "t": run.t[kept]},  # signals have the times of the run
     )  # fmt: skip
     if run.rubs.any() and run.sampled:
         part.__dict__["friction_loss"] = run.friction_loss[kept] - run.friction_loss[kept][:1]
     return part
+
+
+def _end_of(run: Run, kept: slice) -> Any:
+    """The state that a part of a run ends with, which without samples is not known but that of the run."""
+    if len(run.t) == 1 or kept.stop == len(run.t):
+        return run.end
+    last = kept.stop - 1
+    return np.concatenate((run.q[last], run.q_dot[last], *latched_before(run, run.t[last])))
 
 
 def _lost_of(run: Run, kept: slice) -> Any:
@@ -220,7 +244,6 @@ def values_of(quantity: Quantity, parts: list[Run], where: str) -> Vector:
 
 def _value(quantity: Quantity, run: Run, where: str) -> Any:
     """The quantity of one run, checked."""
-    require(run.complete, "every run of a study must reach its end", run.status, where, "run again")
     value = np.asarray(quantity(run), dtype=float)
     require(value.size > 0, "quantity must return a number or an array", value, where, "check the function")
     return value

@@ -183,7 +183,7 @@ def minimise(
     box, limits = box_of(parameters), _limits(constraints or {})
     check_search(tolerance, most, len(box))
     looks = LOOKS * len(box)
-    plan = Plan(duration, dt, discard, tuple(seeds), start, solver)
+    plan = Plan(duration, dt, discard, seeds, start, solver)
     asked = [quantity, *(one for one, _ in limits)]
     known = gradients is None or isinstance(gradients, (bool, np.bool_))
     require(known, "gradients must be True, False or None", gradients, WHERE, "leave it out")

@@ -223,7 +223,7 @@ def mode_count(
     True
     """
     kept, chosen = named(quantity), checked_counts(counts)
-    plan = Plan(duration, dt, discard, tuple(seeds), start, solver)
+    plan = Plan(duration, dt, discard, seeds, start, solver)
     plan.check(scene, kept)
     kinds = kinds_of(scene, residual)
     mesh = {} if elements is None else {"elements": elements}
@@ -313,6 +313,8 @@ def observed_rate(rows: Sequence[Row]) -> float:
 
 def checked_counts(counts: Iterable[int]) -> list[int]:
     """Checked counts, ascending, each once."""
+    listed = hasattr(counts, "__iter__")
+    require(listed, "counts must be a list of numbers of modes", counts, "study", "e.g. [1, 2, 3, 5, 10]")
     chosen = list(counts)
     require(len(chosen) > 0, "counts must hold a number of modes", chosen, "study", "e.g. [1, 2, 3, 5, 10]")
     for count in chosen:

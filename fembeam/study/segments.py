@@ -16,7 +16,9 @@ from fembeam.model import Model, Run
 from fembeam.scene import signals_of
 from fembeam.statistics.initial_transient import FEWEST_BATCHES
 from fembeam.study.decay import correlation_time
+from fembeam.study.execution.executors import finished
 from fembeam.study.realisations import child, continued, noises, renewed
+from fembeam.support import numbers
 
 Vector = NDArray[np.float64]
 
@@ -28,6 +30,7 @@ SHORTEST = 8.0  # correlation times
 LONGEST = 100.0  # correlation times, and eight segments of the spectrum: the lead-in costs at most 5 %
 RENEWAL = 5.0  # correlation times left out after noise was renewed: e^-5 of the old noise is left
 MOST_SAMPLES = 2_000_000  # of a segment
+FEWEST_SAMPLES = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +40,7 @@ class Segment:
     run: Run
     start: float  # s
     end: int  # index of the last sample that counts
+    batches: int
 
 
 @dataclass
@@ -57,6 +61,7 @@ class Segments:
     shortest: float  # s of a realisation
     index: int = 0
     dropped: int = 0
+    taken: int = 0  # batches
     kept: float = 0.0
     discarded: float = 0.0
     time: float = 0.0
@@ -67,7 +72,7 @@ class Segments:
         cls, model: Model, duration: float, dt: float, discard: float | None, start: Any, solver: Any, segment: int
     ) -> Segments:
         """The plan for a model; a realisation holds two half-overlapping segments (samples) of the spectrum."""
-        state = model.rest() if start is None else np.array(start, dtype=float)
+        state = model.rest() if start is None else numbers("start", start, "stationary", "give (2n,) numbers")
         tau = correlation_time(model, lambda seconds: _pilot(model, seconds, dt, state, solver), duration)
         found = list(signals_of(model.scene).values())
         repeats = all(isinstance(s, BandNoise) or hasattr(s, "tones") for s in found)
@@ -78,6 +83,11 @@ class Segments:
             most = max(LONGEST * tau, 8.0 * segment * dt)
             longest = min(longest, _realisation(duration, shortest, most, dt))
         least = LEAD_IN * tau * (not repeats) + FEWEST_BATCHES * tau
+        if not repeats and discard is not None and discard > duration - FEWEST_SAMPLES * dt:
+            raise ValueError(
+                f"discard must leave at least {FEWEST_SAMPLES} samples of the duration of {duration:g} s, got "
+                f"{discard:g} s; a record, or what else cannot be continued, is run once, transient included"
+            )
         if discard is None and duration < least:
             raise ValueError(
                 f"duration must be at least {least:.4g} s, {least / tau:.0f} correlation times of the "
@@ -93,13 +103,14 @@ class Segments:
         """Segment after segment until the duration is reached."""
         if not self.repeats:
             run = self._run(self.duration)
-            yield Segment(run, self.first_lead, self._border(run))
+            yield Segment(run, self.first_lead, self._border(run, self.first_lead), self.batches)
             return
         while self.duration - self.kept > (1.0 + 1e-9) * self.dt:  # less may hold no sample
             lead = self.first_lead if self.index == 0 else RENEWAL * self.correlation_time * self.random
             wanted = min(self.longest, self.duration - self.kept)
+            batches = max(1, round(self.batches * wanted / min(self.longest, self.duration)))
             run = self._run(math.ceil((lead + wanted) / self.dt - 1e-9) * self.dt)
-            yield Segment(run, lead, self._border(run))
+            yield Segment(run, lead, self._border(run, lead), batches)
 
     def _run(self, duration: float) -> Run:
         """One segment from the state reached."""
@@ -107,21 +118,23 @@ class Segments:
         model, later = self.model, partial(continued, time=self.time, duration=duration)
         if self.repeats:  # all changes at once: each makes another scene and system
             model = renewed(model, lambda _, seed: child(seed, i), later)
-        run = model.go_on(duration, self.dt, self.state, self.solver)
-        if not run.complete:
-            raise KeyboardInterrupt
+        run = finished(model.go_on(duration, self.dt, self.state, self.solver))
         self.seconds += run.cost.seconds
         return run
 
-    def _border(self, run: Run) -> int:
-        """The last sample that counts: the end under noise and with memory, else the last one outside every contact."""
+    def _border(self, run: Run, lead: float) -> int:
+        """The last sample that counts: the end under noise and with memory, else the last one outside every contact.
+
+        It lies in the second half of what is not lead-in, or is the end.
+        """
         last, log = len(run.t) - 1, run.contacts
+        half = (last + math.ceil(lead / self.dt - 1e-9)) // 2
         assert run.end is not None
         if self.random or run.end.size > 2 * run.q.shape[1]:  # what laws have latched is known at the end alone
             return last
         order = np.argsort(log.t_in)
         t_in, t_out = log.t_in[order], np.where(np.isnan(log.t_out), np.inf, log.t_out)[order]
-        for i in range(last, last // 2, -1):
+        for i in range(last, half, -1):
             before = t_in < run.t[i]
             if not np.any(t_out[before][-64:] > run.t[i]):
                 return i
@@ -135,7 +148,7 @@ class Segments:
 
     def keep(self, piece: Segment, kept: float) -> None:
         """Count a segment that the statistics use."""
-        self.index += 1
+        self.index, self.taken = self.index + 1, self.taken + piece.batches
         self.kept += kept
         self._go_on(piece)
         self.discarded += self.dt * piece.end - kept
@@ -150,10 +163,7 @@ class Segments:
 
 def _pilot(model: Model, duration: float, dt: float, state: Vector, solver: Any) -> Run:
     """A run by which the level of the motion is seen."""
-    run = model.go_on(math.ceil(duration / dt - 1e-9) * dt, dt, state, solver)
-    if not run.complete:
-        raise KeyboardInterrupt
-    return run
+    return finished(model.go_on(math.ceil(duration / dt - 1e-9) * dt, dt, state, solver))
 
 
 def _longest(found: list[Any], tau: float, dt: float) -> float:

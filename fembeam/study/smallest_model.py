@@ -196,7 +196,7 @@ def smallest_model(
     1
     """
     check_goal(tolerance, most)
-    plan, kept = Plan(duration, dt, discard, tuple(seeds), start), named(quantity)
+    plan, kept = Plan(duration, dt, discard, seeds, start), named(quantity)
     plan.check(scene, kept)
     return Search(
         scene, kept, plan, float(tolerance), int(most), kinds_of(scene, residual), executor, elements

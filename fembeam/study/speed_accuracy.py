@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam import plot
 from fembeam.model import Model, Run, places
+from fembeam.study.execution.executors import finished
 from fembeam.study.result import Result
 from fembeam.support import Part, counting, require, require_positive
 
@@ -232,7 +233,7 @@ class _Question:
 
     def run(self, model: Model, state: Vector, method: Any) -> Run:
         """One run; the state is padded with modes at rest."""
-        return model.simulate(self.duration, self.dt, _padded(state, len(model.omega)), method)
+        return finished(model.simulate(self.duration, self.dt, _padded(state, len(model.omega)), method))
 
     def value(self, run: Run) -> Vector:
         """The quantity as a vector."""
@@ -311,7 +312,7 @@ def _starts(model: Model, starts: Any, duration: float) -> Vector:
         require(bool(starts >= 1), "starts must be at least 1", starts, "speed_accuracy", "e.g. 12")
         spacing = duration * 0.618  # no multiple of a drive period
         dt, method = spacing / _INSTANTS, solvers.Exponential(1e-8, ledger=False)
-        run = model.simulate((starts + 3) * spacing, dt, solver=method)
+        run = finished(model.simulate((starts + 3) * spacing, dt, solver=method))
         closed = np.zeros(len(run.t), dtype=bool)
         for contact in model.system.contacts:
             closed |= (contact.indentation(run.q) > 0.0) & (not contact.always)

@@ -14,6 +14,7 @@ import solvers
 from fembeam import plot
 from fembeam.model import Model
 from fembeam.scene import Scene
+from fembeam.study.execution.executors import finished
 from fembeam.study.result import Result
 from fembeam.study.speed_accuracy import method_name
 from fembeam.support import Part, require
@@ -183,7 +184,7 @@ def _cell(model: Model, method: Any, dt: float, duration: float, tolerance: floa
     state = None if start is None else start(model)
     best = _truth(model, duration, state)
     try:
-        run = model.simulate(duration, duration / SAMPLES, state, forced)
+        run = finished(model.simulate(duration, duration / SAMPLES, state, forced))
     except solvers.SolverError:
         return Verdict.UNSTABLE, np.inf
     delta, wanted = run.indentation(), best.indentation()
@@ -197,4 +198,4 @@ def _truth(model: Model, duration: float, start: Any) -> Any:
     """The reference, once per model."""
     key = "truth of a stability map", duration, None if start is None else tuple(np.asarray(start))
     best = solvers.Exponential(1e-11, ledger=False)
-    return model.system.kept.get(key, lambda: model.simulate(duration, duration / SAMPLES, start, best))
+    return model.system.kept.get(key, lambda: finished(model.simulate(duration, duration / SAMPLES, start, best)))

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
@@ -32,7 +32,7 @@ from fembeam.statistics import Batches, Estimate, Impacts, Signal
 from fembeam.statistics.initial_transient import Settling, settling
 from fembeam.statistics.spectra import FINEST_RESOLUTION
 from fembeam.study.result import Result
-from fembeam.study.segments import Segment, Segments
+from fembeam.study.segments import FEWEST_SAMPLES, Segment, Segments
 from fembeam.support import Part, bar, is_whole, note, number, numbers, require
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ def stationary(
     True
     """
     check(model, duration, dt, until, discard)
-    _check_options(watch, segment, bins, levels)
+    _check_options(watch, segment, bins, levels, of)
     segment = segment or default_segment(dt)
     solver = solver or solvers.Exponential(1e-8, ledger=False)
     plan = Segments.of(model, duration, dt, discard, start, solver, segment)
@@ -214,13 +214,15 @@ def stationary(
                 settled, piece = _after_transient(whole, [x for x, _ in seen.values()], plan)
             if piece is None:
                 continue
-            plan.keep(piece, sums.add(piece, seen, plan.batches))
+            plan.keep(piece, sums.add(piece, seen))
             response = sums.response(plan, settled, enough)
             report(min(plan.kept, duration))
-            if until is not None and (not plan.repeats or plan.index * plan.batches >= FEWEST_BATCHES):
-                enough = all(estimate.relative <= until for estimate in _asked(response, of))
+            if until is not None and plan.taken >= FEWEST_BATCHES:
+                enough = _enough(response, of, until)
                 if enough:
                     break
+    if until is not None and not enough:  # of fewer batches, which are not asked before the end
+        enough = _enough(response, of, until)
     _warn_of_a_short_run(plan, settled)
     response = sums.response(plan, settled, enough)
     note("%r, %.4g s before it left out", response, response.discarded)
@@ -302,7 +304,7 @@ def _warn_of_a_short_run(plan: Segments, settled: Settling | None) -> None:
     if settled is not None and not settled.died_out:
         warnings.warn(f"the transient has not died out: its halves differ by {settled.drift:.1f} standard errors; "
                       "simulate longer, or give discard=", UserWarning, stacklevel=3)  # fmt: skip
-    if plan.index * plan.batches < 2:
+    if plan.taken < 2:
         warnings.warn(f"{plan.kept:.4g} s hold one realisation of the noise, which tells no standard error; "
                       f"simulate at least {2 * plan.shortest:.3g} s", UserWarning, stacklevel=3)  # fmt: skip
 
@@ -318,13 +320,15 @@ def _looked(name: str, look: Watch, run: Run) -> tuple[Vector, Vector | None]:
     return found[0], found[1] if len(found) == 2 else None
 
 
-def _check_options(watch: Any, segment: Any, bins: Any, levels: Any) -> None:
+def _check_options(watch: Any, segment: Any, bins: Any, levels: Any, of: Any) -> None:
     """Bad options, before any computing."""
     where = "stationary"
     for name, given in (("watch", watch), ("bins", bins), ("levels", levels)):
         require(given is None or isinstance(given, Mapping), f"{name} must be a mapping by names of signals", given,
                 where, 'such as {"δ": …}')  # fmt: skip
+    require(of is None or callable(of), "of must be a function of a response", of, where, 'lambda r: r["δ"].std')
     for name, look in (watch or {}).items():
+        require(isinstance(name, str), "names of watch must be text", name, where, 'such as {"δ": …}')
         require(callable(look), f"watch[{name!r}] must be a function of a run", look, where, "lambda run: run.q[:, 0]")
     right = segment is None or (is_whole(segment) and segment >= FEWEST_IN_SEGMENT)
     require(right, f"segment must be a whole number of samples, at least {FEWEST_IN_SEGMENT}", segment, where,
@@ -344,20 +348,24 @@ def default_segment(dt: float) -> int:
     return int(next_fast_len(math.ceil(2 * math.pi / (FINEST_RESOLUTION * dt)), real=True))
 
 
-def _asked(response: Response, of: Callable[[Response], Any] | None) -> list[Estimate]:
-    """The estimates that `until` is about."""
-    if of is None:
-        return [signal.variance for signal in response.signals.values()]
-    found = of(response)
-    return [found] if isinstance(found, Estimate) else list(found)
+def _enough(response: Response, of: Callable[[Response], Any] | None, until: float) -> bool:
+    """Whether the estimates that `until` is about are known so well."""
+    found = [signal.variance for signal in response.signals.values()] if of is None else of(response)
+    asked = list(found) if isinstance(found, Iterable) else [found]
+    require(bool(asked) and all(isinstance(one, Estimate) for one in asked), "of must return an Estimate, or several",
+            found, "stationary", 'e.g. lambda r: r["δ"].std')  # fmt: skip
+    return all(one.relative <= until for one in asked)
 
 
 def check(model: Model, duration: float, dt: float, until: float | None, discard: float | None) -> None:
     """Bad input, before any computing."""
+    require(isinstance(model, Model), "model must be a Model", model, "stationary", "scene.reduce(modes=…) makes one")
     number("duration (s)", duration, above=0.0)
     number("dt (s)", dt, above=0.0)
-    if not dt < duration / 64:
-        raise ValueError(f"dt must leave at least 64 samples of the duration of {duration:g} s, got {dt:g} s")
+    if not dt < duration / FEWEST_SAMPLES:
+        raise ValueError(
+            f"dt must leave at least {FEWEST_SAMPLES} samples of the duration of {duration:g} s, got {dt:g} s"
+        )
     if until is not None and not 0.0 < number("until", until, above=0.0) < 1.0:
         raise ValueError(f"until must be a relative standard error below 1, got {until!r}")
     if discard is not None:
@@ -393,13 +401,13 @@ class Sums:
                     )
         self.impacts = [Impacts() for _ in range(self.stops)]
 
-    def add(self, piece: Segment, seen: Mapping[str, tuple[Vector, Vector | None]], batches: int) -> float:
+    def add(self, piece: Segment, seen: Mapping[str, tuple[Vector, Vector | None]]) -> float:
         """Take in a segment, batch by batch; returns its seconds."""
         first = math.ceil(piece.start / self.dt - 1e-9)
-        borders = np.linspace(first, piece.end, batches + 1).round().astype(int)
+        borders = np.linspace(first, piece.end, piece.batches + 1).round().astype(int)
         for name, (x, rate) in seen.items():
             if name not in self.signals:
-                self.signals[name] = self._signal(name, x[first : piece.end], batches)
+                self.signals[name] = self._signal(name, x[first : piece.end], piece.batches)
             self.signals[name].cut()
             for a, b in pairwise(borders):
                 self.signals[name].add(x[a:b], None if rate is None else rate[a:b])

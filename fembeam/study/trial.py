@@ -91,6 +91,8 @@ class Trial:
         cls, scene: Scene | Maker, names: Sequence[str], asked: Asked, plan: Plan, reduction: dict[str, Any]
     ) -> Trial:
         """Checked, with full paths of the parameters."""
+        made = isinstance(scene, Scene) or callable(scene)
+        require(made, "scene must be a Scene or a function that makes one", scene, "study", "of a model, model.scene")
         called = list(names)
         if isinstance(scene, Scene):
             names = [path_of(scene, name) for name in names]

@@ -179,7 +179,7 @@ def vary(
     >>> bool(abs(found["amplitude"][1] / found["amplitude"][0] - 2.0) < 1e-9)
     True
     """
-    plan = Plan(duration, dt, discard, tuple(seeds), start, solver)
+    plan = Plan(duration, dt, discard, seeds, start, solver)
     names, points, axes = points_of(parameters, samples, seed)
     trial = Trial.of(scene, names, quantity, plan, reduction).prepared(points)
     kept = Checkpoint(checkpoint, {} if checkpoint is None else identity_of(trial))

@@ -18,7 +18,7 @@ from fembeam.model import Model
 from fembeam.scene import Scene
 from fembeam.study.execution.fingerprint import fingerprint
 from fembeam.study.realisations import renewed
-from fembeam.support import written_whole
+from fembeam.support import require, written_whole
 
 FORMAT = 2
 Values = dict[str, NDArray[Any]]
@@ -35,6 +35,8 @@ class Checkpoint:
     """
 
     def __init__(self, path: str | os.PathLike[str] | None, about: Mapping[str, str]) -> None:
+        right = isinstance(path, (str, os.PathLike, type(None)))
+        require(right, "checkpoint must be the path of a file", path, "study", 'e.g. "kept.npz"')
         self.path, self.about = None if path is None else Path(path), dict(about)
         self.values: dict[str, Values] = {}
         if self.path is not None and self.path.exists():

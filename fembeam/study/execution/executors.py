@@ -10,7 +10,8 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, as_completed
 from typing import TypeVar
 
-from fembeam.support import counting
+from fembeam.model import Run
+from fembeam.support import counting, interrupts, require
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -48,6 +49,8 @@ def spread(
     ...     spread(abs, [-3, 2, -1], pool)
     [3, 2, 1]
     """
+    require(executor is None or hasattr(executor, "submit"), "executor must be one of concurrent.futures", executor,
+            "study", "e.g. ProcessPoolExecutor(4)")  # fmt: skip
     work = list(items)
     tell = seen or (lambda index, result: None)
     with counting(progress is not None, total=len(work), desc=progress) as bar:
@@ -71,10 +74,22 @@ def spread(
         return [future.result() for future in futures]
 
 
+def finished(run: Run) -> Run:
+    """The run, unless Ctrl-C ended it early: then it ends the study too."""
+    if not run.complete:
+        raise KeyboardInterrupt
+    return run
+
+
 def _named(function: Callable[[Item], Result], index: int, item: Item) -> Result:
-    """function(item); an error learns which item it was."""
-    try:
-        return function(item)
-    except Exception as error:
-        error.add_note(f"item {index}: {item!r}"[:200])
-        raise
+    """function(item); an error learns which item it was, and Ctrl-C, which ends a run early, ends the study too."""
+    with interrupts.noted() as came:
+        try:
+            result = function(item)
+        except Exception as error:
+            error.add_note(f"item {index}: {item!r}"[:200])
+            if not came:
+                raise
+    if came:
+        raise KeyboardInterrupt
+    return result
