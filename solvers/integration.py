@@ -42,7 +42,7 @@ from solvers.problem import (
     product,
 )
 from solvers.problem import event_list as at
-from solvers.problem.friction import ACCOUNTS, BEGUN, CODE
+from solvers.problem.friction import ACCOUNTS, BEGUN, CODE, STICK, tell_sliders
 from solvers.problem.run_arguments import (
     check_laws,
     check_maps,
@@ -227,10 +227,11 @@ class _Run:
             np.minimum(times, engine.duration, out=due[:-1])
             engine.record(out=np.empty((len(times), self.state.x.size)), due=due)
         self.tangent: Any = None
+        self.parameter: Any = tangent if isinstance(tangent, Parameter) else None
         if tangent:
             from solvers.exponential.tangent import Tangent
 
-            self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None, True)
+            self.tangent = Tangent(system, engine, self.parameter, True)
         state = self.state
         self.size = 2 * engine.problem.k.size
         self.initial, self.latched = state.x[: self.size].copy(), self.memory
@@ -248,7 +249,17 @@ class _Run:
         matrix, n2 = self.tangent.matrix(), 2 * self.system.size
         own = matrix.shape[1] - n2 - self.tangent.exact
         more = {"tangent": np.delete(matrix, np.s_[n2 : n2 + own], axis=1), "rate": self.tangent.rate()}
-        return {**more, "memory_tangent": np.vstack((matrix, self.tangent.latched_matrix()))} if own else more
+        if not own:
+            return more
+        latched = np.vstack((matrix, self.tangent.latched_matrix()))
+        turned = np.empty((len(self.latched), 0))
+        if self.tangent.exact:
+            surfaces = [
+                [one.surface for one in side.contacts] for side in (self.parameter.behind, self.parameter.ahead)
+            ]
+            turned = self.time * np.diff(surfaces, axis=0).T / (2.0 * self.parameter.step)
+        tell_sliders(latched, self.system.contacts, self.latched, self.memory, turned)
+        return {**more, "memory_tangent": latched}
 
     @property
     def memory(self) -> tuple[Array, ...]:
@@ -260,8 +271,7 @@ class _Run:
         for contact, latched in zip(self.system.contacts, found, strict=True):
             if contact.friction is not None:
                 # A slider is told as of a run that begins now; one that slips has no place.
-                law: Any = contact.law
-                latched[1] = latched[1] - law.arm * law.spin * self.time if latched[0] == 0.0 else 0.0
+                latched[1] = latched[1] - contact.surface * self.time if latched[0] == STICK else 0.0
         return found
 
     @property

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.orbits.whole_state import codes, derivatives, end, units
+from solvers.orbits.whole_state import codes, derivatives, end, rate_at_end, units
 from solvers.problem import Array, Parameter, Solution, System
 
 _UNIT = 1e-12  # rounding of the derivatives of latched numbers that are not renewed
@@ -74,13 +74,11 @@ class PeriodicProblem:
         for i, (system, duration) in enumerate(here):
             tangent: Any = Parameter(sides[0][i][0], sides[1][i][0], h) if h else True
             solution, matrix = derivatives(system, x[i], duration, self.method, tangent)
-            assert solution.rate is not None
             residual[i] = end(solution) - x[(i + 1) % m]
             tangents.append(matrix[:, :size])
             if h:
                 lengthening = (sides[1][i][1] - sides[0][i][1]) / (2.0 * h)
-                by_parameter[i] = matrix[:, -1]
-                by_parameter[i, : 2 * system.size] += solution.rate * lengthening
+                by_parameter[i] = matrix[:, -1] + rate_at_end(system, solution) * lengthening
             solutions.append(solution)
         return Chain(x, parameter, residual, np.array(tangents), by_parameter, solutions, slope or self.step == 0.0)
 

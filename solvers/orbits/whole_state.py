@@ -14,6 +14,7 @@ import numpy as np
 
 from solvers.integration import integrate
 from solvers.problem import Array, Parameter, Solution, System, Transitions, columns_of, renew
+from solvers.problem.friction import told_rates
 
 _REALS = ctypes.c_void_p
 _AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS  # border, δ, δ̇, entry rate, parameters
@@ -71,6 +72,12 @@ def end(solution: Solution) -> Array:
     """The state a run ends with."""
     state: Array = np.concatenate((solution.q[-1], solution.q_dot[-1], *solution.memory))
     return state
+
+
+def rate_at_end(system: System, solution: Solution) -> Array:
+    """Derivative of `end` by the duration, of a run with a tangent."""
+    assert solution.rate is not None
+    return np.concatenate((solution.rate, told_rates(system.contacts, solution.memory)))
 
 
 def state_after(system: System, x: Array, duration: float, method: Any) -> Array:
