@@ -263,3 +263,14 @@ def test_what_never_sticks_is_no_family():
     for found, contacts in ((slipping, 1), (open_, 0)):
         assert (len(found.contacts), found.family, found.forgotten) == (contacts, (), 1)
         assert np.abs(found.multipliers - 1.0).min() > 1e-3
+
+
+def test_a_branch_reaches_the_end_of_what_is_allowed():
+    """There is no friction below 0: derivatives by the coefficient are taken from above there."""
+
+    def make(mu):
+        return shaker(60.0, mu), 2.0 * np.pi / 130.0
+
+    found = branch(make, (0.0, 0.3), orbit(*make(0.1)), at=0.1).run()
+    assert [status.name for status in found.status] == ["END", "END"]
+    assert found.orbits[-1].parameter == 0.0 or found.orbits[0].parameter == 0.0

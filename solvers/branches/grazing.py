@@ -191,8 +191,9 @@ def _linear(problem: _Meeting, chain: Chain, speed: float) -> tuple[Array, Array
 
 def _gap_slope(problem: PeriodicProblem, parameter: float, stop: int) -> float:
     """Derivative of a stop's gap by the parameter."""
-    behind, ahead = (problem.make(parameter + s * problem.step)[0].contacts[stop] for s in (-1.0, 1.0))
-    change = (ahead.gap - behind.gap) / (2.0 * problem.step)
+    low, high = problem.beside(parameter)
+    behind, ahead = (problem.make(value)[0].contacts[stop] for value in (low, high))
+    change = (ahead.gap - behind.gap) / (high - low)
     return -change if ahead.outer else change
 
 

@@ -65,11 +65,25 @@ class PeriodicProblem:
             ]
         return self.kept[parameter]
 
+    def beside(self, parameter: float) -> tuple[float, float]:
+        """The parameter less and plus ``step``; itself for one that the family refuses, as a μ below 0."""
+        low, high = parameter - self.step, parameter + self.step
+        try:
+            self.shots(low)
+        except ValueError:
+            return parameter, high
+        try:
+            self.shots(high)
+        except ValueError:
+            return low, parameter
+        return low, high
+
     def evaluate(self, x: Array, parameter: float, slope: bool = True) -> Chain:
         """Integrate all shots from x (m, N); without ``slope`` the derivatives by the parameter are zero."""
         here = self.shots(parameter)
-        h, (m, size) = self.step if slope else 0.0, x.shape
-        sides = [self.shots(parameter + s * h) for s in (-1.0, 1.0)] if h else []
+        low, high = self.beside(parameter) if slope and self.step else (parameter, parameter)
+        h, (m, size) = 0.5 * (high - low), x.shape
+        sides = [self.shots(low), self.shots(high)] if h else []
         residual, tangents, by_parameter, solutions = np.empty((m, size)), [], np.zeros((m, size)), []
         for i, (system, duration) in enumerate(here):
             tangent: Any = Parameter(sides[0][i][0], sides[1][i][0], h) if h else True
