@@ -52,6 +52,7 @@ from solvers.problem.run_arguments import (
     latched_at_start,
     output_times,
 )
+from solvers.problem.whole_runs import must_be_whole, whole_runs
 
 _SAMPLES = 64  # of a run that is made again for its balance
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
@@ -293,6 +294,8 @@ class _Run:
                 if progress:
                     progress(self.time)
         except KeyboardInterrupt:
+            if must_be_whole():
+                raise
             return Status.INTERRUPTED
         x = self.state.x
         finite = math.isfinite(sum(x.tolist())) or np.isfinite(x).all()  # a sum may overflow
@@ -358,7 +361,8 @@ class _Run:
         method, duration = replace(self.engine.method, ledger=True), self.engine.duration
         q, q_dot = np.split(self.engine.back @ self.initial, 2)
         memory = self.latched if self.system.latches else None
-        again = integrate(self.system, q, q_dot, duration, duration / _SAMPLES, method, check=False, memory=memory)
+        with whole_runs():
+            again = integrate(self.system, q, q_dot, duration, duration / _SAMPLES, method, check=False, memory=memory)
         return again.status is Status.DONE
 
     def _sampled(self, status: Status) -> int:
@@ -415,5 +419,6 @@ def _overdrawn(record: Record) -> bool:
 
 def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any, memory: Any) -> Array:
     """Final [q, q̇] of a plain run."""
-    solution = integrate(system, q0, q_dot0, duration, method=method, memory=memory)
+    with whole_runs():
+        solution = integrate(system, q0, q_dot0, duration, method=method, memory=memory)
     return np.concatenate((solution.q[-1], solution.q_dot[-1]))

@@ -23,6 +23,7 @@ from fembeam.support import Part, Printed, is_whole, require
 from solvers.orbits import at_zero, delayed, periods_of_decay, settled, state_after, with_initial_memory
 from solvers.orbits import run as run_from
 from solvers.problem import counted
+from solvers.problem.whole_runs import whole_runs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -269,7 +270,8 @@ def _starts(model: Model, T: float, starts: int | Sequence[ArrayLike], seed: int
         return states
     require(starts >= 1, "starts must be a count above 0 or a list of states", starts, "attractors", "ask for 12")
     method = solvers.Exponential(1e-6, ledger=False)
-    run = solvers.integrate(model.system, np.zeros(n), np.zeros(n), 20.0 * T, T / 16.0, method)
+    with whole_runs():
+        run = solvers.integrate(model.system, np.zeros(n), np.zeros(n), 20.0 * T, T / 16.0, method)
     size = np.concatenate((np.abs(run.q).max(axis=0), np.abs(run.q_dot).max(axis=0)))
     rng = np.random.default_rng(seed)
     return [np.zeros(2 * n), *(2.0 * size * rng.normal(size=2 * n) for _ in range(starts - 1))]

@@ -24,6 +24,7 @@ from fembeam.study.quantities import mean_in_time, place_of
 from fembeam.study.trial import Trial
 from fembeam.support import require
 from reduction import AccuracyError
+from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
 SAME = 1e-3  # by which the orbit may differ from the settled response, relatively
@@ -113,6 +114,7 @@ def has_gradients(trial: Trial, insist: bool = False) -> bool:
     return not reasons
 
 
+@whole_runs()
 def gradient(trial: Trial, point: Vector) -> Vector:
     """(q, d) derivatives of the quantities by the parameters at a point.
 

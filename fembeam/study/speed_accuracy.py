@@ -17,6 +17,7 @@ from fembeam import plot
 from fembeam.model import Model, Run, places
 from fembeam.study.result import Result
 from fembeam.support import Part, counting, require, require_positive
+from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
 _INSTANTS = 8  # between two starts, of which the first with all stops open is taken
@@ -230,6 +231,7 @@ class _Question:
     dt: float | None
     quantity: Callable[[Run], Any]
 
+    @whole_runs()
     def run(self, model: Model, state: Vector, method: Any) -> Run:
         """One run; the state is padded with modes at rest."""
         return model.simulate(self.duration, self.dt, _padded(state, len(model.omega)), method)
@@ -302,6 +304,7 @@ def _check(models: list[Model], methods: list[Any], rounds: int) -> None:
                 where, "reduce one scene to 1, 2, 5, ... modes")  # fmt: skip
 
 
+@whole_runs()
 def _starts(model: Model, starts: Any, duration: float) -> Vector:
     """States (s, 2n) of the smallest model.
 

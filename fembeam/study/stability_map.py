@@ -17,6 +17,7 @@ from fembeam.scene import Scene
 from fembeam.study.result import Result
 from fembeam.study.speed_accuracy import method_name
 from fembeam.support import Part, require
+from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
 SAMPLES = 400  # per run, for the error
@@ -177,6 +178,7 @@ def _limits(model: Model, method: Callable[[float], Any], steps: Vector, duratio
     return limit.flight * flight, limit.contact * contact
 
 
+@whole_runs()
 def _cell(model: Model, method: Any, dt: float, duration: float, tolerance: float, start: Any) -> tuple[Verdict, float]:
     """One run judged."""
     forced = replace(method(float(dt)), force_unstable=True)

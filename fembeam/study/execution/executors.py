@@ -11,6 +11,7 @@ from concurrent.futures import Executor, as_completed
 from typing import TypeVar
 
 from fembeam.support import counting
+from solvers.problem.whole_runs import whole_runs
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -74,7 +75,8 @@ def spread(
 def _named(function: Callable[[Item], Result], index: int, item: Item) -> Result:
     """function(item); an error learns which item it was."""
     try:
-        return function(item)
+        with whole_runs():
+            return function(item)
     except Exception as error:
         error.add_note(f"item {index}: {item!r}"[:200])
         raise
