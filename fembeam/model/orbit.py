@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
@@ -16,9 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
+from fembeam.excitation import Harmonic, Multisine
 from fembeam.model.equations import load_period
 from fembeam.model.extremes import extremes_of
 from fembeam.response import PlacedLog
+from fembeam.scene import with_signals
 from fembeam.support import Part, Printed, is_whole, require
 from solvers.orbits import at_zero, delayed, periods_of_decay, settled, state_after, with_initial_memory
 from solvers.orbits import run as run_from
@@ -95,7 +97,10 @@ class Orbit(Printed):
         from fembeam.model.run import Run
 
         cycles = self.found.period * max(float(self.model.omega.max()), 1.0 / self.found.period) / (2.0 * math.pi)
-        return Run.of(self.model, self.found.samples(max(400, math.ceil(24.0 * cycles))))
+        model = self.model
+        if self.found.phase:  # what is read off a run takes loads and motions of supports at its own times
+            model = model.under(with_signals(model.scene, partial(_later, by=self.found.phase)))
+        return Run.of(model, self.found.samples(max(400, math.ceil(24.0 * cycles))))
 
     def sensitivity(self, parameter: str) -> Sensitivity:
         """Exact derivative of the orbit by a number of its scene: of its state, period, peaks and contacts.
@@ -150,6 +155,14 @@ class Orbit(Printed):
             contacts += f", {counted(len(self.transitions), 'transition')}"
         kind += ", one of a family" if self.found.family else ""
         return f"<{kind} orbit of period {self.period} with {contacts}, |μ| = {abs(self.found.transverse[0]):.4g}>"
+
+
+def _later(signal: Any, by: float) -> Any:
+    """A signal of tones from a later time on."""
+    if isinstance(signal, Harmonic):
+        return replace(signal, phase=signal.phase + signal.omega * by)
+    omega, amplitude = signal.tones()
+    return Multisine(np.abs(amplitude), omega, np.angle(amplitude) + np.asarray(omega) * by)
 
 
 def orbit(model: Model, period: int, start: ArrayLike | Orbit | None, shots: int | None) -> Orbit:
