@@ -42,7 +42,7 @@ from solvers.problem import (
     product,
 )
 from solvers.problem import event_list as at
-from solvers.problem.friction import ACCOUNTS, BEGUN, CODE
+from solvers.problem.friction import ACCOUNTS, BEGUN, CODE, STICK, tell_sliders
 from solvers.problem.run_arguments import (
     check_laws,
     check_maps,
@@ -52,6 +52,7 @@ from solvers.problem.run_arguments import (
     latched_at_start,
     output_times,
 )
+from solvers.problem.whole_runs import must_be_whole, whole_runs
 
 _SAMPLES = 64  # of a run that is made again for its balance
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
@@ -227,10 +228,11 @@ class _Run:
             np.minimum(times, engine.duration, out=due[:-1])
             engine.record(out=np.empty((len(times), self.state.x.size)), due=due)
         self.tangent: Any = None
+        self.parameter: Any = tangent if isinstance(tangent, Parameter) else None
         if tangent:
             from solvers.exponential.tangent import Tangent
 
-            self.tangent = Tangent(system, engine, tangent if isinstance(tangent, Parameter) else None, True)
+            self.tangent = Tangent(system, engine, self.parameter, True)
         state = self.state
         self.size = 2 * engine.problem.k.size
         self.initial, self.latched = state.x[: self.size].copy(), self.memory
@@ -248,7 +250,17 @@ class _Run:
         matrix, n2 = self.tangent.matrix(), 2 * self.system.size
         own = matrix.shape[1] - n2 - self.tangent.exact
         more = {"tangent": np.delete(matrix, np.s_[n2 : n2 + own], axis=1), "rate": self.tangent.rate()}
-        return {**more, "memory_tangent": np.vstack((matrix, self.tangent.latched_matrix()))} if own else more
+        if not own:
+            return more
+        latched = np.vstack((matrix, self.tangent.latched_matrix()))
+        turned = np.empty((len(self.latched), 0))
+        if self.tangent.exact:
+            surfaces = [
+                [one.surface for one in side.contacts] for side in (self.parameter.behind, self.parameter.ahead)
+            ]
+            turned = self.time * np.diff(surfaces, axis=0).T / (2.0 * self.parameter.step)
+        tell_sliders(latched, self.system.contacts, self.latched, self.memory, turned)
+        return {**more, "memory_tangent": latched}
 
     @property
     def memory(self) -> tuple[Array, ...]:
@@ -260,8 +272,7 @@ class _Run:
         for contact, latched in zip(self.system.contacts, found, strict=True):
             if contact.friction is not None:
                 # A slider is told as of a run that begins now; one that slips has no place.
-                law: Any = contact.law
-                latched[1] = latched[1] - law.arm * law.spin * self.time if latched[0] == 0.0 else 0.0
+                latched[1] = latched[1] - contact.surface * self.time if latched[0] == STICK else 0.0
         return found
 
     @property
@@ -283,6 +294,8 @@ class _Run:
                 if progress:
                     progress(self.time)
         except KeyboardInterrupt:
+            if must_be_whole():
+                raise
             return Status.INTERRUPTED
         x = self.state.x
         finite = math.isfinite(sum(x.tolist())) or np.isfinite(x).all()  # a sum may overflow
@@ -348,7 +361,8 @@ class _Run:
         method, duration = replace(self.engine.method, ledger=True), self.engine.duration
         q, q_dot = np.split(self.engine.back @ self.initial, 2)
         memory = self.latched if self.system.latches else None
-        again = integrate(self.system, q, q_dot, duration, duration / _SAMPLES, method, check=False, memory=memory)
+        with whole_runs():
+            again = integrate(self.system, q, q_dot, duration, duration / _SAMPLES, method, check=False, memory=memory)
         return again.status is Status.DONE
 
     def _sampled(self, status: Status) -> int:
@@ -405,5 +419,6 @@ def _overdrawn(record: Record) -> bool:
 
 def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any, memory: Any) -> Array:
     """Final [q, q̇] of a plain run."""
-    solution = integrate(system, q0, q_dot0, duration, method=method, memory=memory)
+    with whole_runs():
+        solution = integrate(system, q0, q_dot0, duration, method=method, memory=memory)
     return np.concatenate((solution.q[-1], solution.q_dot[-1]))

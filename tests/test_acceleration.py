@@ -76,3 +76,24 @@ def test_bodies_and_runs_from_files(tmp_path):
     again = fb.load(run.save(tmp_path / "run"))
     np.testing.assert_array_equal(again.acceleration(0.2, body=1), acceleration)
     np.testing.assert_array_equal(again.velocity(0.2, absolute=True), run.velocity(0.2, absolute=True))
+
+
+def test_a_spinning_shaft_is_turned_aside_by_its_gyroscopic_moments():
+    """Accelerations are slopes of velocities, and the clamp holds what is left of the loads."""
+    shaft = fb.Frame.straight(0.5, fb.Section.circle(2.1e11, 1e-3, 0.012), spin=300.0, bending_only=True)
+    signals = {"x": fb.Harmonic(2.0, 90.0), "y": fb.Harmonic(2.0, 90.0, 1.0)}
+    scene = fb.Scene(
+        shaft,
+        supports=[fb.Clamped("A")],
+        masses=[fb.Disk("B", 3.0, 0.02, 0.04)],
+        forces=[fb.PointForce("B", signal, direction=way) for way, signal in signals.items()],
+    )
+    run = scene.reduce(modes=4).simulate(0.3, 1e-4)
+    for way in ("x", "y", "rx", "ry"):
+        velocity, acceleration = run.velocity("B", way), run.acceleration("B", way)
+        slope = (-velocity[4:] + 8 * velocity[3:-1] - 8 * velocity[1:-3] + velocity[:-4]) / 1.2e-3
+        np.testing.assert_allclose(acceleration[2:-2], slope, rtol=0.0, atol=1e-5 * np.abs(slope).max())
+    for number, (way, signal) in enumerate(signals.items()):
+        held = 3.0 * run.acceleration("B", way) - signal(run.t)  # the shaft has no mass
+        reaction = run.reactions()[0].force[:, number]
+        np.testing.assert_allclose(reaction, held, rtol=0.0, atol=1e-6 * np.abs(held).max())

@@ -51,3 +51,37 @@ def test_refused(tmp_path):
         fb.Frame.from_mesh(written(tmp_path / "l.msh"), {"run": FLAT})
     with pytest.raises(FileNotFoundError):
         fb.Frame.from_mesh(tmp_path / "none.msh", FLAT)
+
+
+def shuffled_shaft(path, seed, both_ways=True):
+    """A straight shaft of three groups, its nodes, its lines and their ways in any order."""
+    rng, z = np.random.default_rng(seed), np.linspace(0.0, 1.0, 11)
+    order, node = rng.permutation(10), rng.permutation(11)
+    points = np.zeros((11, 3))
+    points[node, 2] = z
+    lines = node[np.column_stack((order, order + 1))]
+    turned = rng.random(10) < 0.5
+    lines[turned & both_ways] = lines[turned & both_ways][:, ::-1]
+    group = np.searchsorted([0.3, 0.7], (z[:-1] + z[1:]) / 2.0)[order]
+    sets = {f"g{i}": [np.flatnonzero(group == i)] for i in range(3)}
+    meshio.Mesh(points, [("line", lines)], cell_sets=sets).write(path)
+    return path
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_straight_frame_is_one_in_whatever_order_its_lines_are(tmp_path, seed):
+    """Where z is counted from, and which way the spin turns, is not left to the first line of the file."""
+    path, section = shuffled_shaft(tmp_path / "shaft.inp", seed), fb.Section.circle(2e11, 7850.0, 0.02)
+    frame = fb.Frame.from_mesh(path, {f"g{i}": section for i in range(3)}, spin=300.0, bending_only=True)
+    np.testing.assert_allclose([frame.nodes[one.a][2] for one in frame.members], [0.0, 0.3, 0.7], atol=1e-12)
+    np.testing.assert_allclose([frame.nodes[one.b][2] for one in frame.members], [0.3, 0.7, 1.0], atol=1e-12)
+    assert frame.nodes[frame.site(0.7, "test")][2] == pytest.approx(0.7)
+    np.testing.assert_array_equal(frame.axis, [0.0, 0.0, 1.0])
+
+
+def test_lines_of_both_ways_leave_a_product_of_area_without_a_sign(tmp_path):
+    skew = fb.Section(7e10, 2700.0, 3e-4, 6e-9, I2=9e-9, I12=2e-9, J=5e-9)
+    path = shuffled_shaft(tmp_path / "shaft.inp", 0)
+    with pytest.raises(ValueError, match="must run one way, by which the sign of I12 goes"):
+        fb.Frame.from_mesh(path, skew)
+    fb.Frame.from_mesh(shuffled_shaft(tmp_path / "shaft.inp", 0, both_ways=False), skew)

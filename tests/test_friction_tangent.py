@@ -8,7 +8,8 @@ from scipy.optimize import fsolve
 from test_friction import EYE, SHARP, Tone, disc, pulled, wall
 
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear
-from solvers import Contact, Exponential, Friction, Parameter, System, integrate, orbit
+from solvers import Contact, Exponential, Friction, Parameter, System, branch, integrate, orbit
+from solvers.orbits import newton
 
 FINE = Exponential(1e-11)
 
@@ -210,3 +211,66 @@ def test_multipliers_of_a_driven_orbit(amplitude):
     assert len(found.contacts.t_in) > 0
     expected = np.linalg.eigvals(by_differences(shaker(amplitude), *np.split(found.state[:4], 2), period, 1e-7))
     np.testing.assert_allclose(np.sort(np.abs(found.multipliers))[-2:], np.sort(np.abs(expected))[-2:], rtol=2e-4)
+
+
+def rolled(spin=0.3, omega=3.1, radius=0.5, turn=1.0):
+    """A mass pressed to the bottom of a hole that turns slowly, pushed along it: it sticks, and slips in between."""
+    friction = Friction(0.45, 300.0)
+    rotation = turn * np.array([0.2, 0.0, 1.0])
+    hole = Contact(
+        *(EYE[:2, :3], KelvinVoigt(400.0, 2.0), 1.0),
+        **{"map": "annulus", "friction": friction, "radius": radius, "spin": spin, "rotation": rotation},
+    )
+    loads = [(-EYE[1, :3], Tone(20.0, 0.0)), (EYE[0, :3], Tone(4.5, omega, 0.5))]
+    return System(EYE[:3, :3], 0.3 * EYE[:3, :3], np.diag([4.0, 5.0, 9.0]), [hole], loads)
+
+
+@pytest.mark.parametrize(("name", "value"), [("omega", 3.1), ("spin", 0.3), ("radius", 0.5)])
+def test_the_slope_of_a_branch_on_which_a_spinning_shaft_sticks(name, value):
+    """Its slider's place is told without what the spin has turned by in a period, which each of these changes."""
+
+    def make(x):
+        return rolled(**{name: x}), 2.0 * np.pi / (x if name == "omega" else 3.1)
+
+    point = branch(make, (0.9 * value, 1.1 * value), orbit(*make(value)), at=value).walks[0].first
+    assert point.orbit.memory[0][0] == 0.0  # it sticks where the period begins
+    near = [newton(point.problem, point.chain.x, value + d)[0].x.ravel() for d in (-1e-5, 1e-5)]
+    expected = (near[1] - near[0]) / 2e-5
+    slope = point.tangent[:-1] / point.tangent[-1]
+    np.testing.assert_allclose(slope, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(("name", "value"), [("radius", 0.5), ("turn", 1.0), ("spin", 0.3)])
+def test_derivatives_by_what_turns_a_shaft_in_its_hole(name, value):
+    """The radius at which a rotation rubs is part of the row that the element acts on."""
+
+    def system(d):
+        return rolled(**{name: value + d})
+
+    start = [0.1, -0.2, 0.1], [0.5, -1.0, 0.7]
+    by = Parameter(system(-1e-6), system(1e-6), 1e-6)
+    run = integrate(system(0.0), *start, 4.0, method=Exponential(1e-11), tangent=by)
+    ends = [integrate(system(d), *start, 4.0, method=Exponential(1e-12)).end for d in (-1e-5, 1e-5)]
+    expected = (ends[1] - ends[0]) / 2e-5
+    np.testing.assert_allclose(run.tangent[:, -1], expected[:6], rtol=0.0, atol=1e-6 * np.abs(expected).max())
+
+
+def test_what_never_sticks_is_no_family():
+    """Nothing follows from the place of a slider that is open or slips all the time: no orbit beside belongs to it."""
+    slipping, period = orbit(rotor(180.0), 2.0 * np.pi / 180.0), 2.0 * np.pi / 180.0
+    system = rotor(180.0)
+    open_ = orbit(system.like([replace(system.contacts[0], gap=1.0)]), period)
+    for found, contacts in ((slipping, 1), (open_, 0)):
+        assert (len(found.contacts), found.family, found.forgotten) == (contacts, (), 1)
+        assert np.abs(found.multipliers - 1.0).min() > 1e-3
+
+
+def test_a_branch_reaches_the_end_of_what_is_allowed():
+    """There is no friction below 0: derivatives by the coefficient are taken from above there."""
+
+    def make(mu):
+        return shaker(60.0, mu), 2.0 * np.pi / 130.0
+
+    found = branch(make, (0.0, 0.3), orbit(*make(0.1)), at=0.1).run()
+    assert [status.name for status in found.status] == ["END", "END"]
+    assert found.orbits[-1].parameter == 0.0 or found.orbits[0].parameter == 0.0

@@ -10,6 +10,7 @@ from problems import TIP, paper_scene
 
 import fembeam as fb
 import solvers
+from contacts import Hysteretic
 from fembeam.cli import commands as cli
 from fembeam.model import extremes_of
 from fembeam.model.equations import common_period
@@ -130,3 +131,25 @@ def test_the_table_branch(tmp_path, capsys):
     assert cli.main(["run", str(file), "--out", str(tmp_path / "out"), "--quiet"]) == 0
     assert "reached the end of the span" in capsys.readouterr().out
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {"branch.npz", "branch.csv", "branch.png"}
+
+
+@pytest.mark.parametrize("phase", [1.0, 2.0, 3.0])
+def test_what_is_read_off_an_orbit_takes_loads_at_its_own_times(phase):
+    """An orbit whose law latches the entry rate begins where its stop is open, which need not be t = 0."""
+    scene = fb.Scene(
+        fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
+        supports=[fb.Clamped(0.0)],
+        masses=[fb.LumpedMass(TIP, 0.0254)],
+        stops=[fb.Stop(TIP, Hysteretic.lankarani_nikravesh(1e4, restitution=0.5))],
+        damping=fb.ModalDamping(0.02),
+        base=fb.Harmonic(1e-3, 90.0, phase=phase),
+    )
+    orbit = scene.reduce(modes=2).orbit()
+    run, step = orbit.run, orbit.run.t[1]
+    frame = run.displacement(TIP, absolute=True) - run.displacement(TIP)
+    expected = 1e-3 * np.cos(90.0 * (run.t + orbit.found.phase) + phase)
+    np.testing.assert_allclose(frame, expected, rtol=0.0, atol=1e-15)
+    velocity, acceleration = run.velocity(TIP), run.acceleration(TIP)
+    error = np.abs((velocity[2:] - velocity[:-2]) / (2.0 * step) - acceleration[1:-1])
+    assert np.median(error) < 1e-3 * np.abs(acceleration).max()
+    assert (orbit.found.phase > 0.0) == (phase > 1.0)

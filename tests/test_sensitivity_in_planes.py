@@ -303,3 +303,25 @@ def test_a_direction_changes_rows():
     expected = five_points(lambda h: runs[h].displacement("B", "x"), 1e-4)
     assert abs(expected).max() > 0.0
     np.testing.assert_allclose(found.displacement("B", "x"), expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("path", ["forces[1].signal.omega", "beam.spin", "stops[0].radius"])
+def test_an_orbit_in_which_a_spinning_shaft_sticks(path):
+    """The place of its slider is told without what the spin has turned by in a period."""
+    section = fb.Section.circle(1e7, 1.0, 0.02)
+    loads = [fb.PointForce("B", fb.Harmonic(20.0, 0.0), direction="y")]
+    scene = fb.Scene(
+        fb.Frame.straight(0.5, section, spin=0.3, bending_only=True),
+        supports=[fb.Clamped("A")],
+        masses=[fb.LumpedMass("B", 1.0)],
+        stops=[fb.AnnularStop("B", KelvinVoigt(400.0, 2.0), 1.0, friction=fb.Friction(0.45, 300.0), radius=0.5)],
+        forces=[*loads, fb.PointForce("B", fb.Harmonic(4.5, 3.1, phase=1.0), direction="x")],
+        damping=fb.Rayleigh(0.4, 0.0),
+    )
+    orbit = scene.reduce(modes=2).orbit()
+    assert orbit.found.memory[0][0] == 0.0  # it sticks where the period begins
+    value, h = fb.scene.value_of(scene, path), 1e-5
+    near = [with_value(scene, path, value + d).reduce(modes=2).orbit(start=orbit) for d in (-h, h)]
+    ends = [np.array(one.extremes(("B", "x"))) for one in near]
+    found = orbit.sensitivity(path).extremes(("B", "x"))
+    np.testing.assert_allclose(found, (ends[1] - ends[0]) / (2.0 * h), rtol=1e-5)

@@ -13,6 +13,7 @@ import numpy as np
 
 import solvers
 from fembeam.scene import signals_of
+from solvers.problem.whole_runs import whole_runs
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -56,6 +57,7 @@ def fastest(model: Model) -> float:
     return max(float(model.omega.max()), 1e-9)
 
 
+@whole_runs()
 def _trial(model: Model) -> tuple[solvers.ContactLog | None, list[str]]:
     """Contacts of the first periods from rest; None, and why, when they cannot be computed."""
     moving = model.omega[model.omega > 1e-6 * fastest(model)]

@@ -23,6 +23,7 @@ from fembeam.response.shapes import Vector
 from fembeam.scene import for_duration, respun, with_signals, with_value
 from fembeam.support import Part, Printed, bar, is_whole, note, numbers, require, require_positive
 from solvers.problem import counted
+from solvers.problem.whole_runs import whole_runs
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -114,7 +115,9 @@ class Model(Printed, ModalEquations):
             start[:, mode] = np.array([-contact.gap, -speed]) / contact.direction[mode]
         system = solvers.System(self.system.M, self.system.C, self.system.K, [contact], gyroscopic=self.turning)
         slowest = max(float(self.omega[mode]), 1.0)
-        return PlacedLog.of(solvers.integrate(system, *start, np.pi / slowest).contacts, self.sites[stop : stop + 1])
+        with whole_runs():
+            found = solvers.integrate(system, *start, np.pi / slowest).contacts
+        return PlacedLog.of(found, self.sites[stop : stop + 1])
 
     def under(self, scene: Scene) -> Model:
         """The same model of a scene that differs in signals, gaps and laws only; what depends on none is kept."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
@@ -16,13 +16,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import solvers
+from fembeam.excitation import Harmonic, Multisine
 from fembeam.model.equations import load_period
 from fembeam.model.extremes import extremes_of
 from fembeam.response import PlacedLog
+from fembeam.scene import with_signals
 from fembeam.support import Part, Printed, is_whole, require
 from solvers.orbits import at_zero, delayed, periods_of_decay, settled, state_after, with_initial_memory
 from solvers.orbits import run as run_from
 from solvers.problem import counted
+from solvers.problem.whole_runs import whole_runs
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -94,7 +97,10 @@ class Orbit(Printed):
         from fembeam.model.run import Run
 
         cycles = self.found.period * max(float(self.model.omega.max()), 1.0 / self.found.period) / (2.0 * math.pi)
-        return Run.of(self.model, self.found.samples(max(400, math.ceil(24.0 * cycles))))
+        model = self.model
+        if self.found.phase:  # what is read off a run takes loads and motions of supports at its own times
+            model = model.under(with_signals(model.scene, partial(_later, by=self.found.phase)))
+        return Run.of(model, self.found.samples(max(400, math.ceil(24.0 * cycles))))
 
     def sensitivity(self, parameter: str) -> Sensitivity:
         """Exact derivative of the orbit by a number of its scene: of its state, period, peaks and contacts.
@@ -149,6 +155,14 @@ class Orbit(Printed):
             contacts += f", {counted(len(self.transitions), 'transition')}"
         kind += ", one of a family" if self.found.family else ""
         return f"<{kind} orbit of period {self.period} with {contacts}, |μ| = {abs(self.found.transverse[0]):.4g}>"
+
+
+def _later(signal: Any, by: float) -> Any:
+    """A signal of tones from a later time on."""
+    if isinstance(signal, Harmonic):
+        return replace(signal, phase=signal.phase + signal.omega * by)
+    omega, amplitude = signal.tones()
+    return Multisine(np.abs(amplitude), omega, np.angle(amplitude) + np.asarray(omega) * by)
 
 
 def orbit(model: Model, period: int, start: ArrayLike | Orbit | None, shots: int | None) -> Orbit:
@@ -269,7 +283,8 @@ def _starts(model: Model, T: float, starts: int | Sequence[ArrayLike], seed: int
         return states
     require(starts >= 1, "starts must be a count above 0 or a list of states", starts, "attractors", "ask for 12")
     method = solvers.Exponential(1e-6, ledger=False)
-    run = solvers.integrate(model.system, np.zeros(n), np.zeros(n), 20.0 * T, T / 16.0, method)
+    with whole_runs():
+        run = solvers.integrate(model.system, np.zeros(n), np.zeros(n), 20.0 * T, T / 16.0, method)
     size = np.concatenate((np.abs(run.q).max(axis=0), np.abs(run.q_dot).max(axis=0)))
     rng = np.random.default_rng(seed)
     return [np.zeros(2 * n), *(2.0 * size * rng.normal(size=2 * n) for _ in range(starts - 1))]

@@ -28,6 +28,7 @@ from fembeam.scene.signals import is_of_signal
 from fembeam.support import Part, Printed, numbers, require
 from solvers.orbits import codes, counts, delayed
 from solvers.problem import counted, dataframe
+from solvers.problem.friction import told_rates
 from solvers.sensitivities import Nearby, indentation_change, sensitivities, sensitivity
 
 if TYPE_CHECKING:
@@ -409,7 +410,7 @@ def of_orbit_by_each(orbit: Orbit, parameters: Sequence[str], times: Vector | No
     once = sensitivities(system, *known, [(one, None) for one in later], **options)
     for one, longer in zip(once, lengthening, strict=True):
         change = one.end.copy()
-        change[: 2 * n] += one.rate * longer
+        change += np.concatenate((one.rate, told_rates(system.contacts, one.solution.memory))) * longer
         starts.append(_fixed_point(one.matrix, change, free))
     whole = orbit.run.t if times is None else times
     period = sensitivities(system, *known, list(zip(later, starts, strict=True)), whole, **options)

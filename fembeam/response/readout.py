@@ -82,8 +82,8 @@ class Readout:
 
     @cached_property
     def damping(self) -> Vector:
-        """C (n, n), 1/s."""
-        return np.asarray(self.model.system.C)
+        """C (n, n), 1/s; of a shaft that spins with its gyroscopic matrix."""
+        return np.asarray(self.model.system.by_rate)
 
     @cached_property
     def load_vectors(self) -> Vector:

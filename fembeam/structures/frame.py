@@ -128,11 +128,14 @@ class Frame:
         -------
         Frame : a straight chain of lines of one group is one member, "group" where it is the only one of its group,
             else "group 1", "group 2", …; nodes go by the names of node sets and groups of points, else "n" and their
-            number in the file, from 0.
+            number in the file, from 0. A member runs as the first of its lines. A straight frame runs as its lines do,
+            whatever their order, or where they run both ways from its lower end in its longest direction: that way z
+            is counted, and the spin turns.
 
         Raises
         ------
-        ValueError : the file cannot be read, has no lines or other elements, a group without section.
+        ValueError : the file cannot be read, has no lines or other elements, a group without section, or lines of both
+            ways in a member with I12.
         """
         from fembeam.structures.frame_files import frame_of
 

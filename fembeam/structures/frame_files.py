@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from fembeam.structures.members import Member
 from fembeam.support import require
 
 Vector = NDArray[np.float64]
+Chain = tuple[list[int], str]  # nodes, and the group of their lines
 STRAIGHT = 1e-6  # sine of the angle below which two lines are one
 
 
@@ -42,7 +44,10 @@ def frame_of(
     table = {"": sections} if isinstance(sections, Section) else {str(key): one for key, one in sections.items()}
     named = _names(mesh)
     chains = list(_chains(points, lines, chosen, set(named), where))
-    names = {node: named.get(node, f"n{node}") for chain, _ in chains for node in (chain[0], chain[-1])}
+    skew = {group for group, one in table.items() if one.I12}
+    _require_one_way(points, lines, chosen, chains, skew, where)
+    chains, ends = _in_order(points, lines, chains, skew)
+    names = {node: named.get(node, f"n{node}") for node in ends}
     flat = not np.any(points[np.unique(lines), 2]) and not options.get("bending_only") if plane is None else plane
     members = [
         Member(names[chain[0]], names[chain[-1]], table[group], _up_of(up, group), name)
@@ -50,6 +55,48 @@ def frame_of(
     ]
     nodes = {name: tuple(float(x) for x in points[node, : 2 if flat else 3]) for node, name in names.items()}
     return Frame(nodes, members, **options)
+
+
+def _require_one_way(
+    points: Vector, lines: NDArray[np.int64], groups: list[str], chains: list[Chain], skew: set[str], where: str
+) -> None:
+    """Lines of one member must run one way where its section has I12, whose sign goes by it."""
+    for chain, group in chains if skew else ():
+        inside = {frozenset(pair) for pair in pairwise(chain)}
+        along = points[chain[-1]] - points[chain[0]]
+        mine = [line for line, own in zip(lines, groups, strict=True) if own == group and frozenset(line) in inside]
+        against = [line for line in mine if (points[line[1]] - points[line[0]]) @ along < 0]
+        there = shown(points[against[0]]) if against else None
+        one_way = group not in skew or len(against) in (0, len(mine))
+        require(one_way, "lines of a member must run one way, by which the sign of I12 goes", there, where,
+                "turn the lines round that begin there")  # fmt: skip
+
+
+def _in_order(
+    points: Vector, lines: NDArray[np.int64], chains: list[Chain], skew: set[str]
+) -> tuple[list[Chain], list[int]]:
+    """The chains and their ends in the order of the file; of straight ones along their line.
+
+    That is the way the lines run, or where they run both ways from the lower end, in its longest direction.
+    """
+    ends = list(dict.fromkeys(node for chain, _ in chains for node in (chain[0], chain[-1])))
+    used = points[ends]
+    main = int(np.argmax(np.ptp(used, axis=0)))
+    low = used[np.argmin(used[:, main])]
+    axis = used[np.argmax(used[:, main])] - low
+    length = float(np.linalg.norm(axis)) or 1.0  # of lines that fold back there is none, which the frame refuses
+    along = (points - low) @ axis / length
+    off = np.linalg.norm(used - low - np.outer(along[ends], axis / length), axis=1)
+    if off.max() > STRAIGHT * length:
+        return chains, ends
+    sense = -1.0 if np.all(along[lines[:, 1]] < along[lines[:, 0]]) else 1.0
+    place = sense * along
+    turned = [
+        (chain if place[chain[0]] < place[chain[-1]] or group in skew else chain[::-1], group)
+        for chain, group in chains
+    ]
+    middle = {id(one): place[one[0][0]] + place[one[0][-1]] for one in turned}
+    return sorted(turned, key=lambda one: middle[id(one)]), sorted(ends, key=lambda node: float(place[node]))
 
 
 def _up_of(up: Any, group: str) -> Any:
@@ -77,7 +124,7 @@ def _numbered(names: list[str]) -> list[str]:
 
 def _chains(
     points: Vector, lines: NDArray[np.int64], groups: list[str], named: set[int], where: str
-) -> Iterator[tuple[list[int], str]]:
+) -> Iterator[Chain]:
     """Straight chains of lines of one group, from corner to corner, in the order of the file."""
     meeting: dict[int, list[int]] = {}
     for i, line in enumerate(lines):

@@ -19,12 +19,12 @@ import solvers
 from fembeam.model import Model, Orbit, Run
 from fembeam.model.sensitivity import Sensitivity, by_each, of_orbit_by_each
 from fembeam.scene import Place, Scene
-from fembeam.study.execution.executors import finished
 from fembeam.study.measure import cut, runs, values_of
 from fembeam.study.quantities import mean_in_time, place_of
 from fembeam.study.trial import Trial
 from fembeam.support import require
 from reduction import AccuracyError
+from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
 SAME = 1e-3  # by which the orbit may differ from the settled response, relatively
@@ -114,6 +114,7 @@ def has_gradients(trial: Trial, insist: bool = False) -> bool:
     return not reasons
 
 
+@whole_runs()
 def gradient(trial: Trial, point: Vector) -> Vector:
     """(q, d) derivatives of the quantities by the parameters at a point.
 
@@ -138,7 +139,7 @@ def _of_run(trial: Trial, model: Model) -> Vector:
     plan = trial.plan
     assert plan.duration is not None
     start = None if plan.start is None else plan.start(model)
-    run = finished(model.simulate(plan.duration, plan.dt, start, trial.method))
+    run = model.simulate(plan.duration, plan.dt, start, trial.method)
     part = cut(run, plan.discard, plan.duration)
     mine = (run.contacts.t_in >= plan.discard) & (run.contacts.t_in < plan.duration)
     kept = slice(len(run.t) - len(part.t), None)

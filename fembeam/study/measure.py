@@ -24,10 +24,10 @@ import solvers
 from fembeam.model import Model, Run, load_period
 from fembeam.response import latched_before
 from fembeam.scene import Scene, signals_of
-from fembeam.study.execution.executors import finished
 from fembeam.study.quantities import Quantity, label
 from fembeam.study.realisations import child, renewed, seed_key
 from fembeam.support import is_whole, require, require_non_negative, require_positive
+from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
 Start = Callable[[Model], Any]
@@ -155,13 +155,14 @@ def _measured(case: Case, model: Model, solver: Any, preparation: float) -> Meas
     return Measured(values, len(model.omega), seconds, preparation, share, highest * contact / (2 * np.pi))
 
 
+@whole_runs()
 def runs(model: Model, plan: Plan, quantity: Quantity, solver: Any) -> list[Run]:
     """The runs, or parts of a run, that give independent values; times count from the beginning of each."""
     start = None if plan.start is None else plan.start(model)
     if plan.duration is None:
         return periodic(model, start, solver, getattr(quantity, "sampled", True))
     models = [_seeded(model, seed) for seed in plan.seeds] if plan.seeds else [model]
-    whole = [finished(each.simulate(plan.duration, plan.dt, start, solver)) for each in models]
+    whole = [each.simulate(plan.duration, plan.dt, start, solver) for each in models]
     return [cut(run, plan.discard, plan.duration) for run in whole]
 
 
@@ -169,7 +170,7 @@ def periodic(model: Model, start: Any, solver: Any, sampled: bool) -> list[Run]:
     """Groups of drive periods of the settled response; a simulation rather than shooting, as it may be chaotic."""
     period = load_period(model.scene)
     dt = period / SAMPLES if sampled else None
-    run = finished(model.simulate((SETTLING + GROUPS * GROUP) * period, dt, start, solver))
+    run = model.simulate((SETTLING + GROUPS * GROUP) * period, dt, start, solver)
     borders = (SETTLING + GROUP * np.arange(GROUPS + 1)) * period
     parts = [cut(run, a, b) for a, b in pairwise(borders)]
     share = replace(run.cost, seconds=run.cost.seconds / GROUPS)

@@ -16,9 +16,9 @@ from fembeam.model import Model, Run
 from fembeam.scene import signals_of
 from fembeam.statistics.initial_transient import FEWEST_BATCHES
 from fembeam.study.decay import correlation_time
-from fembeam.study.execution.executors import finished
 from fembeam.study.realisations import child, continued, noises, renewed
 from fembeam.support import numbers
+from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
 
@@ -112,13 +112,14 @@ class Segments:
             run = self._run(math.ceil((lead + wanted) / self.dt - 1e-9) * self.dt)
             yield Segment(run, lead, self._border(run, lead), batches)
 
+    @whole_runs()
     def _run(self, duration: float) -> Run:
         """One segment from the state reached."""
         i = self.index + self.dropped
         model, later = self.model, partial(continued, time=self.time, duration=duration)
         if self.repeats:  # all changes at once: each makes another scene and system
             model = renewed(model, lambda _, seed: child(seed, i), later)
-        run = finished(model.go_on(duration, self.dt, self.state, self.solver))
+        run = model.go_on(duration, self.dt, self.state, self.solver)
         self.seconds += run.cost.seconds
         return run
 
@@ -161,9 +162,10 @@ class Segments:
         self.time += self.dt * piece.end
 
 
+@whole_runs()
 def _pilot(model: Model, duration: float, dt: float, state: Vector, solver: Any) -> Run:
     """A run by which the level of the motion is seen."""
-    return finished(model.go_on(math.ceil(duration / dt - 1e-9) * dt, dt, state, solver))
+    return model.go_on(math.ceil(duration / dt - 1e-9) * dt, dt, state, solver)
 
 
 def _longest(found: list[Any], tau: float, dt: float) -> float:

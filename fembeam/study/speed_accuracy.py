@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam import plot
 from fembeam.model import Model, Run, places
-from fembeam.study.execution.executors import finished
 from fembeam.study.result import Result
 from fembeam.support import Part, counting, require, require_positive
+from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
 _INSTANTS = 8  # between two starts, of which the first with all stops open is taken
@@ -231,9 +231,10 @@ class _Question:
     dt: float | None
     quantity: Callable[[Run], Any]
 
+    @whole_runs()
     def run(self, model: Model, state: Vector, method: Any) -> Run:
         """One run; the state is padded with modes at rest."""
-        return finished(model.simulate(self.duration, self.dt, _padded(state, len(model.omega)), method))
+        return model.simulate(self.duration, self.dt, _padded(state, len(model.omega)), method)
 
     def value(self, run: Run) -> Vector:
         """The quantity as a vector."""
@@ -303,6 +304,7 @@ def _check(models: list[Model], methods: list[Any], rounds: int) -> None:
                 where, "reduce one scene to 1, 2, 5, ... modes")  # fmt: skip
 
 
+@whole_runs()
 def _starts(model: Model, starts: Any, duration: float) -> Vector:
     """States (s, 2n) of the smallest model.
 
@@ -312,7 +314,7 @@ def _starts(model: Model, starts: Any, duration: float) -> Vector:
         require(bool(starts >= 1), "starts must be at least 1", starts, "speed_accuracy", "e.g. 12")
         spacing = duration * 0.618  # no multiple of a drive period
         dt, method = spacing / _INSTANTS, solvers.Exponential(1e-8, ledger=False)
-        run = finished(model.simulate((starts + 3) * spacing, dt, solver=method))
+        run = model.simulate((starts + 3) * spacing, dt, solver=method)
         closed = np.zeros(len(run.t), dtype=bool)
         for contact in model.system.contacts:
             closed |= (contact.indentation(run.q) > 0.0) & (not contact.always)

@@ -14,10 +14,10 @@ import solvers
 from fembeam import plot
 from fembeam.model import Model
 from fembeam.scene import Scene
-from fembeam.study.execution.executors import finished
 from fembeam.study.result import Result
 from fembeam.study.speed_accuracy import method_name
 from fembeam.support import Part, require
+from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
 SAMPLES = 400  # per run, for the error
@@ -178,13 +178,14 @@ def _limits(model: Model, method: Callable[[float], Any], steps: Vector, duratio
     return limit.flight * flight, limit.contact * contact
 
 
+@whole_runs()
 def _cell(model: Model, method: Any, dt: float, duration: float, tolerance: float, start: Any) -> tuple[Verdict, float]:
     """One run judged."""
     forced = replace(method(float(dt)), force_unstable=True)
     state = None if start is None else start(model)
     best = _truth(model, duration, state)
     try:
-        run = finished(model.simulate(duration, duration / SAMPLES, state, forced))
+        run = model.simulate(duration, duration / SAMPLES, state, forced)
     except solvers.SolverError:
         return Verdict.UNSTABLE, np.inf
     delta, wanted = run.indentation(), best.indentation()
@@ -198,4 +199,4 @@ def _truth(model: Model, duration: float, start: Any) -> Any:
     """The reference, once per model."""
     key = "truth of a stability map", duration, None if start is None else tuple(np.asarray(start))
     best = solvers.Exponential(1e-11, ledger=False)
-    return model.system.kept.get(key, lambda: finished(model.simulate(duration, duration / SAMPLES, start, best)))
+    return model.system.kept.get(key, lambda: model.simulate(duration, duration / SAMPLES, start, best))

@@ -21,6 +21,7 @@ from fembeam.study.measure import Plan, runs, values_of
 from fembeam.study.quantities import Quantity, label, named
 from fembeam.support import require
 from reduction import AccuracyError
+from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
 Maker = Callable[..., Scene]  # of named values
@@ -143,7 +144,8 @@ class Trial:
         scene = self.at(point)
         try:
             model = scene.reduce(**self.reduction) if self.model is None else self.model.under(scene)
-            return values_of(self.asked, runs(model, self.plan, self.asked, self.method), self.told(point))
+            with whole_runs():
+                return values_of(self.asked, runs(model, self.plan, self.asked, self.method), self.told(point))
         except (solvers.SolverError, AccuracyError) as error:
             return f"{type(error).__name__}: {error}"
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -49,27 +48,6 @@ def _on_signal(number: int, _: Any) -> None:
     if not (_state["waits"] and first):
         raise KeyboardInterrupt
     os.write(2, b"\nfembeam: stopping as soon as what was computed can be kept; once more stops at once\n")
-
-
-@contextmanager
-def noted() -> Iterator[list[int]]:
-    """The signals that come meanwhile, also those that a run takes as its end; what they do stays as it is."""
-    came: list[int] = []
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-
-    def note(number: int, frame: Any) -> None:
-        came.append(number)
-        before[signal.Signals(number)](number, frame)  # type: ignore[operator, misc]
-
-    watched = [number for number, handler in before.items() if callable(handler)]
-    watched = watched if threading.current_thread() is threading.main_thread() else []
-    try:
-        for number in watched:
-            signal.signal(number, note)
-        yield came
-    finally:
-        for number in watched:
-            signal.signal(number, before[number])
 
 
 @contextmanager

@@ -29,6 +29,7 @@ from solvers.orbits import (
     latching_stops,
     newton,
     orbit_of,
+    rate_at_end,
     state_after,
 )
 from solvers.problem import Array, System
@@ -174,7 +175,7 @@ def _linear(problem: _Meeting, chain: Chain, speed: float) -> tuple[Array, Array
     system, period = problem.make(chain.parameter)
     later, rows, misses = np.zeros((len(places), m, size)), np.zeros((len(places), 2, m * size + 1 + len(places))), []
     for k, place in enumerate(places):
-        rate, stop = _rate(chain, place) * period, problem.stops[place] or 0  # of the state there, per period
+        rate, stop = rate_at_end(system, chain.solutions[place - 1]) * period, problem.stops[place] or 0
         later[k, place - 1] += rate
         later[k, place] -= chain.tangents[place] @ rate
         n, begin = system.size, place * size
@@ -190,16 +191,10 @@ def _linear(problem: _Meeting, chain: Chain, speed: float) -> tuple[Array, Array
 
 def _gap_slope(problem: PeriodicProblem, parameter: float, stop: int) -> float:
     """Derivative of a stop's gap by the parameter."""
-    behind, ahead = (problem.make(parameter + s * problem.step)[0].contacts[stop] for s in (-1.0, 1.0))
-    change = (ahead.gap - behind.gap) / (2.0 * problem.step)
+    low, high = problem.beside(parameter)
+    behind, ahead = (problem.make(value)[0].contacts[stop] for value in (low, high))
+    change = (ahead.gap - behind.gap) / (high - low)
     return -change if ahead.outer else change
-
-
-def _rate(chain: Chain, place: int) -> Array:
-    """Rate, per s, of the state at the end of the shot before a place; latched numbers stay."""
-    rate = chain.solutions[place - 1].rate
-    assert rate is not None
-    return np.concatenate((rate, np.zeros(chain.x.shape[1] - len(rate))))
 
 
 def _length(point: Point, state: Array, parameter: float) -> float:
@@ -272,7 +267,8 @@ def _indicators(point: Point, grazing: Grazing) -> tuple[Array, Array, float]:
         columns[:, -1] += chain.by_parameter[place - 1]
         stop = grazing.stops[place]
         if stop is not None:
-            rate, state = _rate(chain, place), np.split(chain.x[place, : 2 * n], 2)
+            rate = rate_at_end(point.orbit.system, chain.solutions[place - 1])
+            state = np.split(chain.x[place, : 2 * n], 2)
             _, _, w, turning = point.orbit.system.contacts[stop].motion(*state)
             row = w @ columns[:n]
             row[-1] -= _gap_slope(point.problem, grazing.parameter, stop)

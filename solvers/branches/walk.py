@@ -74,7 +74,17 @@ class Walk:
         self._pass(self.point)
 
     def extend(self) -> None:
-        """Find the next orbit and the special points before it, or an end of the branch."""
+        """Find the next orbit and the special points before it, or an end of the branch; all or nothing."""
+        lists = {name: value.copy() for name, value in vars(self).items() if isinstance(value, list)}
+        before = {**vars(self), **lists}
+        try:
+            self._extend()
+        except BaseException:
+            vars(self).update(before)
+            raise
+
+    def _extend(self) -> None:
+        """The same in place."""
         following, self.tried, first = None, math.inf, True
         while following is None:
             h = self.step

@@ -229,7 +229,7 @@ def _same_structure(one: System, other: System) -> bool:
     if any((a.map, a.outer) != (b.map, b.outer) for a, b in zip(one.contacts, other.contacts, strict=True)):
         return False
     pairs = [(one.M, other.M), (one.C, other.C), (one.K, other.K), (one.gyroscopic, other.gyroscopic)]
-    pairs += [(a.direction, b.direction) for a, b in zip(one.contacts, other.contacts, strict=True)]
+    pairs += [(a.rows, b.rows) for a, b in zip(one.contacts, other.contacts, strict=True)]
     pairs += [(a, b) for (a, _), (b, _) in zip(one.loads, other.loads, strict=True)]
     laws = [(a.law, b.law) for a, b in zip(one.contacts, other.contacts, strict=True)]
     return all(a is b or np.array_equal(a, b) for a, b in pairs) and all(

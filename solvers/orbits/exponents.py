@@ -12,6 +12,7 @@ from solvers.compiled.state import T_END
 from solvers.exponential.method import Exponential
 from solvers.integration import prepared_run
 from solvers.problem import SolverError, Status, System
+from solvers.problem.whole_runs import whole_runs
 
 _BATCHES = 20
 
@@ -59,7 +60,8 @@ def lyapunov(
     borders = np.linspace(discard, duration, _BATCHES + 1)
     for border in borders[borders > 0.0]:  # the size of the tangent is recorded where a stretch ends
         run.state.now[T_END] = border
-        status = run.to_the_end(None)
+        with whole_runs():
+            status = run.to_the_end(None)
         if status is not Status.DONE:
             raise SolverError(f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}")
     t, growth = np.array([(0.0, 0.0), *run.tangent.history]).T

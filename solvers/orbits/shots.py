@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.orbits.whole_state import codes, derivatives, end, units
+from solvers.orbits.whole_state import codes, derivatives, end, rate_at_end, units
 from solvers.problem import Array, Parameter, Solution, System
 
 _UNIT = 1e-12  # rounding of the derivatives of latched numbers that are not renewed
@@ -65,22 +65,34 @@ class PeriodicProblem:
             ]
         return self.kept[parameter]
 
+    def beside(self, parameter: float) -> tuple[float, float]:
+        """The parameter less and plus ``step``; itself for one that the family refuses, as a μ below 0."""
+        low, high = parameter - self.step, parameter + self.step
+        try:
+            self.shots(low)
+        except ValueError:
+            return parameter, high
+        try:
+            self.shots(high)
+        except ValueError:
+            return low, parameter
+        return low, high
+
     def evaluate(self, x: Array, parameter: float, slope: bool = True) -> Chain:
         """Integrate all shots from x (m, N); without ``slope`` the derivatives by the parameter are zero."""
         here = self.shots(parameter)
-        h, (m, size) = self.step if slope else 0.0, x.shape
-        sides = [self.shots(parameter + s * h) for s in (-1.0, 1.0)] if h else []
+        low, high = self.beside(parameter) if slope and self.step else (parameter, parameter)
+        h, (m, size) = 0.5 * (high - low), x.shape
+        sides = [self.shots(low), self.shots(high)] if h else []
         residual, tangents, by_parameter, solutions = np.empty((m, size)), [], np.zeros((m, size)), []
         for i, (system, duration) in enumerate(here):
             tangent: Any = Parameter(sides[0][i][0], sides[1][i][0], h) if h else True
             solution, matrix = derivatives(system, x[i], duration, self.method, tangent)
-            assert solution.rate is not None
             residual[i] = end(solution) - x[(i + 1) % m]
             tangents.append(matrix[:, :size])
             if h:
                 lengthening = (sides[1][i][1] - sides[0][i][1]) / (2.0 * h)
-                by_parameter[i] = matrix[:, -1]
-                by_parameter[i, : 2 * system.size] += solution.rate * lengthening
+                by_parameter[i] = matrix[:, -1] + rate_at_end(system, solution) * lengthening
             solutions.append(solution)
         return Chain(x, parameter, residual, np.array(tangents), by_parameter, solutions, slope or self.step == 0.0)
 

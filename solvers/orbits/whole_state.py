@@ -14,6 +14,8 @@ import numpy as np
 
 from solvers.integration import integrate
 from solvers.problem import Array, Parameter, Solution, System, Transitions, columns_of, renew
+from solvers.problem.friction import told_rates
+from solvers.problem.whole_runs import whole_runs
 
 _REALS = ctypes.c_void_p
 _AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS  # border, δ, δ̇, entry rate, parameters
@@ -64,13 +66,20 @@ def memory_of(system: System, x: Array) -> tuple[Array, ...]:
 def run(system: System, x: Array, duration: float, dt: Any = None, method: Any = None, **more: Any) -> Solution:
     """A run from a state."""
     n, memory = system.size, memory_of(system, x)
-    return integrate(system, x[:n], x[n : 2 * n], duration, dt, method, memory=memory or None, **more)
+    with whole_runs():
+        return integrate(system, x[:n], x[n : 2 * n], duration, dt, method, memory=memory or None, **more)
 
 
 def end(solution: Solution) -> Array:
     """The state a run ends with."""
     state: Array = np.concatenate((solution.q[-1], solution.q_dot[-1], *solution.memory))
     return state
+
+
+def rate_at_end(system: System, solution: Solution) -> Array:
+    """Derivative of `end` by the duration, of a run with a tangent."""
+    assert solution.rate is not None
+    return np.concatenate((solution.rate, told_rates(system.contacts, solution.memory)))
 
 
 def state_after(system: System, x: Array, duration: float, method: Any) -> Array:

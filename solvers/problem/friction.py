@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -130,6 +131,36 @@ def may_pull(law: Any) -> bool:
     """Whether a force, before it is cut at zero, may be negative while δ > 0: not known to push for all δ̇."""
     *_, factor, damping = getattr(law, "inlined", None) or (1.0, 1.0)
     return bool(factor or damping)
+
+
+def told_rates(contacts: Sequence[Any], now: Sequence[Array]) -> Array:
+    """(l,) derivatives of latched numbers, as they are told at the end of a run, by its duration.
+
+    The place of a slider that sticks is told as of a run that begins now, in which a spin has turned by nothing yet.
+    """
+    rates = [np.zeros(len(one)) for one in now]
+    for contact, one, rate in zip(contacts, now, rates, strict=True):
+        if contact.friction is not None and one[0] == STICK:
+            rate[1] = -contact.surface
+    return np.concatenate([np.zeros(0), *rates])
+
+
+def tell_sliders(
+    matrix: Array, contacts: Sequence[Any], begun: Sequence[Array], now: Sequence[Array], turned: Array
+) -> None:
+    """Make derivatives (2n + l, 2n + l + d) of the end of a run those of what is told of sliders, in place.
+
+    ``begun`` and ``now`` are latched numbers at start and end; ``turned`` (contacts, d) the derivatives, by d
+    parameters, of the way that spins have turned, which is not told, see `told_rates`. Nothing follows from the place
+    of a slider that did not stick at the start.
+    """
+    place = len(matrix) - sum(map(len, now)) + 1
+    for contact, first, last, way in zip(contacts, begun, now, turned, strict=True):
+        if contact.friction is not None and first[0] != STICK:
+            matrix[:, place] = 0.0
+        if contact.friction is not None and last[0] == STICK:
+            matrix[place, matrix.shape[1] - len(way) :] -= way
+        place += len(last)
 
 
 def row_of(name: str, given: ArrayLike, size: int) -> Array:

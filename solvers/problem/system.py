@@ -225,6 +225,12 @@ class Contact:
         return np.append(self.gap, np.zeros(len(self.rows) - 1))
 
     @property
+    def surface(self) -> float:
+        """R Ω, m/s, the speed that a spin gives the place's own surface; negative around a post."""
+        law: Any = self.law
+        return float(law.arm * self.spin) if self.friction is not None else 0.0
+
+    @property
     def circle(self) -> float:
         """Clearance of an annulus in m, negative of an outer one; 0 of a stop on a line."""
         if self.map != "annulus":

@@ -69,7 +69,7 @@ def motion_of(contact: Any, q: Array, q_dot: Array, t: Any = 0.0) -> ElementMoti
         return ElementMotion(*known, none, none, xi_slopes, xi_curvature, none)
     xi_slopes[:2], xi_curvature[:2, :2] = c / r * across, -c / r**2 * (e[:, None] * across + across[:, None] * e)
     xi_slopes[2:] = -math.copysign(1.0, contact.law.arm)
-    angle, surface = np.arctan2(y[1], y[0]), contact.law.arm * contact.spin
+    angle, surface = np.arctan2(y[1], y[0]), contact.surface
     xi = c * angle + (xi_slopes[2:] * y[2:]).sum(axis=0) + surface * t
     return ElementMotion(*known, xi, (xi_slopes * y_dot).sum(axis=0) + surface, xi_slopes, xi_curvature, angle)
 

@@ -332,6 +332,12 @@ def _begun(places: list[int], law: Any) -> Array:
     return np.asarray(law.parameters)[places]
 
 
+def begun_numbers(system: System, given: Sequence[Any] | None) -> list[Array]:
+    """The latched numbers at the start: given ones, or those that laws begin with."""
+    begin = [_begun(list(getattr(one.law, "memory", ())), one.law) for one in system.contacts]
+    return begin if given is None else [one if own is None else own for one, own in zip(begin, given, strict=True)]
+
+
 def latched_columns(system: System, by: Change, columns: int, given: Sequence[Any] | None) -> list[Array]:
     """(l, m) derivatives of the latched numbers of every element at the start.
 

@@ -103,7 +103,7 @@ class ElementChange:
             found = [one.derivative(lambda system: read(system.contacts[s])) for one in nearby]
             return np.array(found).reshape(len(nearby), *shape)
 
-        numbers = (of(read) for read in (_clearance, _mu, _stiffness, _surface))
+        numbers = (of(read) for read in (_clearance, _mu, _stiffness, lambda one: one.surface))
         return cls(of(lambda one: one.rows, shape), of(lambda one: one.row_gaps, shape[:1]), *numbers)
 
 
@@ -132,10 +132,6 @@ def _mu(contact: Any) -> float:
 
 def _stiffness(contact: Any) -> float:
     return contact.friction.stiffness if contact.friction else 0.0
-
-
-def _surface(contact: Any) -> float:
-    return contact.law.arm * contact.spin if contact.friction else 0.0
 
 
 class Change:

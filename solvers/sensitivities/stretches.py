@@ -14,6 +14,7 @@ from solvers.compiled.state import law_parameters
 from solvers.integration import prepared_run
 from solvers.problem import Array, Solution, SolverError, Status, System, dense
 from solvers.problem import event_list as at
+from solvers.problem.whole_runs import whole_runs
 from solvers.sensitivities import laws
 from solvers.sensitivities.elements import Slider, motion_of
 from solvers.sensitivities.panels import Clock, Panels
@@ -67,7 +68,8 @@ def replayed(
     """The run with its list of events (k, 14), a row an event."""
     n = system.size
     run = prepared_run(system, x[:n], x[n:], duration, times, method, False, memory)
-    status = run.to_the_end(None)
+    with whole_runs():
+        status = run.to_the_end(None)
     solution = run.solution(status, 0.0)
     rows = run.state.log[: int(run.state.count[_LOGGED])]
     rows = rows[rows[:, at.GUARD] != at.FRICTION]

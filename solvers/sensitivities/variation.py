@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 
 from solvers.problem import Array, ContactLog, Solution, System, dense
 from solvers.problem import event_list as at
+from solvers.problem.friction import tell_sliders
 from solvers.sensitivities.elements import motion_of
 from solvers.sensitivities.events import GRAZING, NoDerivativeError, called, cross
-from solvers.sensitivities.flow import Flow, latched_columns
+from solvers.sensitivities.flow import Flow, begun_numbers, latched_columns
 from solvers.sensitivities.nearby import Change, Nearby, unchanged
 from solvers.sensitivities.panels import Panels, S, coefficients, interpolated, largest, zeros
 from solvers.sensitivities.sampled import SampledLoads
@@ -344,6 +345,10 @@ class _Walk:
         """The collected derivatives, one `Sensitivity` for each parameter."""
         flow, log, times = self.flow, self.solution.contacts, self.asked.times
         end = np.concatenate((flow.state, *flow.latched))
+        system, now = self.asked.system, self.solution.memory
+        begun = begun_numbers(system, self.asked.memory)
+        turned = self.asked.duration * np.array([one.surface for one in self.asked.by.elements])
+        tell_sliders(end, system.contacts, begun, now, turned)
         rate = flow.rate(np.array([self.asked.duration]), self.acting)[:, 0]
         of_contacts, matrix = self._of_contacts(log), end[:, : len(end)]
         about: Any = matrix, self._growth(), flow.roughness, self.solution

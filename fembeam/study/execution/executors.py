@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, as_completed
 from typing import TypeVar
 
-from fembeam.model import Run
-from fembeam.support import counting, interrupts, require
+from fembeam.support import counting, require
+from solvers.problem.whole_runs import whole_runs
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -74,22 +74,11 @@ def spread(
         return [future.result() for future in futures]
 
 
-def finished(run: Run) -> Run:
-    """The run, unless Ctrl-C ended it early: then it ends the study too."""
-    if not run.complete:
-        raise KeyboardInterrupt
-    return run
-
-
 def _named(function: Callable[[Item], Result], index: int, item: Item) -> Result:
-    """function(item); an error learns which item it was, and Ctrl-C, which ends a run early, ends the study too."""
-    with interrupts.noted() as came:
-        try:
-            result = function(item)
-        except Exception as error:
-            error.add_note(f"item {index}: {item!r}"[:200])
-            if not came:
-                raise
-    if came:
-        raise KeyboardInterrupt
-    return result
+    """function(item); an error learns which item it was."""
+    try:
+        with whole_runs():
+            return function(item)
+    except Exception as error:
+        error.add_note(f"item {index}: {item!r}"[:200])
+        raise
