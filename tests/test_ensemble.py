@@ -490,7 +490,11 @@ def stopped(model):
 
 def test_ctrl_c_in_a_run_of_the_quantity_ends_the_ensemble(tmp_path):
     """The run ends there with what it has, which is no value of the quantity."""
-    with pytest.raises(KeyboardInterrupt):
-        ensemble(small_model(), 2, stopped, checkpoint=tmp_path / "kept.npz")
-    assert list(tmp_path.iterdir()) == []
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            ensemble(small_model(), 2, stopped, checkpoint=tmp_path / "kept.npz")
+        assert list(tmp_path.iterdir()) == []
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)

@@ -421,7 +421,8 @@ def renew_all(problem, state, scratch, element, border):
             renew(problem, state, s, border, delta, rate)
             continue
         begun, just_before, margin = scratch.margin_begin[s], scratch.margin_before, scratch.margin_end[s]
-        if s != element:
+        if s != element:  # that of the element itself is still needed
+            just_before = scratch.ends[:count]
             margins_later(problem, state, scratch, s, state.now[T], x, -time, just_before)
         for j in range(count):
             before, rounding = max(begun[j], just_before[j]), max(scratch.noise[s, j], missed * scratch.largest[s, j])

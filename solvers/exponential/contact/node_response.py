@@ -161,7 +161,7 @@ def unresolved_part(coefficients, largest, power):
 
 @inlined
 def error_of_work(problem, state, scratch, s, unresolved, largest, slopes):
-    """Part of a force that a step leaves out, N, in units of its tolerance for the work of an element with memory.
+    """Part of a force that a step leaves out, N, in units of its tolerance for the work of an element.
 
     ``slopes`` of the law by δ and δ̇ give the rounding of the force, which is no error of the step.
     """
