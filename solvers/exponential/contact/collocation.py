@@ -20,8 +20,8 @@ show in the coefficients; there the law is compared with the polynomial.
 
 In this error, what a light element takes from a heavy structure is lost. So, where the slope of a law with memory
 changes on the step, the part left out must also be below 10 rtol of the largest force, or below the rounding of the
-force. Where the slope is constant, the force is as exact as the motion. On an entry step the same holds for all stops
-but the one that enters, as the nodes are no rule of high order for their works.
+force. Where the slope is constant, the force is as exact as the motion. On an entry step, whose nodes are no rule of
+high order for the works of other elements, the same holds for all that have memory.
 """
 
 from __future__ import annotations
@@ -225,7 +225,7 @@ def step_error(problem, tables, state, scratch, node_set, level):
             unresolved += 0.01 * _hidden_kink(problem, state, scratch, s, largest)
         if unresolved == 0.0:
             continue
-        if node_set > 0 and s != node_set - 1:
+        if node_set > 0 and s != node_set - 1 and problem.border_count[s] > 0:
             worst = max(worst, error_of_work(problem, state, scratch, s, unresolved, largest, (stiffness, 0.0)))
         elif node_set == 0 and problem.border_count[s] > 0 and problem.knots[s, 0] < 0.0:
             viscous = largest_size(scratch.slope[s, 1])
