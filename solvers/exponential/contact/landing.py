@@ -82,7 +82,7 @@ from solvers.exponential.contact.node_response import (
 from solvers.exponential.contact.peaks import state_peaks
 from solvers.problem.friction import CODE, FREE, PEAK, SLIDES, STIFFNESS
 
-OPENED = 2  # place in `Scratch.landed`: stop whose opening the step in ``scratch.stages`` ends at, or -1
+OPENED = 2  # place in `Scratch.landed`: 1 + stop whose opening the step in ``scratch.stages`` ends at, or 0
 _MOST_TRIALS = 8  # iterations for the step that ends at an output time, or on a bend
 _MIDPOINT_UP_TO = 1e-4  # change of a landing's length, relative, that the midpoint rule makes: its error is the cube
 _CLASSICAL_UP_TO = 4e-3  # the same by the classical rule, of order 4
@@ -433,7 +433,7 @@ def land(problem, tables, state, scratch, stop, direction, time_to_border):
     a law with memory that is crossed before, ``scratch.landed`` holds its element and number.
     """
     size, t, rate = state.x.size, state.now[T], scratch.start_motion[stop, 1]
-    scratch.landed[0] = scratch.landed[OPENED] = -1
+    scratch.landed[0], scratch.landed[OPENED] = -1, 0
     if not may_land(problem, tables, state, scratch, stop, direction, time_to_border):
         return -1
     longest, kappa = _longest_time(problem, tables, state, scratch), tables.time_exponent[1 + stop]
@@ -454,7 +454,7 @@ def land(problem, tables, state, scratch, stop, direction, time_to_border):
         scratch.landed[0], scratch.landed[1] = passed(problem, state, scratch, -1, -1, w, x)
         if scratch.landed[0] != -1:
             other = TOO_LONG
-            scratch.landed[OPENED] = stop if scratch.landed[0] == stop and variable == ROOT else -1
+            scratch.landed[OPENED] = stop + 1 if scratch.landed[0] == stop and variable == ROOT else 0
     if other != CLEAR:
         return max(other, -1)
     level = _knot(problem, state, stop, direction)
@@ -641,10 +641,10 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
     """
     limit, largest = _longest_time(problem, tables, state, scratch), scratch.bend_values[scratch.bend_values.size - 1]
     tolerance, sign, slope = 1e-10 * largest, 0.0, 0.0
-    opened = scratch.landed[OPENED] == stop
+    opened = scratch.landed[OPENED] == stop + 1
     if border >= 0:  # if it were missed by more, the next step might cross it in the wrong direction
         largest, tolerance = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
-    scratch.landed[0] = scratch.landed[OPENED] = -1
+    scratch.landed[0], scratch.landed[OPENED] = -1, 0
     variable, exponent, forward = np.int64(TIME), 1.0, 1.0  # a literal would be compiled for itself
     if border >= 0 and scratch.control[NEW] and scratch.control[NODE_SET] == stop + 1:
         variable, exponent = np.int64(SINCE), 1.0 / tables.time_exponent[stop + 1]
