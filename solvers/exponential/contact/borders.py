@@ -359,8 +359,8 @@ def passed(problem, state, scratch, element, border, w, x):
 
     Left out are the border that is landed on, and margins negative by rounding only. (`UNRESOLVED`, -1) is returned if
     a margin may have been negative in between, or is so in w: then its border is crossed before any step. The margins
-    in w and x go to ``scratch.margin_begin`` and ``scratch.margin_end``; those of an
-    ``element`` whose border is landed on are there already.
+    in w and x go to ``scratch.margin_begin`` and ``scratch.margin_end``; those of an ``element`` whose border is landed
+    on are there already.
     """
     worst, found, number, may_dip = -_TOGETHER, -1, -1, False
     for s in range(problem.law.size):

@@ -592,8 +592,8 @@ def _locate(problem, tables, state, scratch, stop, border, search):
     """Locate a zero of the event function by the secant rule, safeguarded by a bracket; (length, remaining value).
 
     The value is NaN if there is no zero up to ``longest``. Trials that differ little are short steps from the last one.
-    ``search`` is (variable, sign of its direction, first trial, longest, scale of the event
-    function, tolerance, sign of `_event_function`, slope at the first trial or 0).
+    ``search`` is (variable, sign of its direction, first trial, longest, scale of the event function, tolerance,
+    sign of `_event_function`, slope at the first trial or 0).
     """
     variable, forward, span, longest, largest, tolerance, sign, slope = search
     x, span_before = scratch.stages[LANDED], 0.0
