@@ -330,6 +330,19 @@ def test_a_slip_at_entry_far_shorter_than_any_step(method):
     assert run.q_dot[-1, 1] == pytest.approx(0.082746796, abs=1e-8)  # of `DormandPrince`
 
 
+@pytest.mark.parametrize("turning", [-0.00764, -0.00722, -0.00714, -0.0067])
+def test_slips_within_the_rounding_of_an_indentation(turning):
+    """Under δ^1.2 one at entry ends at 1e-23 m, and before the opening others begin at 1e-16 m and less."""
+    rows = np.array([[-0.788, 0.0, 0.0], [0.0, 0.8475, 0.0]])
+    rub = {"friction": Friction(0.11, 6.76e7), "rotation": [0.0, 0.0, 84752.0], "radius": 1.12e-5, "spin": 935.6}
+    hole = Contact(rows, Hertz(4.8e10, exponent=1.2), 1.445e-6, map="annulus", centre=(1.68e-7, 2.51e-7), **rub)
+    system = System(EYE, 0.0 * EYE, 0.0 * EYE, [hole])
+    start = [-1.0048e-06, 8.4061e-07, -4.825e-05], [-0.010063, -0.0031601, turning]
+    exact, run = (integrate(system, *start, 3e-4, method=method) for method in (SHARP, Exponential(1e-10)))
+    np.testing.assert_allclose(run.contacts.t_out, exact.contacts.t_out, rtol=0.0, atol=1e-14)
+    np.testing.assert_allclose(run.q_dot[-1], exact.q_dot[-1], rtol=0.0, atol=1e-11)
+
+
 @every_method
 @pytest.mark.parametrize(
     ("v_t", "mu", "k_t"),

@@ -550,6 +550,17 @@ def indentation_and_rate(problem, s, x):
     return dot(problem.read[row], x, size) - problem.gap[row], dot(problem.read_rate[row], x, size)
 
 
+@inner
+def surface_tolerance(problem, s, x):
+    """Distance, m, from a knot up to which a stop counts as on it: rounding of δ."""
+    row = row_of(problem, s)
+    size = abs(problem.gap[row]) + abs_dot(problem.read[row], x, 2 * problem.k.size)
+    if is_circle(problem, s):
+        size += abs(problem.radius[s]) + abs(problem.gap[row + 1])
+        size += abs_dot(problem.read[row + 1], x, 2 * problem.k.size)
+    return 1e-15 * size + 1e-20
+
+
 @part(RADIAL_MOTION, types.UniTuple(REAL, 2), types.int64, VECTOR)
 def radial_motion(problem, s, x):
     """(δ, m, δ̇, m/s) of a circular clearance; at the centre δ̇ is that of going outward."""

@@ -44,6 +44,7 @@ from solvers.compiled.kernels import (
     radius_of,
     rows_at,
     slider_of,
+    surface_tolerance,
     xi_and_rate_at,
 )
 from solvers.problem.friction import (
@@ -64,6 +65,7 @@ from solvers.problem.friction import (
 DELTA, RATE, ACCELERATION, XI, XI_RATE, XI_ACCELERATION = range(6)  # places in a point: δ, δ̇, δ̈, ξ, ξ̇, ξ̈
 POINT = 6
 STUCK, SLIPPED, FREED = range(3)  # codes of events, see `problem.friction.Rubbing`
+WITHIN_ROUNDING = 100.0  # δ, in units of its rounding, below which a slip as a contact begins or ends is not told
 _JUST_INSIDE = 1e-200  # m: there forces like δ^{1/4} have an unbounded slope, and those like δ^{3/2} a slope of zero
 
 
@@ -206,11 +208,19 @@ def _latch_stick_or_slip(slider, xi, xi_rate, growth):
         slider[CODE] = math.copysign(1.0, xi_rate)
 
 
+@inlined
+def _growth_at(problem, s, entry_rate, delta, rate):
+    """Ṅ, N/s, at a small indentation that grows at a rate."""
+    normal_force(problem, s, 1, entry_rate, delta, rate)
+    return normal_rate(problem, s, rate, 0.0, entry_rate)
+
+
 @inner
 def begin_slider(problem, s, t, x, entry_rate, under_way):
     """Latch stick, slip or freedom of a slider as a contact begins.
 
-    A contact ``under_way`` as the run begins sticks or is free.
+    A contact ``under_way`` as the run begins sticks or is free. A slip that would end within the rounding of δ, as
+    N ~ δ^{6/5} grows, is not begun.
     """
     slider, growth = slider_of(problem, s), math.inf
     if is_circle(problem, s):
@@ -223,8 +233,10 @@ def begin_slider(problem, s, t, x, entry_rate, under_way):
         slider[CODE], slider[SLIDER] = FREE, 0.0
         return
     if not under_way and normal <= 0.0:
-        normal_force(problem, s, 1, entry_rate, _JUST_INSIDE, rate)
-        growth = normal_rate(problem, s, rate, 0.0, entry_rate)
+        growth = max(
+            _growth_at(problem, s, entry_rate, _JUST_INSIDE, rate),
+            _growth_at(problem, s, entry_rate, WITHIN_ROUNDING * surface_tolerance(problem, s, x), rate),
+        )
     _latch_stick_or_slip(slider, xi, xi_rate, growth)
 
 

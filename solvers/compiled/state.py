@@ -24,6 +24,7 @@ from solvers.compiled.kernels import (
     row_of,
     rubs,
     slider_of,
+    surface_tolerance,
     xi_and_rate_at,
 )
 from solvers.compiled.parts import addresses_of
@@ -94,17 +95,6 @@ def summed(total, left, part):
 def move_clock(now, h):
     """Advance the time by h."""
     now[T], now[LEFT] = summed(now[T], now[LEFT], h)
-
-
-@inner
-def surface_tolerance(problem, s, x):
-    """Distance, m, from a knot up to which a stop counts as on it: rounding of δ."""
-    row = row_of(problem, s)
-    size = abs(problem.gap[row]) + abs_dot(problem.read[row], x, 2 * problem.k.size)
-    if is_circle(problem, s):
-        size += abs(problem.radius[s]) + abs(problem.gap[row + 1])
-        size += abs_dot(problem.read[row + 1], x, 2 * problem.k.size)
-    return 1e-15 * size + 1e-20
 
 
 @inner

@@ -22,6 +22,7 @@ from solvers.compiled.kernels import (
     kernel,
     rubs,
     slider_of,
+    surface_tolerance,
 )
 from solvers.compiled.renewals import count_event, margins, margins_before, margins_in, renew
 from solvers.compiled.sliding import (
@@ -33,7 +34,7 @@ from solvers.compiled.sliding import (
     slider_margins,
     xi_tolerances,
 )
-from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance, surface_tolerance
+from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance
 from solvers.problem.friction import CODE
 from solvers.stepping.events import NONE, bisection, golden_section, motion_of, point_at, polynomial
 

@@ -20,9 +20,9 @@ from solvers.compiled.kernels import (
     radial,
     radius_of,
     slider_of,
+    surface_tolerance,
 )
 from solvers.compiled.sliding import ACCELERATION, DELTA, RATE, XI, XI_ACCELERATION, XI_RATE
-from solvers.compiled.state import surface_tolerance
 
 # finer near 0, where a contact just left may come back
 _NODES = np.array([0.0, 1 / 64, 1 / 32, 1 / 16, 1 / 8, 1 / 4, 3 / 8, 1 / 2, 5 / 8, 3 / 4, 7 / 8, 1.0])

@@ -17,6 +17,7 @@ from solvers.compiled.kernels import (
     radius_of,
     rubs,
     slider_of,
+    surface_tolerance,
 )
 from solvers.compiled.renewals import most_rows
 from solvers.compiled.sliding import DELTA, RATE, XI, normal_force
@@ -40,7 +41,6 @@ from solvers.compiled.state import (
     acting_segment,
     begins_and_ends,
     move_clock,
-    surface_tolerance,
     switch,
     switch_on_surface,
 )

@@ -20,6 +20,7 @@ from solvers.compiled.kernels import (
     merged,
     radial_motion,
     rhs,
+    surface_tolerance,
 )
 from solvers.compiled.parts import (
     CIRCLE_AWAY,
@@ -33,7 +34,7 @@ from solvers.compiled.parts import (
     part,
 )
 from solvers.compiled.simd import load8, positive8, splat8, sqrt8, store8, sum8
-from solvers.compiled.state import CALLS, T, acts, surface_tolerance
+from solvers.compiled.state import CALLS, T, acts
 from solvers.compiled.sums import above, combine
 from solvers.exponential.contact.many_stops import pair_response
 from solvers.exponential.contact.nodes import S

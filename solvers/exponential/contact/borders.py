@@ -26,11 +26,12 @@ from solvers.compiled.kernels import (
     row_of,
     rubs,
     slider_of,
+    surface_tolerance,
 )
 from solvers.compiled.parts import PASSED, part
 from solvers.compiled.renewals import count_event, margins, margins_before, margins_in, renew
 from solvers.compiled.sliding import DELTA, RATE
-from solvers.compiled.state import LAST_EVENT, T, rate_tolerance, surface_tolerance
+from solvers.compiled.state import LAST_EVENT, T, rate_tolerance
 from solvers.exponential.contact.crossings import extremum
 from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, motion_of, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL, S, lagrange

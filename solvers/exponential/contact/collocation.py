@@ -50,10 +50,11 @@ from solvers.compiled.kernels import (
     row_of,
     rubs,
     slider_of,
+    surface_tolerance,
 )
 from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import largest8, least8, load8
-from solvers.compiled.state import CALLS, LAST_EVENT, T_END, T, acts, rate_tolerance, surface_tolerance
+from solvers.compiled.state import CALLS, LAST_EVENT, T_END, T, acts, rate_tolerance
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton

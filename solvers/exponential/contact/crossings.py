@@ -33,10 +33,11 @@ from solvers.compiled.kernels import (
     merged,
     push_of,
     row_of,
+    surface_tolerance,
 )
 from solvers.compiled.parts import BOUNDS, LEAVES, SIDE, part
 from solvers.compiled.simd import largest8, least8, load8, splat8, store8
-from solvers.compiled.state import PEAK_FORCE, T_IN, T, acts, begins_and_ends, is_open, surface_tolerance
+from solvers.compiled.state import PEAK_FORCE, T_IN, T, acts, begins_and_ends, is_open
 from solvers.compiled.sums import above
 from solvers.exponential.circles.contact import radial_nodes, stays_in_circle
 from solvers.exponential.contact.many_stops import CONTINUING, ENTERING, add_block_motion, motion_at_nodes, uses_blocks

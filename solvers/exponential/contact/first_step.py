@@ -18,9 +18,10 @@ from solvers.compiled.kernels import (
     merged,
     row_of,
     rubs,
+    surface_tolerance,
 )
 from solvers.compiled.parts import BEGIN, part
-from solvers.compiled.state import T_IN, T, surface_tolerance
+from solvers.compiled.state import T_IN, T
 from solvers.exponential.contact.crossings import choose_sides
 from solvers.exponential.contact.node_response import own_accelerance
 from solvers.exponential.contact.peaks import pressed_speed, state_peaks

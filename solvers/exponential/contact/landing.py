@@ -47,9 +47,10 @@ from solvers.compiled.kernels import (
     row_of,
     rubs,
     slider_of,
+    surface_tolerance,
 )
 from solvers.compiled.parts import PASSED
-from solvers.compiled.sliding import XI, XI_RATE, slider_force, xi_tolerances
+from solvers.compiled.sliding import WITHIN_ROUNDING, XI, XI_RATE, slider_force, xi_tolerances
 from solvers.compiled.state import (
     CALLS,
     LANDING,
@@ -59,7 +60,6 @@ from solvers.compiled.state import (
     T_END,
     T,
     rate_tolerance,
-    surface_tolerance,
     write_event,
 )
 from solvers.compiled.sums import combine
@@ -88,6 +88,8 @@ _MIDPOINT_UP_TO = 1e-4  # change of a landing's length, relative, that the midpo
 _CLASSICAL_UP_TO = 4e-3  # the same by the classical rule, of order 4
 _ON_BORDER = 1e-6  # margin, in units of its largest, below which a landing begins on the border that it ends on
 _STAGNATION = 1e-10  # margin, in units of its largest, below which trials that do not halve it show its rounding
+_FOUND = 1e-6  # the same, up to which a landing has found its border
+_MOST_ROUNDING = 0.01  # the same, up to which rounding of δ may hide a margin's zero
 _HALVINGS, _LEAST_SHARE = 30, 1e-3  # of an interval that contains a root; least share of the way to it
 _MOST_VERTICES = 6  # parabolas to the maximum of |F_t| inside a landing
 _MOST_BORDER_TRIALS = 40  # the same on a border: its margin may change only near the start, which bisection must find
@@ -97,6 +99,7 @@ _DERIVATIVE_SHARE, _MOST_FACTOR = 0.01, 1e4  # the derivative of a run may err b
 _ROUNDING = 1e-11  # rounding of a margin, in units of its largest
 _SHARE_OF_CONTACT = 0.2  # longest landing in time on a border of friction, in units of the contact's duration × reach
 _SHARE_SINCE_ENTRY = 0.04  # the same of one from the entry on
+_NEAR_SURFACE = 1e-6  # δ, in units of its peak, below which its rounding may hide a border
 _LEAST_RATE = 0.5  # δ̇ at the end of a landing, in units of that at its start, below which it is too long
 _LAST_STEP = 0.09  # indentation, in units of the deepest, below which a landing on δ = 0 is tried
 _LAST_STEP_ROOT, _MOST_ROOT = 0.2, 0.25  # the same with u = δ^{1/2}, over reach², and at most: errors grow like u⁹
@@ -426,6 +429,16 @@ def _is_resolved(problem, tables, state, scratch, variable, stop):
 
 
 @merged
+def _falls_on_surface(problem, state, scratch, stop, border):
+    """Whether a border passed before the opening just landed on is too near to it to be told from it by δ."""
+    x = scratch.stages[LANDED]
+    near = min(WITHIN_ROUNDING * surface_tolerance(problem, stop, x), _NEAR_SURFACE * state.active[stop, PEAK_DELTA])
+    time = near / abs(indentation_rate(problem, stop, x))
+    margins_later(problem, state, scratch, stop, x[state.x.size], x, -time, scratch.margin_before)
+    return scratch.margin_before[border] >= -scratch.noise[stop, border]
+
+
+@merged
 def land(problem, tables, state, scratch, stop, direction, time_to_border):
     """Try to land on the border of ``stop`` in a direction, 1 up or -1 down, about ``time_to_border`` s ahead.
 
@@ -452,9 +465,12 @@ def land(problem, tables, state, scratch, stop, direction, time_to_border):
     other = before_landing(problem, tables, state, scratch, stop, np.bool_(0), w, x)
     if other == CLEAR and problem.parts[PASSED]:
         scratch.landed[0], scratch.landed[1] = passed(problem, state, scratch, -1, -1, w, x)
+        own = scratch.landed[0] == stop and variable == ROOT
+        if own and _falls_on_surface(problem, state, scratch, stop, scratch.landed[1]):
+            scratch.landed[0] = -1
         if scratch.landed[0] != -1:
             other = TOO_LONG
-            scratch.landed[OPENED] = stop + 1 if scratch.landed[0] == stop and variable == ROOT else 0
+            scratch.landed[OPENED] = stop + 1 if own else 0
     if other != CLEAR:
         return max(other, -1)
     level = _knot(problem, state, stop, direction)
@@ -587,11 +603,23 @@ def _bisect(low, high):
     return math.sqrt(low * high) if low > 0.0 else 1e-3 * high
 
 
+@inlined
+def _rounded(problem, tables, scratch, variable, stop, size):
+    """Change of a landing's variable by the rounding of δ where it has ended."""
+    x = scratch.stages[LANDED]
+    time = surface_tolerance(problem, stop, x) / max(abs(indentation_rate(problem, stop, x)), 1e-300)
+    if variable == TIME:
+        return time
+    kappa = tables.time_exponent[1 + stop]
+    return time / max(kappa * raised(abs(x[size + 1]), kappa - 1.0), 1e-300)
+
+
 @merged
 def _locate(problem, tables, state, scratch, stop, border, search):
-    """Locate a zero of the event function by the secant rule, safeguarded by a bracket; (length, remaining value).
+    """Locate a zero of the event function by the secant rule, safeguarded by a bracket.
 
-    The value is NaN if there is no zero up to ``longest``. Trials that differ little are short steps from the last one.
+    Returns (length, remaining value, its rounding, by that of δ too). The value is NaN if there is no zero up to
+    ``longest``. Trials that differ little are short steps from the last one.
     ``search`` is (variable, sign of its direction, first trial, longest, scale of the event function, tolerance,
     sign of `_event_function`, slope at the first trial or 0).
     """
@@ -605,7 +633,7 @@ def _locate(problem, tables, state, scratch, stop, border, search):
         span_before = 0.9 * span
         _step(problem, tables, state, scratch, variable, stop, forward * span_before)
         value_before, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
-    low, high = span_before if value_before > 0.0 else 0.0, longest
+    low, high, rounding = span_before if value_before > 0.0 else 0.0, longest, 0.0
     for _ in range(_MOST_TRIALS if border < 0 else _MOST_BORDER_TRIALS):
         change = span - span_before
         if abs(change) <= _CLASSICAL_UP_TO * span:
@@ -616,9 +644,13 @@ def _locate(problem, tables, state, scratch, stop, border, search):
         value, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
         if slope == 0.0:
             slope = (value - value_before) / (span - span_before)
+        rounding = _STAGNATION * largest
+        if border >= 0:
+            of_delta = slope * _rounded(problem, tables, scratch, variable, stop, state.x.size)
+            rounding = max(rounding, 10.0 * tolerance, min(abs(of_delta), _MOST_ROUNDING * largest))
         next_span, slope = span - value / slope, 0.0
         stagnates = abs(next_span - span) <= 1e-15 * span and border >= 0
-        if stagnates or abs(value) <= tolerance or 0.5 * abs(value_before) <= abs(value) <= _STAGNATION * largest:
+        if stagnates or abs(value) <= tolerance or 0.5 * abs(value_before) <= abs(value) <= rounding:
             break
         if border >= 0:
             low, high = (span, high) if value > 0.0 else (low, span)
@@ -627,9 +659,9 @@ def _locate(problem, tables, state, scratch, stop, border, search):
                 if rubs(problem, stop):  # the landing may begin on the same border
                     next_span = max(next_span, 2.0 * shortest)
         if not shortest < next_span <= longest or next_span == span:
-            return span, np.nan
+            return span, np.nan, rounding
         span_before, value_before, span = span, value, next_span
-    return span, value
+    return span, value, rounding
 
 
 @merged
@@ -658,9 +690,10 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
         span, sign, slope = _guess_before_opening(problem, tables, state, scratch, stop, border, guess, opened)
         largest, tolerance = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
     search = variable, forward, span, limit, largest, tolerance, sign, slope
-    span, value = _locate(problem, tables, state, scratch, stop, border, search)
+    span, value, rounding = _locate(problem, tables, state, scratch, stop, border, search)
     time = span if variable == TIME else x[size] - w[size]
-    if not (abs(value) <= 1e-6 * largest and _within_tolerance(problem, tables, state, scratch, variable, stop, time)):
+    found = abs(value) <= max(_FOUND * largest, rounding)
+    if not (found and _within_tolerance(problem, tables, state, scratch, variable, stop, time)):
         return False
     crossed_upward = border >= 0 and _was_below(problem, state, scratch, stop, border, value, 1e-3 * time)
     if crossed_upward or before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:

@@ -17,10 +17,11 @@ from solvers.compiled.kernels import (
     reordered,
     row_of,
     rubs,
+    surface_tolerance,
     table_value,
 )
 from solvers.compiled.simd import largest8, load8, size8, splat8, store8
-from solvers.compiled.state import CALLS, PEAK_FORCE, T, acts, rate_tolerance, surface_tolerance
+from solvers.compiled.state import CALLS, PEAK_FORCE, T, acts, rate_tolerance
 from solvers.compiled.sums import above, combine
 from solvers.exponential.circles.contact import radial_forces
 from solvers.exponential.circles.friction import rubbing_forces

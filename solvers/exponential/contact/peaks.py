@@ -23,10 +23,11 @@ from solvers.compiled.kernels import (
     place_of,
     rubs,
     slider_of,
+    surface_tolerance,
 )
 from solvers.compiled.simd import largest8, load8
 from solvers.compiled.sliding import slider_force
-from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, T, acting_segment, begins_and_ends, surface_tolerance
+from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, T, acting_segment, begins_and_ends
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, force_of, motion_of, own_accelerance
 from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S

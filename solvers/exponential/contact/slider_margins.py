@@ -22,6 +22,7 @@ from solvers.compiled.kernels import (
     rhs,
     row_of,
     slider_of,
+    surface_tolerance,
     xi_and_rate_at,
 )
 from solvers.compiled.parts import RUB_AROUND, RUB_IN, RUB_MARGINS, RUB_PEAK, part
@@ -38,7 +39,7 @@ from solvers.compiled.sliding import (
     slider_margins,
     xi_tolerances,
 )
-from solvers.compiled.state import T, rate_tolerance, surface_tolerance
+from solvers.compiled.state import T, rate_tolerance
 from solvers.compiled.sums import above, combine
 from solvers.exponential.circles.friction import (
     NODE_XI,

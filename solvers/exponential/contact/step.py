@@ -26,6 +26,7 @@ from solvers.compiled.kernels import (
     rhs,
     row_of,
     rubs,
+    surface_tolerance,
 )
 from solvers.compiled.parts import ACCEPT, CONTACT, FIRST_END, PRESSED, part
 from solvers.compiled.state import (
@@ -42,7 +43,6 @@ from solvers.compiled.state import (
     acts,
     in_contact,
     rate_tolerance,
-    surface_tolerance,
     switch,
     switch_on_surface,
 )
