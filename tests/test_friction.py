@@ -317,6 +317,15 @@ def test_the_peak_of_friction_just_before_a_slip(method, k_t, v_t):
     assert run.friction.peak_friction[0] == pytest.approx(v_t * np.sqrt(k_t * 0.08), rel=1e-7)
 
 
+def test_the_peak_of_friction_in_a_landing_on_the_way_out():
+    """In stick |F_t| <= v_t √(k_t m), reached about where a linear law with a knot that changes nothing passes it."""
+    law = PiecewiseLinear([4e5, 4e5], [2e-4])
+    for after in np.linspace(0.74, 0.86, 30):  # peak, in units of the contact's duration
+        k_t = 4e5 / (2.0 * after) ** 2
+        run = bounce(wall(law, 5.0, k_t), 0.2, Exponential(1e-8))
+        assert run.friction.peak_friction[0] == pytest.approx(0.2 * np.sqrt(k_t * 0.08), rel=1e-8)
+
+
 @every_method
 def test_a_slip_at_entry_far_shorter_than_any_step(method):
     """Under δ^1.2 it ends where k_t ξ̇ = μ N_δ v, here after 6e-13 s of a contact of 4e-5 s."""

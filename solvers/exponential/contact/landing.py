@@ -270,18 +270,18 @@ def _friction_after(problem, tables, state, scratch, variable, stop, length, s):
 @inner
 def _locate_friction_peak(problem, tables, state, scratch, variable, stop, span, s):
     """Raise the largest |F_t| of stop s by its maximum inside a landing, found by successive parabolas."""
-    a, b, c, slider = 0.0, 0.5 * span, span, slider_of(problem, s)
+    a, b, c, slider = 0.0, 0.5, 1.0, slider_of(problem, s)  # shares of the span, which may be negative
     low = _friction_after(problem, tables, state, scratch, variable, stop, a, s)
-    best = _friction_after(problem, tables, state, scratch, variable, stop, b, s)
-    high = _friction_after(problem, tables, state, scratch, variable, stop, c, s)
+    best = _friction_after(problem, tables, state, scratch, variable, stop, b * span, s)
+    high = _friction_after(problem, tables, state, scratch, variable, stop, c * span, s)
     for _ in range(_MOST_VERTICES):
         rise, fall = (b - a) * (best - high), (c - b) * (best - low)
         if not rise + fall > 0.0:
             break
         vertex = b - 0.5 * ((b - a) * rise - (c - b) * fall) / (rise + fall)
-        if not a < vertex < c or abs(vertex - b) <= 1e-6 * span:
+        if not a < vertex < c or abs(vertex - b) <= 1e-6:
             break
-        value = _friction_after(problem, tables, state, scratch, variable, stop, vertex, s)
+        value = _friction_after(problem, tables, state, scratch, variable, stop, vertex * span, s)
         if value >= best:
             a, low, c, high = (a, low, b, best) if vertex < b else (b, best, c, high)
             b, best = vertex, value
