@@ -78,9 +78,10 @@ from solvers.exponential.contact.node_response import (
     STRAIGHT,
     WITHIN,
     error_of_work,
+    own_accelerance,
 )
 from solvers.exponential.contact.peaks import state_peaks
-from solvers.problem.friction import CODE, FREE, PEAK, SLIDES, STIFFNESS
+from solvers.problem.friction import CODE, FREE, MU, PEAK, SLIDES, STIFFNESS
 
 OPENED = 2  # place in `Scratch.landed`: 1 + stop whose opening the step in ``scratch.stages`` ends at, or 0
 _MOST_TRIALS = 8  # iterations for the step that ends at an output time, or on a bend
@@ -100,6 +101,7 @@ _ROUNDING = 1e-11  # rounding of a margin, in units of its largest
 _SHARE_OF_CONTACT = 0.2  # longest landing in time on a border of friction, in units of the contact's duration × reach
 _SHARE_SINCE_ENTRY = 0.04  # the same of one from the entry on
 _NEAR_SURFACE = 1e-6  # δ, in units of its peak, below which its rounding may hide a border
+_LEAST_MARGIN = 0.1  # part of a margin's error that counts, in units of the tolerance of δ̇
 _LEAST_RATE = 0.5  # δ̇ at the end of a landing, in units of that at its start, below which it is too long
 _LAST_STEP = 0.09  # indentation, in units of the deepest, below which a landing on δ = 0 is tried
 _LAST_STEP_ROOT, _MOST_ROOT = 0.2, 0.25  # the same with u = δ^{1/2}, over reach², and at most: errors grow like u⁹
@@ -589,12 +591,26 @@ def _promising(problem, scratch, variable, stop):
     return share * scratch.accuracy[REACH] * scratch.duration[stop]
 
 
+@inlined
+def _error_of_stick(problem, tables, scratch, stop):
+    """Factor of the tolerated errors of δ̇ where a slip ends under a strong dashpot, at least 1.
+
+    The margin σξ̇ - μṄ/k_t has N_δ̇ δ̈, and δ̈ errs by the error of δ̇ times N_δ̇ and the accelerance.
+    """
+    slope = scratch.viscous[stop]
+    if slope == 0.0 or not rubs(problem, stop) or abs(slider_of(problem, stop)[CODE]) != 1.0:
+        return 1.0
+    slider = slider_of(problem, stop)
+    margin = slider[MU] / slider[STIFFNESS] * slope * slope * own_accelerance(problem, tables, stop)
+    return max(_LEAST_MARGIN * margin, 1.0)
+
+
 @merged
 def _within_tolerance(problem, tables, state, scratch, variable, stop, time):
     """Whether the error of the landing just taken, of length ``time`` s, is within the tolerance."""
     if variable == ROOT:
         return _is_resolved(problem, tables, state, scratch, variable, stop)
-    return _error_in_time(problem, state, scratch, time) <= 1.0
+    return _error_in_time(problem, state, scratch, time) * _error_of_stick(problem, tables, scratch, stop) <= 1.0
 
 
 @inlined
