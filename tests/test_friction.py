@@ -649,6 +649,32 @@ def test_a_stick_before_an_opening_lasts_as_long_as_that_of_a_second_method(rtol
     np.testing.assert_allclose(found.t[later], other.t[same], rtol=0.0, atol=10.0 * rtol)
 
 
+@pytest.mark.parametrize("rtol", [1e-9, 1e-10, 1e-11])
+def test_a_slip_that_ends_as_the_force_does_has_taken_its_share_of_the_impulse(rtol):
+    """A landing on N = 0 has stages beyond, where F_t = μN stays smooth."""
+    law = Viscoelastic(5.65e9, 5.03e4, clamp=True)
+    for speed in np.linspace(0.03, 0.06, 8):
+        system, start = wall(law, 0.0063, 7.5e6, 1.0), [speed, 0.3 * speed]
+        runs = [integrate(system, [-1e-5, 0.0], start, 3e-3, method=method) for method in (Exponential(rtol), SHARP)]
+        found, exact = (run.friction.impulse[0] for run in runs)
+        assert runs[0].transitions.event.tolist() == ["slip", "free"]
+        assert found == pytest.approx(exact, rel=1e-10)
+
+
+@pytest.mark.parametrize("depth", [2e-5, 2.5e-5, 2.9e-5])
+def test_a_slip_under_a_strong_dashpot_ends_in_time(depth):
+    """The rate of N has N_δ̇ δ̈, N_δ̇ = 5e7/s: δ̇ to rtol alone does not tell where k_t ξ̇ = μṄ."""
+    law = Hysteretic(1.72e13, damping_factor=1.236, exponent=1.5, clamp=True, entry_rate_floor=1e-4)
+    row = np.array([0.0055, 0.1393, 0.3674, 0.0095, 0.2426, 0.6398])
+    start = np.array([-3.6e-4, -5.42e-5, -4.83e-5, 3.3e-5, 1.56e-4, 1.08e-4]), [0.05, 0.197, -0.048, 0.02, 0.064, 0.012]
+    across, friction = np.r_[-row[3:], row[:3]], Friction(0.8675, 4.087e9)
+    contact = Contact(row, law, -row @ start[0] - depth, map="oblique", tangent=across, friction=friction)
+    K = np.diag([3.03e4, 2.05e6, 6.02e7, 4.63e4, 2.03e6, 2.68e7])
+    system = System(np.eye(6), np.zeros((6, 6)), K, [contact])
+    exact, run = (integrate(system, *start, 1e-3, method=method) for method in (SHARP, Exponential(1e-7)))
+    np.testing.assert_allclose(run.transitions.t, exact.transitions.t, rtol=0.0, atol=1e-9)
+
+
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-11])
 def test_a_hole_hardly_touched_at_rest_takes_few_steps(rtol):
     """2e-8 m deep at 9 mm, δ and the drawn spring have eight digits: shorter steps do not find more of the forces."""

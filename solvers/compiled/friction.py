@@ -97,10 +97,13 @@ def spring_stretch(radius, slider, xi):
 
 @inlined
 def friction_force(radius, slider, xi, normal):
-    """F_t, N, at a tangential displacement ξ under a normal force N."""
+    """F_t, N, at a tangential displacement ξ under a normal force N; in slip it stays smooth where N goes through zero.
+
+    A step that ends where N does, the slider being free from there on, has stages beyond.
+    """
     if slider[CODE] == 0.0:
         return slider[STIFFNESS] * spring_stretch(radius, slider, xi)
-    if slider[CODE] == FREE or normal <= 0.0:
+    if slider[CODE] == FREE:
         return 0.0
     return slider[CODE] * slider[MU] * normal
 
