@@ -6,6 +6,7 @@ from problems import PAPER_BEAM, TIP, paper_scene
 
 import fembeam as fb
 from contacts import BoucWen, Hertz, Jenkins, KelvinVoigt, WaltonBraun
+from fembeam.study.measure import cut
 from solvers import Exponential
 
 
@@ -50,6 +51,27 @@ def test_contacts_cut_by_start_and_end_and_samples_of_ones_own():
     late = model.simulate(0.1, np.linspace(0.04, 0.1, 61))
     seen = late.contacts.impulse[late.contacts.t_in > 0.04].sum()
     assert np.trapezoid(late.force(mean=True), late.t) == pytest.approx(seen, rel=1e-12)
+
+
+@pytest.mark.parametrize("dt", [1e-3, 2e-4])
+def test_a_contact_under_way_at_the_first_sample_keeps_what_is_left_of_its_impulse(dt):
+    """Of a part of a run, and of a run sampled late, against forces sampled finely."""
+    model = scene(fb.Stop(TIP, Hertz(2e6))).reduce(2)  # contacts of some ms
+    fine, run = model.simulate(0.2, 1e-6), model.simulate(0.2, dt)
+    grown = np.append(0.0, np.cumsum(fine.force()[1:] + fine.force()[:-1])) * 0.5e-6
+    log, cell = run.contacts, round(dt / 1e-6)
+    open_at = np.flatnonzero(run.force() > 0.0)
+    assert len(log) > 5
+    for first, last in ((open_at[0], open_at[-1]), (open_at[1], open_at[1] + 1), (open_at[3], len(run.t) - 1)):
+        edges = np.arange(first, last + 1) * cell
+        edges = np.concatenate([edges[:1], (edges[1:] + edges[:-1]) // 2, edges[-1:]])
+        expected = np.diff(grown[edges]) / np.diff(fine.t[edges])
+        part = cut(run, run.t[first], run.t[last])
+        late = model.simulate(0.2, run.t[first : last + 1])
+        for one in (part, late):
+            found = one.force(mean=True)
+            np.testing.assert_allclose(found, expected, atol=5e-3 * expected.max())
+            assert np.trapezoid(found, one.t) == pytest.approx(grown[edges[-1]] - grown[edges[0]], rel=1e-6)
 
 
 @pytest.mark.parametrize("law", [KelvinVoigt(1e5, 20.0), Hertz(1e7)])
