@@ -71,7 +71,7 @@ def _of_log(run: Histories, stop: int, law: Any, motion: Vector, edges: Vector) 
     owner, a, b = _between(motion, starts[:, ~whole], ends[:, ~whole])
     interval = np.clip(np.searchsorted(t, (a[0] + b[0]) / 2) - 1, 0, len(t) - 2)
     rates = np.maximum(np.abs(log.speed_in[seen[~whole]]), law.entry_rate_floor)[owner]
-    parts = _shares(law, owner, rates, (a, b, edges[1:-1][interval])) * impulses[~whole][owner, None]
+    parts = _shared(law, owner, rates, impulses[~whole], (a, b, edges[1:-1][interval]))
     for half in (0, 1):
         impulse += np.bincount(interval + half, parts[:, half], len(t))
     return impulse
@@ -113,12 +113,17 @@ def _between(motion: Vector, starts: Vector, ends: Vector) -> tuple[NDArray[np.i
     return owner[cubic], points[:, cubic], points[:, cubic + 1]
 
 
-def _shares(law: Any, owner: NDArray[np.int64], rates: Vector, cubics: Cubics) -> Vector:
-    """Parts (p, 2) of its contact's impulse on each cubic before and after its cell's end; by time where F is 0."""
-    grown = _impulses(lambda cubic, _, d, v: np.maximum(law.force(d, v, rates[cubic]), 0.0), cubics)
-    pushed = np.bincount(owner, grown.sum(axis=1))[owner] > 0.0
-    grown[~pushed] = 2.0 * _halves(cubics)[~pushed]
-    return np.asarray(grown / np.bincount(owner, grown.sum(axis=1))[owner, None])
+def _shared(law: Any, owner: NDArray[np.int64], rates: Vector, impulses: Vector, cubics: Cubics) -> Vector:
+    """Impulses (p, 2) on each cubic before and after its cell's end, which add up to those of the contacts (c,).
+
+    What the law on cubics misses of those is divided as the sizes of what it finds; by time where F is 0.
+    """
+    found = _impulses(lambda cubic, _, d, v: law.force(d, v, rates[cubic]), cubics)
+    sizes = np.abs(found)
+    pushed = np.bincount(owner, sizes.sum(axis=1))[owner] > 0.0
+    sizes[~pushed] = _halves(cubics)[~pushed]
+    missed = impulses - np.bincount(owner, found.sum(axis=1), len(impulses))
+    return np.asarray(found + sizes * (missed / np.bincount(owner, sizes.sum(axis=1), len(impulses)))[owner, None])
 
 
 def _halves(cubics: Cubics) -> Vector:
