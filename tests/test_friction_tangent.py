@@ -70,6 +70,22 @@ def test_the_tangent_where_a_law_pulls_as_it_opens(clamp, v_t):
 
 
 @pytest.mark.parametrize("clamp", [False, True])
+@pytest.mark.parametrize(("stiffness", "damping"), [(1.0, 0.0), (0.0, 1.0)])
+def test_the_derivative_by_the_law_where_it_pulls_as_it_opens(stiffness, damping, clamp):
+    """N = 0 ends a slip: the limits of the laws on both sides of the parameter are beyond their zero or before it."""
+
+    def changed(d):
+        return wall(KelvinVoigt(4e5 * (1.0 + stiffness * d), 60.0 * (1.0 + damping * d), clamp=clamp))
+
+    start, step = ([-1e-3, 0.0], [0.8, 1.5], 0.004), 1e-5
+    run = integrate(changed(0.0), *start, method=FINE, tangent=Parameter(changed(-step), changed(step), step))
+    assert run.transitions.event.tolist() == ["slip", "free"]
+    ends = [integrate(changed(d), *start, method=SHARP).end[:4] for d in (step, -step)]
+    expected = (ends[0] - ends[1]) / (2.0 * step)
+    assert abs(run.tangent[:, -1] - expected).max() < 1e-7 * abs(expected).max()
+
+
+@pytest.mark.parametrize("clamp", [False, True])
 def test_the_tangent_where_a_law_pulls_and_pushes_again(clamp):
     """The slider begins anew where N grows from zero: s has the derivative of ξ then, the time of N = 0 included."""
     start = pulled(clamp), [-1e-4, 0.0], [0.3, 0.3], 0.004

@@ -31,6 +31,7 @@ from solvers.compiled.kernels import (
     acceleration_of,
     add_push,
     add_tangential,
+    call_force,
     call_gradient,
     contact_forces,
     contact_gradient,
@@ -205,6 +206,20 @@ def _gradient(problem, tables, past, scratch, s, batch):
 
 
 @merged
+def _force_of_side(side, uncut, tables, past, scratch, s, batch, force):
+    """Force of a law at another value of the parameter, cut at zero where the landing is beyond the law's bend.
+
+    Where it lands on the bend either value of the parameter may be on either side.
+    """
+    d, v, rate = batch[0:1], batch[1:2], past.entry_rate[s]
+    force[0] = 0.0
+    if tables.bend[s] != FORCE:
+        contact_forces(side, s, d, v, rate, force)
+    elif scratch.unresolved[s] > 0.0:
+        call_force(tables.uncut[s], 1, d, v, rate, uncut, (force,))
+
+
+@merged
 def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, variation, w, factor, out):
     """Rates of all columns at one stage of a landing; ``w`` is its state and time, ``factor`` is dt along the step."""
     n, size, t, batch = problem.k.size, 2 * problem.k.size, w[past.x.size], derivatives.batch
@@ -224,11 +239,11 @@ def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, var
         _gradient(problem, tables, past, scratch, s, batch)
         by_latched(problem, past, derivatives, s, 1, batch[0:1], batch[1:2])
         if variation.law_step > 0.0:
-            contact_forces(ahead, s, batch[0:1], batch[1:2], rate, batch[5:6])
-            contact_forces(behind, s, batch[0:1], batch[1:2], rate, batch[6:7])
+            _force_of_side(ahead, variation.uncut[0, s], tables, past, scratch, s, batch, batch[5:6])
+            _force_of_side(behind, variation.uncut[1, s], tables, past, scratch, s, batch, batch[6:7])
         if rubs(problem, s):
-            delta, known = _inside_segment(problem, past, s, w), past.entry_rate[s]
-            add_rubbing_change(problem, ahead, behind, derivatives, variation, s, known, w, t, delta, factor, out)
+            delta = _inside_segment(problem, past, s, w)
+            add_rubbing_change(problem, ahead, behind, derivatives, variation, s, rate, w, t, delta, factor, out)
             continue
         if is_circle(problem, s):
             by_law = (batch[5] - batch[6]) / (2.0 * variation.law_step) if variation.law_step > 0.0 else 0.0

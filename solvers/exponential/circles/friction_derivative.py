@@ -178,6 +178,17 @@ def store_row_directions(problem, scratch, s):
             scratch.node_directions[6 * s + 2 * a, i], scratch.node_directions[6 * s + 2 * a + 1, i] = by_delta, by_xi
 
 
+@inlined
+def _friction_of_side(radius, slider, xi, normal):
+    """F_t at another value of the parameter; in slip in proportion to N also where N < 0, beyond the end of the slip.
+
+    Where N falls to zero one of both values is there, and half of the difference would be lost.
+    """
+    if slider[CODE] == 0.0:
+        return friction_force(radius, slider, xi, normal)
+    return friction_by_normal(slider) * normal
+
+
 @inner
 def _forces_of_side(side, past, scratch, s, place, normals, frictions):
     """N and F_t at the nodes by the laws of one ``side`` of the parameter, for the motion found."""
@@ -186,7 +197,7 @@ def _forces_of_side(side, past, scratch, s, place, normals, frictions):
     contact_forces(side, s, scratch.clipped, motion[1], past.entry_rate[s], normals)
     xi_and_rate_at_nodes(side, scratch, s)
     for i in range(S):
-        frictions[i] = friction_force(radius, slider, slid[NODE_XI, i], normals[i])
+        frictions[i] = _friction_of_side(radius, slider, slid[NODE_XI, i], normals[i])
 
 
 @inner
@@ -248,6 +259,13 @@ def rubbing_residual(problem, tables, scratch, derivatives, variation, node_set,
 
 
 @inner
+def _friction_in_state(side, s, t, w, normal):
+    """F_t at another value of the parameter, in the state w of a landing."""
+    xi = xi_and_rate_at(side, s, t, w)[0]
+    return _friction_of_side(radius_of(side, s), slider_of(side, s), xi, normal)
+
+
+@inner
 def _forces_in_state(problem, s, entry_rate, t, w, delta, rate, batch):
     """N and F_t in the state w of a landing, where δ and δ̇ are given."""
     normal = force_at(problem, s, delta, rate, entry_rate, batch)
@@ -260,21 +278,17 @@ def _forces_in_state(problem, s, entry_rate, t, w, delta, rate, batch):
 def add_rubbing_change(problem, ahead, behind, derivatives, variation, s, entry_rate, w, t, delta, factor, out):
     """Add the changes of an element's forces, in the state w of a landing, to the rates of all columns.
 
-    The slopes of the law are in ``derivatives.batch[2:5]``.
+    The slopes of the law are in ``derivatives.batch[2:5]``, N ahead and behind in the next two.
     """
     first, m, size, batch = row_of(problem, s), count_of(problem, s), 2 * problem.k.size, derivatives.batch
     by_delta, by_rate, by_entry, rate = batch[2], batch[3], batch[4], indentation_rate(problem, s, w)
     motion, slopes, slider = derivatives.at_rows, derivatives.turned, slider_of(problem, s)
     normal_by_parameter, friction_by_parameter = 0.0, 0.0
     if variation.law_step > 0.0:
-        normal_by_parameter, friction_by_parameter = _forces_in_state(
-            ahead, s, entry_rate, t, w, delta, rate, batch[5:8]
-        )
-        press, rub = _forces_in_state(behind, s, entry_rate, t, w, delta, rate, batch[5:8])
-        normal_by_parameter, friction_by_parameter = (
-            (normal_by_parameter - press) / (2.0 * variation.law_step),
-            (friction_by_parameter - rub) / (2.0 * variation.law_step),
-        )
+        width = 2.0 * variation.law_step
+        normal_by_parameter = (batch[5] - batch[6]) / width
+        friction_by_parameter = _friction_in_state(ahead, s, t, w, batch[5]) / width
+        friction_by_parameter -= _friction_in_state(behind, s, t, w, batch[6]) / width
     normal, tangential = _forces_in_state(problem, s, entry_rate, t, w, delta, rate, batch[5:8])
     for a in range(m):
         motion[a, 0, 0] = dot(problem.read[first + a], w, size) - problem.gap[first + a]
