@@ -49,6 +49,7 @@ from solvers.compiled.kernels import (
     slider_of,
 )
 from solvers.compiled.packed import unpacker
+from solvers.compiled.sliding import is_held, normal_force
 from solvers.compiled.state import (
     BEGAN,
     ENDED,
@@ -75,6 +76,7 @@ from solvers.exponential.circles.friction_derivative import (
     begin_rubbing,
     end_rubbing,
     latch_begin,
+    pass_slider,
 )
 from solvers.exponential.contact.crossings import FORCE, side_at
 from solvers.exponential.contact.landing_step import landing_step, start_landing
@@ -89,7 +91,7 @@ from solvers.exponential.linearised_step import (
 )
 from solvers.exponential.preparation import SCRATCH, TABLES
 from solvers.exponential.responses import propagate
-from solvers.problem.friction import CODE, FREE
+from solvers.problem.friction import CODE, FREE, SLIDES
 
 _OFF = 1e-10  # relative distance from a knot at which a law is evaluated on one side of it
 
@@ -147,18 +149,27 @@ def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, directi
         jump -= force_at(problem, s, below, rate, past.entry_rate[s], derivatives.batch)
     jump *= direction
     past.now[LAST_EVENT] = t
+    within, held, friction_jump = rubs(problem, s) and border > 0 and segment + direction > 0, False, 0.0
+    if within:
+        knot, entry_rate = problem.knots[s, border], past.entry_rate[s]
+        held = is_held(problem, s, entry_rate, segment, segment + direction, knot, rate)
+        if not held:
+            normal = normal_force(problem, s, segment, entry_rate, knot, rate)
+            friction_jump = friction_by_normal(slider_of(problem, s)) * max(jump, -max(normal, 0.0))
     for c in range(derivatives.y.shape[0]):
         d_delta = change_of(problem, variation, derivatives, past.x, c, s, 0, t)
-        shift = -d_delta / rate if abs(rate) > rate_rounding else 0.0
-        derivatives.shift[c, problem.law.size] = shift
+        derivatives.shift[c, problem.law.size] = -d_delta / rate if abs(rate) > rate_rounding else 0.0
+    if held:  # by the motion before the knot
+        pass_slider(problem, ahead, behind, past, derivatives, variation, s, np.int64(SLIDES))
+    for c in range(derivatives.y.shape[0]):
+        shift = derivatives.shift[c, problem.law.size]
         if entering:
             floored = abs(rate) < problem.floor[s]
             change = change_of(problem, variation, derivatives, past.x, c, s, 1, t) + acceleration * shift
             derivatives.shift[c, s] = shift
             derivatives.entry[c, s] = 0.0 if floored else change
         add_push(problem, s, -jump * shift, past.x, derivatives.y[c])
-        if rubs(problem, s) and border > 0:
-            friction_jump = friction_by_normal(slider_of(problem, s)) * jump
+        if within:
             add_tangential(problem, s, -friction_jump * shift, past.x, derivatives.y[c])
     past.segment[s] += direction
     if rubs(problem, s) and entering:

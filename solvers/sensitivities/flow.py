@@ -209,6 +209,13 @@ class Flow:
         changed = change.normal_other[0] + np.einsum("dak,dac->c", change.normal, moved_rows)
         return float(self.force(times, s, acting)[0]), float(slopes @ self.rates(t, s, acting)), changed
 
+    def size_of_force(self, t: float, s: int, acting: Acting) -> float:
+        """What the terms of N add up to, N."""
+        law: Any = self.system.contacts[s].law
+        inside = self._inside(s, acting, self.motion_of(t, s))
+        slopes = laws.slopes(law, acting.rows[s], inside, acting.entry_rate[s])[:2, 0]
+        return float(sum(abs(slope * np.ravel(part)[0]) for slope, part in zip(slopes, inside, strict=True)))
+
     def fly(self, start: float, end: float, samples: Array) -> Array:
         """Move over a flight that parameters do not drive; derivatives by the parameters at samples, (q, 2n, d)."""
         over = propagator(self.k, self.c, np.append(samples, end) - start)

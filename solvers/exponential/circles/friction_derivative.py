@@ -8,9 +8,9 @@ s is latched at entry, ds = dξ + ξ̇ dt*, and where slip ends, at s = ξ - F_t
 
     ds = dξ - dF_t/k_t + (ξ̇ - Ḟ_t/k_t) dt*.
 
-There ṡ = ξ̇ - Ḟ_t/k_t falls to zero, so that dt* does not matter, unless ṡ jumps with Ṅ, at a knot or an event of
-another element; then dt* is that of this event. F_t is continuous at all borders. A parameter adds the change of the
-forces at fixed motion, a difference of the two laws ahead and behind.
+There ṡ = ξ̇ - Ḟ_t/k_t falls to zero, so that dt* does not matter, unless ṡ jumps with Ṅ, or N jumps up, at a knot or an
+event of another element; then dt* is that of this event. F_t is continuous at all borders, unless N has jumped down on
+a knot. A parameter adds the change of the forces at fixed motion, a difference of the two laws ahead and behind.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from __future__ import annotations
 from solvers.compiled.friction import friction_force
 from solvers.compiled.kernels import (
     acceleration_of,
+    add_tangential,
     contact_forces,
     copy,
     dot,
@@ -33,7 +34,15 @@ from solvers.compiled.kernels import (
     slider_of,
     xi_and_rate_at,
 )
-from solvers.compiled.sliding import begin_slider, end_slider, normal_force, renew_slider, slopes_of
+from solvers.compiled.sliding import (
+    begin_slider,
+    begins_beyond_zero,
+    end_slider,
+    normal_force,
+    renew_slider,
+    slider_force,
+    slopes_of,
+)
 from solvers.compiled.state import LAST_EVENT, T
 from solvers.exponential.circles.derivative import change_of, explicit_change, is_parameter, row_change
 from solvers.exponential.circles.friction import (
@@ -136,9 +145,11 @@ def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
     """Cross border j of a slider: renew it, and its derivative ds if it sticks from then on.
 
     Where slip ends, dt* is that of the event which ended it, if one did; where N begins to grow, ds = dξ + ξ̇ dt* with
-    dt* = -dN/Ṅ.
+    dt* = -dN/Ṅ, unless it has jumped there. So has F_t where N has jumped below its limit.
     """
     t, slider, entry = past.now[T], slider_of(problem, s), past.entry_rate[s]
+    jumped = begins_beyond_zero(problem, s, entry, past.segment[s], past.x)
+    friction_jump = -slider_force(problem, s, past.segment[s], entry, t, past.x)
     rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
     code_before, share, by_law = (
         slider[CODE],
@@ -152,6 +163,7 @@ def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
     normal_rate, xi_rate = by_delta * rate + by_rate * acceleration, xi_and_rate_at(problem, s, t, past.x)[1]
     out = derivatives.batch[5:8]
     renew_slider(problem, s, j, entry, past.segment[s], t, past.x, derivatives.rate[0], out)
+    friction_jump += slider_force(problem, s, past.segment[s], entry, t, past.x)
     for c in range(derivatives.y.shape[0]):
         normal_change = by_delta * change_of(problem, variation, derivatives, past.x, c, s, 0, t)
         normal_change += by_rate * change_of(problem, variation, derivatives, past.x, c, s, 1, t)
@@ -159,10 +171,12 @@ def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
         change = xi_change(problem, variation, derivatives, past.x, c, s, t) - share * normal_change
         if is_parameter(variation, derivatives, c):
             normal_change, change = normal_change + by_law[0], change + by_law[1]
-        if code_before == FREE:
+        shift = derivatives.shift[c, problem.law.size] if past.now[LAST_EVENT] == t else 0.0
+        if code_before == FREE and not jumped:
             change -= xi_rate * normal_change / normal_rate if normal_rate != 0.0 else 0.0
-        elif past.now[LAST_EVENT] == t:
-            change += (xi_rate - share * normal_rate) * derivatives.shift[c, problem.law.size]
+        else:
+            change += (xi_rate - share * normal_rate) * shift
+            add_tangential(problem, s, -friction_jump * shift, past.x, derivatives.y[c])
         derivatives.latched[c, _latched_place(problem, s)] = change if slider[CODE] == 0.0 else 0.0
     _copy_slider(problem, ahead, behind, variation, s)
 
