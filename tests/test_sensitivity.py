@@ -93,6 +93,8 @@ CASES = {
     "stiffness": (lambda p: beam(Hysteretic(p, damping_factor=0.5)), 2.1e8),
     "damping factor": (lambda p: beam(Hysteretic(2.1e8, damping_factor=p)), 0.5),
     "dashpot": (lambda p: beam(KelvinVoigt(2e5, p)), 30.0),
+    "dashpot of a force cut at zero": (lambda p: beam(KelvinVoigt(2e5, p, clamp=True)), 300.0),
+    "spring of a force cut at zero": (lambda p: beam(KelvinVoigt(p, 300.0, clamp=True)), 2e5),
     "a force cut at zero": (lambda p: beam(KelvinVoigt(2e5, 300.0, clamp=True), gap=p), 2e-5),
     "knot": (lambda p: beam(PiecewiseLinear([1e5, 4e5], knots=[p])), 1e-5),
     "amplitude": (lambda p: beam(amplitude=p), 40.0),

@@ -159,6 +159,19 @@ class Flow:
 
         return self.by.over_laws(s, of)
 
+    def _force_over_laws(self, s: int, acting: Acting, inside: tuple[Array, Array]) -> Array:
+        """Derivatives (k, d) of N by the parameters, through the law's numbers at fixed motion.
+
+        Of a law that is cut at zero force where it is not cut itself: nearby ones are cut a little before or after.
+        """
+        law, rate = self.system.contacts[s].law, acting.entry_rate[s]
+        if getattr(law, "bend", None) != "force":
+            return np.asarray(self.over_laws(s, acting, lambda one, own: laws.force(one, own, inside, rate)))
+        pushes: Any = laws.bend(law, inside, rate)
+        return (
+            np.asarray(self.by.over_laws(s, lambda one: laws.uncut_force(one, inside, rate))) * (pushes > 0.0)[:, None]
+        )
+
     def force_change(self, t: Array, s: int, acting: Acting) -> Linear:
         """Changes of an element's forces at times (k,), by its motion and by everything else."""
         law: Any = self.system.contacts[s].law
@@ -168,7 +181,7 @@ class Flow:
         by_law = np.outer(slopes[2], self.entry[s])
         if len(self.latched[s]) and slider is None:
             by_law += laws.by_latched(law, acting.rows[s], inside, rate).T @ self.latched[s]
-        by_law[:, self.own] += self.over_laws(s, acting, lambda one, own: laws.force(one, own, inside, rate))
+        by_law[:, self.own] += self._force_over_laws(s, acting, inside)
         if circle := self.system.contacts[s].circle:
             by_law[:, self.own] -= np.outer(slopes[0], np.sign(circle) * self.by.elements[s].clearance)
         found = linear(motion, slider, self.force(t, s, acting, motion), slopes[:2], by_law)

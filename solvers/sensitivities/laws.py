@@ -56,7 +56,12 @@ def bend(law: Any, motion: tuple[Any, Any], entry_rate: float) -> Array | None:
     kind = getattr(law, "bend", None)
     if kind == "rate":
         return np.asarray(motion[1])
-    return force(law.uncut, np.array(law.uncut.parameters), motion, entry_rate) if kind == "force" else None
+    return uncut_force(law, motion, entry_rate) if kind == "force" else None
+
+
+def uncut_force(law: Any, motion: tuple[Any, Any], entry_rate: float) -> Array:
+    """Force (k,) of a law that is cut at zero without its cut."""
+    return force(law.uncut, np.array(law.uncut.parameters, dtype=float), motion, entry_rate)
 
 
 def margin(law: Any, row: Array, border: int, delta: float, rate: float, entry_rate: float) -> float:
