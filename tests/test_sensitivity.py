@@ -112,6 +112,21 @@ def five_points(function, step):
     return (8.0 * (c - b) - (d - a)) / (12.0 * step)
 
 
+def test_a_sum_with_a_part_that_is_cut_at_zero():
+    """The kink of the part is no zero of the sum; runs themselves do not land on it."""
+
+    def make(p):
+        return beam(KelvinVoigt(2e5, p, clamp=True) + PiecewiseLinear([1e5]))
+
+    def run(step):
+        return integrate(make(300.0 + step), START[:2], START[2:], 0.025, method=Exponential(1e-12)).end
+
+    found = sensitivity(make(300.0), START[:2], START[2:], 0.025, [0.025], Nearby.of(make, 300.0, 0.03), method=FINE)
+    expected = five_points(run, 6e-3)
+    np.testing.assert_allclose(found.states[0], expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+    assert found.roughness < 1e-6
+
+
 @pytest.mark.parametrize("name", [name for name in CASES if name not in ("gap", "dashpot", "amplitude", "frequency")])
 def test_against_differences_of_runs(name):
     """States, times, peaks and impulses of some six contacts with two stops, to 1e-6 of the largest of each."""
