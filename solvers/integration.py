@@ -52,6 +52,7 @@ from solvers.problem.run_arguments import (
     latched_at_start,
     output_times,
 )
+from solvers.problem.signals import sampled_values
 from solvers.problem.whole_runs import must_be_whole, whole_runs
 
 _SAMPLES = 64  # of a run that is made again for its balance
@@ -204,6 +205,19 @@ def prepared_once(system: System, method: Any, duration: float) -> tuple[Forcing
         if forcing is system.kept.find("forcing"):  # of what cannot change, also if resonant tones are sampled
             system.kept.store(key, known)
     return known
+
+
+def loads_taken(system: System, duration: float, t: Array, method: Any = None) -> dict[int, Array]:
+    """Values (k,) at times (k,) of the sampled loads, by number, as a run by a method takes them: right to its rtol.
+
+    Where a load is much larger than what it leaves, as that of a support's displacement on a stiff shape that follows
+    it, the motion goes by these and not by the signal itself.
+    """
+    if method is None:
+        from solvers.exponential.method import Exponential
+
+        method = Exponential()
+    return sampled_values(prepared_once(system, method, duration)[0], t)
 
 
 def _kept_forcing(system: System, duration: float, rtol: float) -> Forcing:

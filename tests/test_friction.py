@@ -413,6 +413,41 @@ def test_a_slider_is_free_where_its_law_pulls(method, clamp, v_t):
     assert run.friction.slip[0] == pytest.approx(way + begun / 3e5, rel=1e-8)
 
 
+def returned(slopes, knot, damping, mu, k_t, start, duration, mass=0.08, steps=40_000):
+    """Tangential velocity behind a wall whose dashpot changes at a knot: small steps, F_t cut at μN after each."""
+    h, (x, xi), (v, w) = duration / steps, *start
+    drawn, bent = 0.0, slopes[0] * knot
+    for _ in range(steps):
+        deep = x > knot
+        normal = (bent + slopes[1] * (x - knot) if deep else slopes[0] * x) + damping[deep] * v
+        normal = normal if x > 0.0 else 0.0
+        limit = mu * max(normal, 0.0) / k_t
+        drawn = min(max(drawn + h * w, -limit), limit)
+        v, w = v - h * normal / mass, w - h * k_t * drawn / mass
+        x, xi = x + h * v, xi + h * w
+    return w
+
+
+JUMPS = {
+    "a slip is held where N jumps up": ([4e5, 4e5], [0.0, 20.0], 0.2, ["slip", "stick", "slip"]),
+    "free, it sticks where N jumps up": ([4e5, 8e5], [100.0, 250.0], 0.5, ["slip", "free", "stick", "slip", "free"]),
+    "it slips where N jumps down": ([4e5, 4e5], [150.0, 5.0], 0.5, ["slip", "free"]),
+}
+
+
+@every_method
+@pytest.mark.parametrize("name", JUMPS)
+def test_a_slider_where_the_force_jumps_on_a_knot(name, method):
+    """Its spring keeps what it holds up to the new limit."""
+    slopes, damping, v_t, events = JUMPS[name]
+    system = wall(PiecewiseLinear(slopes, [1e-4], damping=damping))
+    run = integrate(system, [-1e-4, 0.0], [0.8, v_t], 0.0022, 1e-5, method)
+    assert run.transitions.event.tolist() == events
+    expected = returned(slopes, 1e-4, damping, 0.25, 3e5, ([-1e-4, 0.0], [0.8, v_t]), 0.0022)
+    assert run.q_dot[-1, 1] == pytest.approx(expected, abs=1e-3 * v_t)
+    assert abs(run.energy.residual).max() < 1e-9 * run.energy.initial
+
+
 def pulled(clamp, amplitude=400.0):
     """A mass on a dashpot stronger than its spring, shaken so that N falls to zero and comes back within a contact."""
     law, friction = KelvinVoigt(4e5, 300.0, clamp=clamp), Friction(0.25, 3e5)

@@ -8,7 +8,7 @@ from scipy.optimize import fsolve
 from test_friction import EYE, SHARP, Tone, disc, pulled, wall
 
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear
-from solvers import Contact, Exponential, Friction, Parameter, System, branch, integrate, orbit
+from solvers import Contact, Exponential, Friction, Nearby, Parameter, System, branch, integrate, orbit, sensitivity
 from solvers.orbits import newton
 
 FINE = Exponential(1e-11)
@@ -70,6 +70,22 @@ def test_the_tangent_where_a_law_pulls_as_it_opens(clamp, v_t):
 
 
 @pytest.mark.parametrize("clamp", [False, True])
+@pytest.mark.parametrize(("stiffness", "damping"), [(1.0, 0.0), (0.0, 1.0)])
+def test_the_derivative_by_the_law_where_it_pulls_as_it_opens(stiffness, damping, clamp):
+    """N = 0 ends a slip: the limits of the laws on both sides of the parameter are beyond their zero or before it."""
+
+    def changed(d):
+        return wall(KelvinVoigt(4e5 * (1.0 + stiffness * d), 60.0 * (1.0 + damping * d), clamp=clamp))
+
+    start, step = ([-1e-3, 0.0], [0.8, 1.5], 0.004), 1e-5
+    run = integrate(changed(0.0), *start, method=FINE, tangent=Parameter(changed(-step), changed(step), step))
+    assert run.transitions.event.tolist() == ["slip", "free"]
+    ends = [integrate(changed(d), *start, method=SHARP).end[:4] for d in (step, -step)]
+    expected = (ends[0] - ends[1]) / (2.0 * step)
+    assert abs(run.tangent[:, -1] - expected).max() < 1e-7 * abs(expected).max()
+
+
+@pytest.mark.parametrize("clamp", [False, True])
 def test_the_tangent_where_a_law_pulls_and_pushes_again(clamp):
     """The slider begins anew where N grows from zero: s has the derivative of ξ then, the time of N = 0 included."""
     start = pulled(clamp), [-1e-4, 0.0], [0.3, 0.3], 0.004
@@ -77,6 +93,28 @@ def test_the_tangent_where_a_law_pulls_and_pushes_again(clamp):
     assert run.transitions.event.tolist().count("free") == 4
     expected = by_differences(*start)
     assert abs(run.tangent - expected).max() < 5e-5 * abs(expected).max()
+
+
+@pytest.mark.parametrize(
+    ("slopes", "damping", "v_t"),
+    [([4e5, 4e5], [5.0, 20.0], 0.2), ([4e5, 8e5], [100.0, 250.0], 0.5), ([4e5, 4e5], [150.0, 5.0], 0.5)],
+)
+def test_the_derivative_where_the_force_jumps_on_a_knot(slopes, damping, v_t):
+    """A slip is held, one begins after the law pulled, one begins at once: by the start and by a number of the law."""
+
+    def changed(d):
+        return wall(PiecewiseLinear(slopes, [1e-4], damping=[damping[0], damping[1] * (1.0 + d)]))
+
+    start, step = ([-1e-4, 0.0], [0.8, v_t], 0.0022), 1e-5
+    nearby = Nearby.of(changed, 0.0, 1e-3)
+    run = integrate(changed(0.0), *start, method=FINE, tangent=Parameter(changed(-step), changed(step), step))
+    ends = [integrate(changed(d), *start, method=SHARP).end[:4] for d in (step, -step)]
+    expected = np.column_stack((by_differences(changed(0.0), *start), (ends[0] - ends[1]) / (2.0 * step)))
+    size = abs(expected).max(axis=0)
+    assert np.all(abs(run.tangent - expected).max(axis=0) < 1e-5 * size)
+    found = sensitivity(changed(0.0), *start, [start[-1]], nearby, method=FINE)
+    assert abs(found.states[-1] - expected[:, -1]).max() < 1e-6 * size[-1]
+    assert np.all(abs(found.matrix[:4, :4] - expected[:, :4]).max(axis=0) < 1e-5 * size[:4])
 
 
 def knotted(d):

@@ -7,6 +7,7 @@ from frames import PORTAL, portal
 import fembeam as fb
 from contacts import Hertz, KelvinVoigt
 from fembeam.plot.bodies import displacements
+from fembeam.study.measure import cut
 
 WAVE = fb.Harmonic(1e-3, 46.0, phase=0.7)
 DAMPED = {"damping": fb.ModalDamping(0.02)}
@@ -42,6 +43,22 @@ def test_equal_motions_are_a_base_motion():
         forces = two.section_forces(place)
         assert all(equal(known, forces[name], 1e-10) for name, known in one.section_forces(place).items())
     assert abs(two.energy.residual).max() < 1e-9 * abs(two.energy.input).max()
+
+
+@pytest.mark.parametrize("signal", [fb.BandNoise(1e-3, (0.0, 400.0), seed=3), fb.SineSweep(1e-3, 50.0, 200.0, 0.8)])
+def test_equal_sampled_motions_are_a_base_motion(signal, tmp_path):
+    """At the default tolerance, to which the run takes such signals; also of a part of the run and of its file."""
+    rod = fb.Section.circle(2.1e11, 7800.0, 0.02)
+    damping = fb.Rayleigh(0.0, 1e-5)
+    shaken = fb.Scene(fb.Beam(1.0, rod), [fb.Clamped(0.0)], damping=damping, base=signal)
+    moved = fb.Scene(fb.Beam(1.0, rod), [fb.Clamped(0.0, motion={"y": signal})], damping=damping)
+    one, two = (scene.reduce(8).simulate(0.79, 5e-3) for scene in (shaken, moved))
+    known, force = one.acceleration(1.0, absolute=True), one.reactions()[0].force
+    two.save(tmp_path / "run.npz")
+    for run, first in ((two, 1), (cut(two, 0.1, 0.79), 20), (fb.load(tmp_path / "run.npz"), 1)):
+        found = slice(len(run.t) - len(known) + first, None)
+        assert equal(known[first:], run.acceleration(1.0)[found], 2e-5)
+        assert equal(force[first:], run.reactions()[0].force[found], 2e-5)
 
 
 def test_kept_by_a_file(tmp_path):

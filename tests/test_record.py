@@ -87,6 +87,42 @@ def test_the_value_of_a_linear_acceleration_is_its_double_integral():
     assert line(0.1234) == pytest.approx(2.0 - 3.0 * 0.1234)
 
 
+@pytest.mark.parametrize("band", [None, (0.0, 250.0)])
+def test_the_value_of_an_acceleration_is_its_double_integral(band):
+    """Its straight line from the first to the last sample is integrated, too: here to 3 m of 2 cm of motion."""
+    acceleration = np.cos(9.0 * TIMES) + 0.5 * np.sin(40.0 * TIMES)
+    record = fb.Record(TIMES, acceleration, band, "acceleration")
+    t, h = np.linspace(1.0, 3.0, 50), 1e-4
+    exact = np.cos(9.0 * t) + 0.5 * np.sin(40.0 * t)
+    assert record.derivative(2)(t) == pytest.approx(exact, abs=3e-3)
+    ends = record([0.0, record.duration])
+    assert np.abs(ends).max() < 1e-14
+    motion = -np.cos(9.0 * t) / 81.0 - 0.5 * np.sin(40.0 * t) / 1600.0
+    assert np.abs(np.polyval(np.polyfit(t, record(t) - motion, 1), t) - (record(t) - motion)).max() < 1e-4
+    assert record.derivative(1)(t) == pytest.approx((record(t + h) - record(t - h)) / (2 * h), abs=1e-6)
+    assert record.derivative(2)(t) == pytest.approx((record(t + h) - 2 * record(t) + record(t - h)) / h**2, abs=1e-5)
+    dt, rows = record.nodes(record.duration, 1e-9)
+    at = dt * np.arange(len(rows))
+    for order, column in enumerate(rows.T):
+        inside = at <= record.duration
+        assert column[inside] == pytest.approx(record.derivative(order)(at[inside]), abs=1e-6)
+
+
+def test_supports_that_move_all_together_move_the_structure_as_the_base_does():
+    acceleration = np.cos(9.0 * TIMES) + 0.5 * np.sin(40.0 * TIMES)
+    record = fb.Record(TIMES, acceleration, quantity="acceleration")
+    chain = fb.Structure([[4e3, -4e3], [-4e3, 4e3]], np.eye(2), labels=[(0, "x"), (1, "x")])
+    damping = fb.Rayleigh(0.0, 1e-3)
+    shaken = fb.Scene(chain, supports=[fb.Fixed(0, "x")], damping=damping, base={"x": record})
+    moved = fb.Scene(chain, supports=[fb.Fixed(0, "x", motion={"x": record})], damping=damping)
+    by_base, by_support = (scene.reduce(modes="all").simulate(3.9, 0.1) for scene in (shaken, moved))
+    relative = by_support.displacement(1, "x") - record(by_support.t)
+    size = np.abs(by_base.displacement(1, "x")).max()
+    assert relative == pytest.approx(by_base.displacement(1, "x"), abs=1e-6 * size)
+    absolute = by_base.displacement(1, "x", absolute=True)
+    assert by_support.displacement(1, "x") == pytest.approx(absolute, abs=1e-6 * size)
+
+
 @pytest.mark.parametrize("interpolation", ["linear", "spectral"])
 def test_padding_lets_a_run_outlast_its_record(interpolation):
     record = fb.Record(TIMES, QUAKE, quantity="acceleration", interpolation=interpolation, padding=2.003)

@@ -93,6 +93,8 @@ CASES = {
     "stiffness": (lambda p: beam(Hysteretic(p, damping_factor=0.5)), 2.1e8),
     "damping factor": (lambda p: beam(Hysteretic(2.1e8, damping_factor=p)), 0.5),
     "dashpot": (lambda p: beam(KelvinVoigt(2e5, p)), 30.0),
+    "dashpot of a force cut at zero": (lambda p: beam(KelvinVoigt(2e5, p, clamp=True)), 300.0),
+    "spring of a force cut at zero": (lambda p: beam(KelvinVoigt(p, 300.0, clamp=True)), 2e5),
     "a force cut at zero": (lambda p: beam(KelvinVoigt(2e5, 300.0, clamp=True), gap=p), 2e-5),
     "knot": (lambda p: beam(PiecewiseLinear([1e5, 4e5], knots=[p])), 1e-5),
     "amplitude": (lambda p: beam(amplitude=p), 40.0),
@@ -108,6 +110,21 @@ def five_points(function, step):
     """Central differences of fourth order."""
     a, b, c, d = (np.asarray(function(k * step)) for k in (-2, -1, 1, 2))
     return (8.0 * (c - b) - (d - a)) / (12.0 * step)
+
+
+def test_a_sum_with_a_part_that_is_cut_at_zero():
+    """The kink of the part is no zero of the sum; runs themselves do not land on it."""
+
+    def make(p):
+        return beam(KelvinVoigt(2e5, p, clamp=True) + PiecewiseLinear([1e5]))
+
+    def run(step):
+        return integrate(make(300.0 + step), START[:2], START[2:], 0.025, method=Exponential(1e-12)).end
+
+    found = sensitivity(make(300.0), START[:2], START[2:], 0.025, [0.025], Nearby.of(make, 300.0, 0.03), method=FINE)
+    expected = five_points(run, 6e-3)
+    np.testing.assert_allclose(found.states[0], expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+    assert found.roughness < 1e-6
 
 
 @pytest.mark.parametrize("name", [name for name in CASES if name not in ("gap", "dashpot", "amplitude", "frequency")])

@@ -113,6 +113,8 @@ PARAMETERS = {
     "stiffness": (lambda p: beam(law=Hysteretic(p, damping_factor=0.5)), 2.1e8),
     "damping_factor": (lambda p: beam(law=Hysteretic(2.1e8, damping_factor=p)), 0.5),
     "dashpot": (lambda p: beam(law=KelvinVoigt(2e5, p)), 30.0),
+    "dashpot, cut at zero": (lambda p: beam(law=KelvinVoigt(2e5, p, clamp=True)), 30.0),
+    "stiffness, cut at zero": (lambda p: beam(law=KelvinVoigt(p, 30.0, clamp=True)), 2e5),
     "slope": (lambda p: beam(law=PiecewiseLinear([1e5, p], knots=[2e-5])), 4e5),
     "knot": (lambda p: beam(law=PiecewiseLinear([1e5, 4e5], knots=[p])), 2e-5),
     "zeta": (lambda p: beam(zeta=p), 1.0),

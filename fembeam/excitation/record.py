@@ -4,7 +4,8 @@
 
 The straight line joins the first and the last sample; what is left vanishes at both ends, so its odd
 extension is continuous with its rate, and the sine series passes through every sample. Derivatives are taken
-line by line. Or the samples are joined by straight lines, see `polyline`.
+line by line, integrals too; those of the straight line are a parabola and a cubic, the cubic zero at both ends as the
+sines are. Or the samples are joined by straight lines, see `polyline`.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.excitation.line_spectrum import LineSpectrum, checked_band, checked_order, within
@@ -55,7 +57,7 @@ class Record:
         lo > 0 the straight line (drift, mean) goes as well.
     quantity : "displacement", "acceleration" or "force"
         What `y` is. For an acceleration `derivative(2)` is the record itself, and the value is its double
-        integral without straight line and constants, zero at both ends; slow drift stays unless lo > 0. A force
+        integral, with constants such that it is zero at both ends; slow drift stays unless lo > 0. A force
         (or moment) is no motion: it has no derivatives. A scene file must say it.
     detrend : bool
         Remove the least-squares straight line first: offset and drift of the sensor. An acceleration needs it
@@ -107,7 +109,7 @@ class Record:
     padding: float = 0.0
     order: int = field(default=0, kw_only=True)
     kind: InitVar[Quantity | None] = field(default=None, kw_only=True)
-    _spectrum: tuple[LineSpectrum | Polyline, float, float] = field(init=False, repr=False)
+    _spectrum: tuple[LineSpectrum | Polyline, tuple[float, ...]] = field(init=False, repr=False)
 
     def __post_init__(self, kind: Quantity | None) -> None:
         t, y = checked_samples(self.t, self.y)
@@ -220,13 +222,16 @@ class Record:
         h = float(self.t[-1]) / (y.size - 1)
         return h, padded(y, math.ceil(self.padding / h - 1e-9))
 
-    def _transformed(self) -> tuple[LineSpectrum | Polyline, float, float]:
-        """Sine lines of this signal and its straight line c_0 + c_1 t; or the polyline, and no other line."""
+    def _transformed(self) -> tuple[LineSpectrum | Polyline, tuple[float, ...]]:
+        """Sine lines of this signal and the coefficients of its straight line, or of what it is integrated to.
+
+        Or the polyline, and zero.
+        """
         from scipy.fft import dst
 
         (h, y), power = self._samples, self._power
         if self.interpolation == "linear":
-            return Polyline(h, y, -power), 0.0, 0.0
+            return Polyline(h, y, -power), (0.0,)
         n = y.size - 1
         line = (float(y[0]), float(y[-1] - y[0]) / self.duration)
         sines = dst(y[1:-1] - (line[0] + line[1] * h * np.arange(1, n)), type=1) / n
@@ -235,8 +240,10 @@ class Record:
             lines = within(lines, self.band)
         if self.band is not None and self.band[0] > 0:
             line = (0.0, 0.0)
-        c_0, c_1 = (*line, 0.0, 0.0)[power : power + 2] if 0 <= power <= 2 else (0.0, 0.0)
-        return lines.derivative(power), c_0, c_1
+        twice = Polynomial(line).integ(2)
+        twice -= Polynomial([0.0, twice(self.duration) / self.duration])
+        rest = Polynomial(line).deriv(power) if power >= 0 else twice.deriv(2 + power)
+        return lines.derivative(power), tuple(rest.coef.tolist())
 
     def __call__(self, t: ArrayLike) -> Any:
         """Value at the instants t (s from the first sample), of any shape; an error outside the record."""
@@ -246,8 +253,8 @@ class Record:
         if outside.any():
             worst = float(times[outside].flat[0])
             raise ValueError(f"Record covers 0 to {self.duration:.6g} s, got t = {worst:.6g} s")
-        lines, c_0, c_1 = self._spectrum
-        return lines.at(times) + c_0 + c_1 * times
+        lines, rest = self._spectrum
+        return lines.at(times) + Polynomial(rest)(times)
 
     def nodes(self, duration: float, rtol: float) -> tuple[float, NDArray[np.float64]]:
         """Hermite data of the signal on a uniform grid, with a proven interpolation error.
@@ -258,10 +265,11 @@ class Record:
         linear interpolation the error is that of its spectrum, see `polyline`.
         """
         self.for_duration(duration)
-        lines, c_0, c_1 = self._spectrum
+        lines, coefficients = self._spectrum
         dt, values = lines.nodes(duration, rtol)
-        values[:, 0] += c_0 + c_1 * dt * np.arange(len(values))
-        values[:, 1] += c_1
+        rest, t = Polynomial(coefficients), dt * np.arange(len(values))
+        for order in range(3):
+            values[:, order] += rest.deriv(order)(t)
         return dt, values
 
     def derivative(self, order: int) -> Record:

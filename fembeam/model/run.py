@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,6 +16,7 @@ import solvers
 from fembeam.response import Histories, PlacedLog
 from fembeam.scene import ON, Source
 from fembeam.support import Part, Printed, is_finite
+from solvers.integration import loads_taken
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -101,6 +102,9 @@ class Run(Histories, Printed):
         if not solution.status.good:
             status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
         reached = made.duration if made and solution.status.good else float(solution.t[-1]) if len(solution.t) else 0.0
+        taken = None
+        if made and len(model.following):
+            taken = partial(loads_taken, model.system, made.duration, method=made.solver)
         return cls(
             *(solution.t, solution.q, solution.q_dot),
             contacts=PlacedLog.of(solution.contacts, model.sites),
@@ -128,6 +132,7 @@ class Run(Histories, Printed):
             rubs=np.array([one.rub for one in rows], dtype=float).reshape(-1, 4),
             rubbing=solution.record.friction,
             reached=reached,
+            taken=taken,
             made=made,
         )
 

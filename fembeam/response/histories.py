@@ -66,6 +66,7 @@ class Histories:
     rubs: Vector = field(default_factory=lambda: np.zeros((0, 4)))  # (m, 4): μ, k_t, R (< 0 outer), Ω; else zeros
     rubbing: Callable[[], FrictionLog] | None = field(default=None, repr=False)  # makes `friction_log`
     reached: float = 0.0  # s, the time of `end`
+    taken: Callable[[Vector], Any] | None = field(default=None, repr=False)  # sampled loads as the run took them
     sampled: bool = True  # else t, q, q_dot are the final state alone, and no history
 
     @cached_property
@@ -100,7 +101,7 @@ class Histories:
     @cached_property
     def readout(self) -> Readout:
         """Loads, damping, section forces and reactions, from the model or from the file."""
-        return Readout(self.model, self.t, self.kept)
+        return Readout(self.model, self.t, self.kept, self.taken)
 
     def _at_samples(self, values: Vector) -> Vector:
         """Values (k, …) at the samples; ValueError for a run without any, whose q and q̇ are the final state."""

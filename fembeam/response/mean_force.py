@@ -59,36 +59,45 @@ def _missed(run: Histories, stop: int, found: Vector) -> Vector:
 def _of_log(run: Histories, stop: int, law: Any, motion: Vector, edges: Vector) -> Vector:
     """The log's impulses in each cell (k,): of contacts within a cell whole, of others in shares."""
     log, t = run.contacts, motion[0]
-    end, impulses = _to_the_last_sample(run, stop, motion)
-    seen = np.flatnonzero((log.stop == stop) & (end > t[0]) & (log.t_in < t[-1]))
-    first, last = (np.searchsorted(edges, times[seen], side="right") - 1 for times in (log.t_in, end))
+    seen = np.flatnonzero((log.stop == stop) & ~(log.t_out <= t[0]) & (log.t_in < t[-1]))
+    if not len(seen):
+        return np.zeros(len(t))
+    starts, ends, impulses = _within_samples(run, stop, motion, seen)
+    first, last = (np.searchsorted(edges, times, side="right") - 1 for times in (starts[0], ends[0]))
     whole = first == last
-    impulse: Vector = np.bincount(first[whole], impulses[seen[whole]], len(t)).astype(float)
+    impulse: Vector = np.bincount(first[whole], impulses[whole], len(t)).astype(float)
     if whole.all():
         return impulse
-    cut, rest = seen[~whole], 0.0 * seen[~whole]
-    starts = np.array([log.t_in[cut], rest, log.speed_in[cut]])
-    owner, a, b = _between(motion, starts, np.array([end[cut], rest, -log.speed_out[cut]]))
-    middle = (a[0] + b[0]) / 2
-    interval = np.clip(np.searchsorted(t, middle) - 1, 0, len(t) - 2)
-    rates = np.maximum(np.abs(log.speed_in[cut]), law.entry_rate_floor)[owner]
-    parts = _shares(law, owner, rates, (a, b, edges[1:-1][interval])) * impulses[cut][owner, None]
-    parts[(middle < t[0]) | (middle > t[-1])] = 0.0  # of contacts under way at the first or the last sample
+    owner, a, b = _between(motion, starts[:, ~whole], ends[:, ~whole])
+    interval = np.clip(np.searchsorted(t, (a[0] + b[0]) / 2) - 1, 0, len(t) - 2)
+    rates = np.maximum(np.abs(log.speed_in[seen[~whole]]), law.entry_rate_floor)[owner]
+    parts = _shared(law, owner, rates, impulses[~whole], (a, b, edges[1:-1][interval]))
     for half in (0, 1):
         impulse += np.bincount(interval + half, parts[:, half], len(t))
     return impulse
 
 
-def _to_the_last_sample(run: Histories, stop: int, motion: Vector) -> tuple[Vector, Vector]:
-    """Ends and impulses of the log's contacts, of the one under way at the last sample up to there."""
-    log, (t, delta, _) = run.contacts, motion
-    mine, ended = log.stop == stop, log.t_out <= t[-1]
-    lasts = mine & ~ended & (log.t_in < t[-1])
-    whole = delta[0] <= 0.0 or np.any(mine & (log.t_in <= t[0]))  # else a part of a run: a contact began before it
-    kept = run.losses.impulses if whole and lasts.any() else None
-    if kept is None:
-        return np.where(np.isnan(log.t_out), t[-1], log.t_out), log.impulse
-    return np.fmin(log.t_out, t[-1]), np.where(lasts, kept[-1, stop] - log.impulse[mine & ended].sum(), log.impulse)
+def _within_samples(
+    run: Histories, stop: int, motion: Vector, seen: NDArray[np.int64]
+) -> tuple[Vector, Vector, Vector]:
+    """Of the log's contacts (c,) t, δ, δ̇ (3, c) at entry and exit and impulses, from the first to the last sample.
+
+    A run has the impulse up to every sample. What contacts that lie before it do not tell of that, the contact under
+    way at the first or the last sample does.
+    """
+    log, (first, *_, last) = run.contacts, motion.T
+    starts = np.array([log.t_in[seen], 0.0 * seen, log.speed_in[seen]])
+    ends = np.array([log.t_out[seen], 0.0 * seen, -log.speed_out[seen]])
+    impulses = log.impulse[seen]
+    begun, lasts = starts[0] < first[0], ~(ends[0] <= last[0])
+    if begun.any() or lasts.any():
+        kept, mine = run.losses.impulses, log.stop == stop
+        assert kept is not None  # of a run read from a file `mean_force` has returned
+        before, after = (
+            kept[k, stop] - log.impulse[mine & (log.t_out <= t)].sum() for k, t in ((0, first[0]), (-1, last[0]))
+        )
+        impulses = np.where(lasts, after, impulses) - np.where(begun, before, 0.0)
+    return np.where(begun, first[:, None], starts), np.where(lasts, last[:, None], ends), impulses
 
 
 def _between(motion: Vector, starts: Vector, ends: Vector) -> tuple[NDArray[np.int64], Vector, Vector]:
@@ -104,12 +113,17 @@ def _between(motion: Vector, starts: Vector, ends: Vector) -> tuple[NDArray[np.i
     return owner[cubic], points[:, cubic], points[:, cubic + 1]
 
 
-def _shares(law: Any, owner: NDArray[np.int64], rates: Vector, cubics: Cubics) -> Vector:
-    """Parts (p, 2) of its contact's impulse on each cubic before and after its cell's end; by time where F is 0."""
-    grown = _impulses(lambda cubic, _, d, v: np.maximum(law.force(d, v, rates[cubic]), 0.0), cubics)
-    pushed = np.bincount(owner, grown.sum(axis=1))[owner] > 0.0
-    grown[~pushed] = 2.0 * _halves(cubics)[~pushed]
-    return np.asarray(grown / np.bincount(owner, grown.sum(axis=1))[owner, None])
+def _shared(law: Any, owner: NDArray[np.int64], rates: Vector, impulses: Vector, cubics: Cubics) -> Vector:
+    """Impulses (p, 2) on each cubic before and after its cell's end, which add up to those of the contacts (c,).
+
+    What the law on cubics misses of those is divided as the sizes of what it finds; by time where F is 0.
+    """
+    found = _impulses(lambda cubic, _, d, v: law.force(d, v, rates[cubic]), cubics)
+    sizes = np.abs(found)
+    pushed = np.bincount(owner, sizes.sum(axis=1))[owner] > 0.0
+    sizes[~pushed] = _halves(cubics)[~pushed]
+    missed = impulses - np.bincount(owner, found.sum(axis=1), len(impulses))
+    return np.asarray(found + sizes * (missed / np.bincount(owner, sizes.sum(axis=1), len(impulses)))[owner, None])
 
 
 def _halves(cubics: Cubics) -> Vector:

@@ -7,7 +7,7 @@ k samples, n coordinates, m rows of contacts, l loads, r reactions. Neither scen
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -47,13 +47,16 @@ class Readout:
     """Loads, damping, the frame's motion, section forces, reactions, heights of one run; each made once.
 
     ``kept`` are those of a file, by the names of the properties; what is neither there nor of a model is a ValueError.
+    ``taken`` gives values of loads at times by their numbers, where they are not those of the signals themselves.
     """
 
     forces: Vector | None = None  # (r, k) on the rows of contacts, of a run read from a file
     means: Vector | None = None  # (m, k) of the contacts over each sample, likewise
 
-    def __init__(self, model: Model | None, t: Vector, kept: Mapping[str, Any]) -> None:
-        self._model, self.t = model, t
+    def __init__(
+        self, model: Model | None, t: Vector, kept: Mapping[str, Any], taken: Callable[[Vector], Any] | None = None
+    ) -> None:
+        self._model, self.t, self._taken = model, t, taken
         self.__dict__.update(kept)
 
     @property
@@ -93,9 +96,15 @@ class Readout:
 
     @cached_property
     def loads(self) -> Vector:
-        """Signals s (l, k): of forces and feet, then the frame's ÿ if it moves, then gravity."""
+        """Signals s (l, k): of forces and feet, then the frame's ÿ if it moves, then gravity.
+
+        With supports that move sampled ones as the run took them: their displacement loads shapes of some 1e5 rad/s
+        that follow it, whose accelerations are differences of nearly equal terms.
+        """
         signals = [signal for _, signal in self.model.system.loads]
-        return np.array([_sampled(signal, self.t) for signal in signals]).reshape(len(signals), len(self.t))
+        known = {} if self._taken is None else self._taken(self.t)
+        values = [known[i] if i in known else _sampled(signal, self.t) for i, signal in enumerate(signals)]
+        return np.array(values).reshape(len(signals), len(self.t))
 
     @cached_property
     def base(self) -> int | None:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 import solvers
 from fembeam.model import Model, Run, load_period
-from fembeam.response import latched_before
+from fembeam.response import latched_before, mean_force
 from fembeam.scene import Scene, signals_of
 from fembeam.study.quantities import Quantity, label
 from fembeam.study.realisations import child, renewed, seed_key
@@ -195,11 +195,25 @@ def cut(run: Run, start: float, end: float) -> Run:
         borders=partial(of_log, "transitions", "t"), reached=end - start,
         began=latched_before(run, start), end=_end_of(run, kept),
         made=run.made if start == 0.0 and end >= run.reached else None,
-        kept={"forces": run._forces[:, kept], "t": run.t[kept]},  # signals have the times of the run
+        kept={"forces": run._forces[:, kept], "means": _MeansOf(run, kept), "t": run.t[kept]},  # times of the run
     )  # fmt: skip
     if run.rubs.any() and run.sampled:
         part.__dict__["friction_loss"] = run.friction_loss[kept] - run.friction_loss[kept][:1]
     return part
+
+
+@dataclass(frozen=True)
+class _MeansOf:
+    """Mean forces (k,) by stop over the cells of some of a run's samples, each made when asked for."""
+
+    run: Run
+    kept: slice
+
+    def __getitem__(self, stop: int) -> Vector:
+        run, kept = self.run, self.kept
+        impulses = run.losses.impulses
+        lost = replace(run.losses, impulses=impulses if impulses is None else impulses[kept])
+        return mean_force(replace(run, t=run.t[kept], q=run.q[kept], q_dot=run.q_dot[kept], lost=lambda: lost), stop)
 
 
 def _end_of(run: Run, kept: slice) -> Any:

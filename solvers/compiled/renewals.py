@@ -16,9 +16,7 @@ from solvers.compiled.kernels import (
     inlined,
     inner,
     rubs,
-    slider_of,
 )
-from solvers.compiled.sliding import SLIPPED, renew_slider
 from solvers.compiled.state import (
     AT_ONCE,
     LAST_EVENT,
@@ -28,10 +26,10 @@ from solvers.compiled.state import (
     T,
     end_event,
     event_row,
+    renew_slider_row,
     write_event,
 )
 from solvers.problem import event_list as at
-from solvers.problem.friction import STIFFNESS
 
 
 @inlined
@@ -65,13 +63,7 @@ def renew(problem, state, s, j, delta, rate):
         write_event(state, RENEWAL, t, t, 0.0, s, j, state.x)
     event_row(problem, state, s, t, j, delta, rate, row)
     if rubs(problem, s):
-        account, found = problem.friction[s, 1], row[at.DELTA : at.FORCE + 1]
-        entry, segment = state.entry_rate[s], state.segment[s]
-        row[at.CODE] = renew_slider(problem, s, j, entry, segment, t, state.x, state.rate, found)
-        row[at.WORK], row[at.IMPULSE] = state.x[account], state.x[account + 1]
-        held = abs(row[at.FORCE]) / slider_of(problem, s)[STIFFNESS]
-        state.x[account + 2] += held if row[at.CODE] == SLIPPED else -held
-        end_event(problem, state, s, row)
+        renew_slider_row(problem, state, s, j, row)
         return
     force_at(problem, s, delta, rate, state.entry_rate[s], row[at.DELTA : at.FORCE + 1])
     row[at.CODE] = call_renewal(problem.renewal[s], j, delta, rate, state.entry_rate[s], problem.parameters[s])
@@ -91,7 +83,7 @@ def count_event(state):
 @inlined
 def most_rows(problem):
     """The most rows of the log that the events of one instant take."""
-    rows = problem.law.size + problem.friction.shape[0]
+    rows = problem.law.size + 2 * problem.friction.shape[0]
     for count in problem.border_count:
         rows += count
     return rows

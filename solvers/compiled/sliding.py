@@ -1,9 +1,9 @@
 """Stick and slip of friction under a contact's own force: where a slider's segment ends, and what begins there.
 
     stick      margin μN - |F_t|            at zero: slip in the direction of F_t
-    slip σ     margin σξ̇ - μṄ/k_t = σṡ      at zero: stick, s = ξ - σμN/k_t
+    slip σ     margin σξ̇ - μṄ/k_t = σṡ      at zero, and where N jumps up: stick, s = ξ - σμN/k_t with N before
                margin N                     at zero: free
-    free       margin -N                    at zero: as at an entry
+    free       margin -N                    at zero, and where N jumps up from below: as at an entry
     entry      stick if N jumps or k_t |ξ̇| <= μṄ, s = ξ; else slip in the direction of ξ̇
 
 With μ = 0 the slider always slips, and changes its direction with ξ̇.
@@ -33,6 +33,7 @@ from solvers.compiled.kernels import (
     delta_of,
     force_at,
     indentation,
+    indentation_and_rate,
     indentation_rate,
     inlined,
     inner,
@@ -66,6 +67,7 @@ DELTA, RATE, ACCELERATION, XI, XI_RATE, XI_ACCELERATION = range(6)  # places in 
 POINT = 6
 STUCK, SLIPPED, FREED = range(3)  # codes of events, see `problem.friction.Rubbing`
 WITHIN_ROUNDING = 100.0  # δ, in units of its rounding, below which a slip as a contact begins or ends is not told
+_JUMP = 1e-6  # of what its terms give: N that begins beyond zero by more, or grows by more on a knot, jumps
 _JUST_INSIDE = 1e-200  # m: there forces like δ^{1/4} have an unbounded slope, and those like δ^{3/2} a slope of zero
 
 
@@ -241,6 +243,29 @@ def begin_slider(problem, s, t, x, entry_rate, under_way):
 
 
 @inner
+def is_held(problem, s, entry_rate, segment, following, delta, rate):
+    """Whether N jumps up on a knot, from one segment to another, while the slider slips: it sticks from then on.
+
+    Its spring stays drawn by μN of before, which is less than the new limit.
+    """
+    slider = slider_of(problem, s)
+    if abs(slider[CODE]) != 1.0 or slider[MU] == 0.0:
+        return False
+    before = normal_force(problem, s, segment, entry_rate, delta, rate)
+    after = normal_force(problem, s, following, entry_rate, delta, rate)
+    return after - before > _JUMP * abs(after)
+
+
+@inner
+def begins_beyond_zero(problem, s, entry_rate, segment, x):
+    """Whether N, of what was free, is positive by more than the place of a border is known to: it has jumped."""
+    delta, rate = indentation_and_rate(problem, s, x)
+    normal = normal_force(problem, s, segment, entry_rate, delta, rate)
+    by_delta, by_rate, _ = slopes_of(problem, s, entry_rate)
+    return normal > _JUMP * (abs(by_delta * delta) + abs(by_rate * rate))
+
+
+@inner
 def end_slider(problem, s):
     """Reset the slider of a contact that has ended."""
     slider = slider_of(problem, s)
@@ -282,10 +307,10 @@ def renew_slider(problem, s, j, entry_rate, segment, t, x, rate_of_x, out):
         slider[CODE], slider[SLIDER] = FREE, 0.0
         return FREED
     if slider[CODE] == FREE:
-        acceleration = acceleration_of(problem, s, x, rate_of_x)
-        _latch_stick_or_slip(
-            slider, xi, xi_rate, normal_rate(problem, s, indentation_rate(problem, s, x), acceleration, entry_rate)
-        )
+        growth, acceleration = math.inf, acceleration_of(problem, s, x, rate_of_x)
+        if not begins_beyond_zero(problem, s, entry_rate, segment, x):
+            growth = normal_rate(problem, s, indentation_rate(problem, s, x), acceleration, entry_rate)
+        _latch_stick_or_slip(slider, xi, xi_rate, growth)
         return STUCK if slider[CODE] == 0.0 else SLIPPED
     if slider[MU] == 0.0 and slider[CODE] != 0.0:
         slider[CODE] = -slider[CODE]

@@ -28,10 +28,10 @@ from solvers.compiled.kernels import (
     xi_and_rate_at,
 )
 from solvers.compiled.parts import addresses_of
-from solvers.compiled.sliding import begin_slider, end_slider, slider_force
+from solvers.compiled.sliding import SLIPPED, begin_slider, end_slider, is_held, renew_slider, slider_force
 from solvers.problem import Array, Contact, Forcing, Law, Status, System
 from solvers.problem import event_list as at
-from solvers.problem.friction import ACCOUNTS, BEGUN, CODE, FREE, PEAK, STIFFNESS
+from solvers.problem.friction import ACCOUNTS, BEGUN, CODE, FREE, PEAK, SLIDES, STIFFNESS
 
 STATUSES = list(Status)
 DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAINED = (
@@ -243,13 +243,31 @@ def log_begin(problem, state):
 
 
 @inner
+def renew_slider_row(problem, state, s, j, row):
+    """Begin the segment of a slider behind its border j, and complete the row of the log by it."""
+    account, found = problem.friction[s, 1], row[at.DELTA : at.FORCE + 1]
+    entry, segment = state.entry_rate[s], state.segment[s]
+    row[at.CODE] = renew_slider(problem, s, j, entry, segment, row[at.TIME], state.x, state.rate, found)
+    row[at.WORK], row[at.IMPULSE] = state.x[account], state.x[account + 1]
+    held = abs(row[at.FORCE]) / slider_of(problem, s)[STIFFNESS]
+    state.x[account + 2] += held if row[at.CODE] == SLIPPED else -held
+    end_event(problem, state, s, row)
+
+
+@inner
 def switch(problem, state, s, direction):
-    """Move stop s one segment up (direction 1) or down (-1), and log it."""
-    t, row = state.now[T], state.log[state.count[LOGGED]]
+    """Move stop s one segment up (direction 1) or down (-1), and log it, after the slip that it ends by a jump of N."""
+    t, segment = state.now[T], state.segment[s]
     if state.event_record.shape[0]:
         write_event(state, EVENT, t, t, 0.0, s, direction, state.x)
-    level = problem.knots[s, state.segment[s] - (1 if direction < 0 else 0)]
-    event_row(problem, state, s, t, at.KNOT, level, indentation_rate(problem, s, state.x), row)
+    level, rate = problem.knots[s, segment - (1 if direction < 0 else 0)], indentation_rate(problem, s, state.x)
+    entry, following, within = state.entry_rate[s], segment + direction, segment > 0 and segment + direction > 0
+    if within and rubs(problem, s) and is_held(problem, s, entry, segment, following, level, rate):
+        row = state.log[state.count[LOGGED]]
+        event_row(problem, state, s, t, SLIDES, level, rate, row)
+        renew_slider_row(problem, state, s, SLIDES, row)
+    row = state.log[state.count[LOGGED]]
+    event_row(problem, state, s, t, at.KNOT, level, rate, row)
     state.segment[s] += direction
     end_event(problem, state, s, row)
     if rubs(problem, s) and (state.segment[s] == 0 or row[at.FROM] == 0.0):

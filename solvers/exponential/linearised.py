@@ -31,6 +31,7 @@ from solvers.compiled.kernels import (
     acceleration_of,
     add_push,
     add_tangential,
+    call_force,
     call_gradient,
     contact_forces,
     contact_gradient,
@@ -48,6 +49,7 @@ from solvers.compiled.kernels import (
     slider_of,
 )
 from solvers.compiled.packed import unpacker
+from solvers.compiled.sliding import is_held, normal_force
 from solvers.compiled.state import (
     BEGAN,
     ENDED,
@@ -74,6 +76,7 @@ from solvers.exponential.circles.friction_derivative import (
     begin_rubbing,
     end_rubbing,
     latch_begin,
+    pass_slider,
 )
 from solvers.exponential.contact.crossings import FORCE, side_at
 from solvers.exponential.contact.landing_step import landing_step, start_landing
@@ -88,7 +91,7 @@ from solvers.exponential.linearised_step import (
 )
 from solvers.exponential.preparation import SCRATCH, TABLES
 from solvers.exponential.responses import propagate
-from solvers.problem.friction import CODE, FREE
+from solvers.problem.friction import CODE, FREE, SLIDES
 
 _OFF = 1e-10  # relative distance from a knot at which a law is evaluated on one side of it
 
@@ -146,18 +149,27 @@ def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, directi
         jump -= force_at(problem, s, below, rate, past.entry_rate[s], derivatives.batch)
     jump *= direction
     past.now[LAST_EVENT] = t
+    within, held, friction_jump = rubs(problem, s) and border > 0 and segment + direction > 0, False, 0.0
+    if within:
+        knot, entry_rate = problem.knots[s, border], past.entry_rate[s]
+        held = is_held(problem, s, entry_rate, segment, segment + direction, knot, rate)
+        if not held:
+            normal = normal_force(problem, s, segment, entry_rate, knot, rate)
+            friction_jump = friction_by_normal(slider_of(problem, s)) * max(jump, -max(normal, 0.0))
     for c in range(derivatives.y.shape[0]):
         d_delta = change_of(problem, variation, derivatives, past.x, c, s, 0, t)
-        shift = -d_delta / rate if abs(rate) > rate_rounding else 0.0
-        derivatives.shift[c, problem.law.size] = shift
+        derivatives.shift[c, problem.law.size] = -d_delta / rate if abs(rate) > rate_rounding else 0.0
+    if held:  # by the motion before the knot
+        pass_slider(problem, ahead, behind, past, derivatives, variation, s, np.int64(SLIDES))
+    for c in range(derivatives.y.shape[0]):
+        shift = derivatives.shift[c, problem.law.size]
         if entering:
             floored = abs(rate) < problem.floor[s]
             change = change_of(problem, variation, derivatives, past.x, c, s, 1, t) + acceleration * shift
             derivatives.shift[c, s] = shift
             derivatives.entry[c, s] = 0.0 if floored else change
         add_push(problem, s, -jump * shift, past.x, derivatives.y[c])
-        if rubs(problem, s) and border > 0:
-            friction_jump = friction_by_normal(slider_of(problem, s)) * jump
+        if within:
             add_tangential(problem, s, -friction_jump * shift, past.x, derivatives.y[c])
     past.segment[s] += direction
     if rubs(problem, s) and entering:
@@ -205,6 +217,20 @@ def _gradient(problem, tables, past, scratch, s, batch):
 
 
 @merged
+def _force_of_side(side, uncut, tables, past, scratch, s, batch, force):
+    """Force of a law at another value of the parameter, cut at zero where the landing is beyond the law's bend.
+
+    Where it lands on the bend either value of the parameter may be on either side.
+    """
+    d, v, rate = batch[0:1], batch[1:2], past.entry_rate[s]
+    force[0] = 0.0
+    if tables.bend[s] != FORCE:
+        contact_forces(side, s, d, v, rate, force)
+    elif scratch.unresolved[s] > 0.0:
+        call_force(tables.uncut[s], 1, d, v, rate, uncut, (force,))
+
+
+@merged
 def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, variation, w, factor, out):
     """Rates of all columns at one stage of a landing; ``w`` is its state and time, ``factor`` is dt along the step."""
     n, size, t, batch = problem.k.size, 2 * problem.k.size, w[past.x.size], derivatives.batch
@@ -224,11 +250,11 @@ def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, var
         _gradient(problem, tables, past, scratch, s, batch)
         by_latched(problem, past, derivatives, s, 1, batch[0:1], batch[1:2])
         if variation.law_step > 0.0:
-            contact_forces(ahead, s, batch[0:1], batch[1:2], rate, batch[5:6])
-            contact_forces(behind, s, batch[0:1], batch[1:2], rate, batch[6:7])
+            _force_of_side(ahead, variation.uncut[0, s], tables, past, scratch, s, batch, batch[5:6])
+            _force_of_side(behind, variation.uncut[1, s], tables, past, scratch, s, batch, batch[6:7])
         if rubs(problem, s):
-            delta, known = _inside_segment(problem, past, s, w), past.entry_rate[s]
-            add_rubbing_change(problem, ahead, behind, derivatives, variation, s, known, w, t, delta, factor, out)
+            delta = _inside_segment(problem, past, s, w)
+            add_rubbing_change(problem, ahead, behind, derivatives, variation, s, rate, w, t, delta, factor, out)
             continue
         if is_circle(problem, s):
             by_law = (batch[5] - batch[6]) / (2.0 * variation.law_step) if variation.law_step > 0.0 else 0.0

@@ -63,6 +63,7 @@ class Variation(NamedTuple):
     steady: Annotated[Any, "K, R, 2, 4"]  # (Re a, Im a, Re b, Im b) of δ and δ̇ = Re (a + t b) e^{iωt}
     gap: Annotated[Any, "R"]
     radius: Annotated[Any, "C"]  # of circular clearances, as in `Problem`
+    uncut: Annotated[Any, "2, E, P"]  # parameters of the laws ahead and behind without their cuts, as in `Tables`
 
 
 DERIVATIVES, VARIATION = packed_type(Derivatives), packed_type(Variation)

@@ -104,7 +104,7 @@ def law_tables_of(contacts: Sequence[Any]) -> dict[str, Any]:
     laws = [contact.law for contact in contacts]
     inlined = [None if contact.always else getattr(contact.law, "inlined", None) for contact in contacts]
     bends = [getattr(law, "bend", None) for law in laws]
-    uncut = [law.uncut if bend == "force" else law for law, bend in zip(laws, bends, strict=True)]
+    uncut = [_uncut(law) for law in laws]
     return {
         "exponent": np.array([law.exponent for law in laws], dtype=float),
         "power_law": np.array([own or (0.0,) * 4 for own in inlined]).reshape(-1, 4),
@@ -113,6 +113,16 @@ def law_tables_of(contacts: Sequence[Any]) -> dict[str, Any]:
         "uncut_gradient": np.array([law.gradient_address for law in uncut], dtype=np.int64),
         "uncut_parameters": parameters_of(uncut),
     }
+
+
+def _uncut(law: Any) -> Any:
+    """The law without its cut at F = 0, or itself."""
+    return law.uncut if getattr(law, "bend", None) == "force" else law
+
+
+def uncut_parameters(contacts: Sequence[Any]) -> Any:
+    """Parameters (E, P) of the laws of contacts without their cuts at F = 0."""
+    return parameters_of([_uncut(contact.law) for contact in contacts])
 
 
 # tables with columns for the tones' blocks

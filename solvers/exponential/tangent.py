@@ -30,6 +30,7 @@ from solvers.exponential.linearised import linearise_run
 from solvers.exponential.linearised_step import DERIVATIVES, VARIATION, Derivatives, Variation
 from solvers.exponential.preparation import places_among_tones
 from solvers.exponential.steady_response import steady_response
+from solvers.exponential.tables import uncut_parameters
 from solvers.problem import Array, Parameter, SolverError, System
 
 _ROWS = 256  # of the event record, for some 25 contacts, within which no derivative overflows
@@ -149,7 +150,8 @@ class _Change:
         """Without a parameter."""
         rows = len(problem.gap)
         variation = Variation(
-            0.0, 0.0, np.zeros(0), np.zeros((0, rows, 2, 4)), np.zeros(rows), np.zeros(problem.radius.size)
+            *(0.0, 0.0, np.zeros(0), np.zeros((0, rows, 2, 4)), np.zeros(rows), np.zeros(problem.radius.size)),
+            np.zeros((2, 0, 0)),
         )
         none = np.zeros((0, 2 * n), dtype=complex)
         return cls(variation, [parameters] * 2, none, none)
@@ -179,6 +181,7 @@ class _Change:
         variation = Variation(
             *(parameter.step, parameter.step, tones.omega, np.ascontiguousarray(steady), shift),
             (radii[1] - radii[0]) / width,
+            np.array([uncut_parameters(side.contacts) for side in reversed(sides)]),
         )
         if all(one.law is other.law for one, other in zip(*(side.contacts for side in sides), strict=True)):
             return cls(variation._replace(law_step=0.0), [engine.problem.parameters] * 2, a, b)

@@ -34,7 +34,8 @@ class Friction:
     is drawn, k_t |ξ̇| <= μṄ; else in slip, as laws of exponent above 1 always do. One under way as a run begins is
     undrawn. In a circle of radius c the spring must stay within half a turn, |F_t| < k_t π c; other runs are refused.
     Where a law pulls, N < 0, or is cut, N = 0, the slider is free as in an open contact: it follows without force, and
-    its way is no slip; where N grows again it begins as at an entry.
+    its way is no slip; where N grows again it begins as at an entry. Where N jumps up on a knot of the
+    law a slip ends: F_t stays.
 
     Parameters
     ----------

@@ -76,6 +76,28 @@ def forcing_of(signals: list[Signal], duration: float, rtol: float) -> Forcing:
     )
 
 
+def sampled_values(forcing: Forcing, t: Array) -> dict[int, Array]:
+    """Values (k,) at times (k,) of the loads that have node tables, as the quintics between the nodes have them."""
+    found = {}
+    for j, load in enumerate(forcing.table_load.tolist()):
+        own = forcing.tone_load == load  # of a load whose other tones are sampled
+        tones = forcing.tone_amplitude[own] @ np.exp(1j * np.outer(forcing.tone_omega[own], t))
+        rows = forcing.table[forcing.table_start[j] : forcing.table_start[j + 1]]
+        found[load] = tones.real + _quintics(float(forcing.table_dt[j]), rows, t)
+    return found
+
+
+def _quintics(dt: float, rows: Array, t: Array) -> Array:
+    """Values (k,) of a node table at times (k,)."""
+    cell = np.clip((t / dt).astype(np.int64), 0, len(rows) - 2)
+    x, scale = t / dt - cell, np.array([1.0, dt, dt * dt])
+    a, b = rows[cell] * scale, rows[cell + 1] * scale
+    rest = b - np.stack((a @ [1.0, 1.0, 0.5], a @ [0.0, 1.0, 1.0], a[:, 2]), axis=1)
+    cubic, fourth, fifth = rest @ [10.0, -4.0, 0.5], rest @ [-15.0, 7.0, -1.0], rest @ [6.0, -3.0, 0.5]
+    found: Array = a[:, 0] + x * (a[:, 1] + x * (0.5 * a[:, 2] + x * (cubic + x * (fourth + x * fifth))))
+    return found
+
+
 def _joined(tables: list[Array]) -> Array:
     """All node tables in one array; a single one, which is long, is not copied."""
     if len(tables) == 1:

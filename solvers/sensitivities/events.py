@@ -47,6 +47,7 @@ def cross(flow: Flow, t: float, row: Array, acting: Acting, span: float, last: A
     if flow.slider(s, acting) is not None and row[at.GUARD] >= 0.0:
         shift = np.zeros(flow.columns) if last is None else last
         _renew_slider(flow, t, s, acting, following, shift)
+        flow.y -= np.outer(flow.push[s].T @ _friction_jump(flow, t, s, acting, following), shift)
         return following, shift
     memory = row[at.GUARD] >= 0.0
     rate, acceleration = flow.rates(t, s, acting)
@@ -99,16 +100,19 @@ def _latch_slider(flow: Flow, t: float, s: int, begun: Acting, shift: Array) -> 
 def _renew_slider(flow: Flow, t: float, s: int, acting: Acting, following: Acting, shift: Array) -> None:
     """Derivative of the place of a slider where stick begins, s = ξ - F_t/k_t.
 
-    Where slip ends, the rate of s is zero, so that dt* does not matter, unless Ṅ jumps there, at a knot or an event of
-    another element; then dt* is that of this event. Where N begins to grow from zero, dt* = -dN/Ṅ.
+    Where slip ends, the rate of s is zero, so that dt* does not matter, unless Ṅ jumps there, or N up, at a knot or an
+    event of another element; then dt* is that of this event. Where N begins to grow from zero, dt* = -dN/Ṅ.
     """
     flow.latched[s][:] = 0.0
     slider, before = flow.slider(s, following), flow.slider(s, acting)
     if slider is None or before is None or not slider.sticks:
         return
     if before.free:
-        _, normal_rate, normal_change = flow.at_instant(t, s, acting.changed(s, rows=before.uncut(acting.rows[s])))
-        flow.latched[s][1] = flow.xi_change(t, s) - float(flow.motion_of(t, s).xi_rate[0]) * normal_change / normal_rate
+        pushing = acting.changed(s, rows=before.uncut(acting.rows[s]))
+        push, normal_rate, change = flow.at_instant(t, s, pushing)
+        jumped = push > _LEFT_BEHIND * flow.size_of_force(t, s, pushing)
+        moved = shift if jumped else -change / normal_rate
+        flow.latched[s][1] = flow.xi_change(t, s) + float(flow.motion_of(t, s).xi_rate[0]) * moved
         return
     numbers = slider.numbers
     _, normal_rate, normal_change = flow.at_instant(t, s, acting)
@@ -120,6 +124,19 @@ def _renew_slider(flow: Flow, t: float, s: int, acting: Acting, following: Actin
         one = flow.by.elements[s]
         changed = one.mu / numbers[MU] - one.stiffness / numbers[STIFFNESS]
         flow.latched[s][1, flow.own] -= force / numbers[STIFFNESS] * changed
+
+
+def _friction_jump(flow: Flow, t: float, s: int, acting: Acting, following: Acting) -> Array:
+    """Jumps of the forces (m,) on the rows where a slider begins another segment: none, unless N has jumped down."""
+    motion, normal = flow.motion_of(t, s), flow.force(np.array([t]), s, acting)
+    before, then = (forces_of(motion, flow.slider(s, one), normal)[:, 0] for one in (acting, following))
+    return np.asarray(then - before)
+
+
+def knot_shift(flow: Flow, t: float, row: Array, acting: Acting, span: float) -> Array:
+    """Change dt* (m,) of the time of a knot."""
+    s = int(row[at.ELEMENT])
+    return _at_knot(flow, t, row, acting, (flow.change(t, s)[0], *flow.rates(t, s, acting)), span)
 
 
 def _at_knot(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[Any, ...], span: float) -> Array:

@@ -159,6 +159,19 @@ class Flow:
 
         return self.by.over_laws(s, of)
 
+    def _force_over_laws(self, s: int, acting: Acting, inside: tuple[Array, Array]) -> Array:
+        """Derivatives (k, d) of N by the parameters, through the law's numbers at fixed motion.
+
+        Of a law that is cut at zero force where it is not cut itself: nearby ones are cut a little before or after.
+        """
+        law, rate = self.system.contacts[s].law, acting.entry_rate[s]
+        if getattr(law, "bend", None) != "force":
+            return np.asarray(self.over_laws(s, acting, lambda one, own: laws.force(one, own, inside, rate)))
+        pushes: Any = laws.bend(law, inside, rate)
+        return (
+            np.asarray(self.by.over_laws(s, lambda one: laws.uncut_force(one, inside, rate))) * (pushes > 0.0)[:, None]
+        )
+
     def force_change(self, t: Array, s: int, acting: Acting) -> Linear:
         """Changes of an element's forces at times (k,), by its motion and by everything else."""
         law: Any = self.system.contacts[s].law
@@ -168,7 +181,7 @@ class Flow:
         by_law = np.outer(slopes[2], self.entry[s])
         if len(self.latched[s]) and slider is None:
             by_law += laws.by_latched(law, acting.rows[s], inside, rate).T @ self.latched[s]
-        by_law[:, self.own] += self.over_laws(s, acting, lambda one, own: laws.force(one, own, inside, rate))
+        by_law[:, self.own] += self._force_over_laws(s, acting, inside)
         if circle := self.system.contacts[s].circle:
             by_law[:, self.own] -= np.outer(slopes[0], np.sign(circle) * self.by.elements[s].clearance)
         found = linear(motion, slider, self.force(t, s, acting, motion), slopes[:2], by_law)
@@ -208,6 +221,13 @@ class Flow:
         slopes = laws.slopes(law, acting.rows[s], inside, acting.entry_rate[s])[:2, 0]
         changed = change.normal_other[0] + np.einsum("dak,dac->c", change.normal, moved_rows)
         return float(self.force(times, s, acting)[0]), float(slopes @ self.rates(t, s, acting)), changed
+
+    def size_of_force(self, t: float, s: int, acting: Acting) -> float:
+        """What the terms of N add up to, N."""
+        law: Any = self.system.contacts[s].law
+        inside = self._inside(s, acting, self.motion_of(t, s))
+        slopes = laws.slopes(law, acting.rows[s], inside, acting.entry_rate[s])[:2, 0]
+        return float(sum(abs(slope * np.ravel(part)[0]) for slope, part in zip(slopes, inside, strict=True)))
 
     def fly(self, start: float, end: float, samples: Array) -> Array:
         """Move over a flight that parameters do not drive; derivatives by the parameters at samples, (q, 2n, d)."""

@@ -52,11 +52,25 @@ def by_latched(law: Any, row: Array, motion: tuple[Any, Any], entry_rate: float)
 
 
 def bend(law: Any, motion: tuple[Any, Any], entry_rate: float) -> Array | None:
-    """Event function (k,) of a law's kink that is no knot: the force without its cut, or δ̇; None without one."""
+    """Event function (k,) of a law's kink that is no knot: the force without its cut, or δ̇; None without one.
+
+    Of a sum the product of those of its parts.
+    """
     kind = getattr(law, "bend", None)
     if kind == "rate":
         return np.asarray(motion[1])
-    return force(law.uncut, np.array(law.uncut.parameters), motion, entry_rate) if kind == "force" else None
+    if kind == "force":
+        return uncut_force(law, motion, entry_rate)
+    parts = getattr(law, "parts", ())
+    if any(part.memory for part in parts):
+        return None
+    found = [one for part in parts if (one := bend(part, motion, entry_rate)) is not None]
+    return np.prod(found, axis=0) if found else None
+
+
+def uncut_force(law: Any, motion: tuple[Any, Any], entry_rate: float) -> Array:
+    """Force (k,) of a law that is cut at zero without its cut."""
+    return force(law.uncut, np.array(law.uncut.parameters, dtype=float), motion, entry_rate)
 
 
 def margin(law: Any, row: Array, border: int, delta: float, rate: float, entry_rate: float) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from solvers.problem import Array, ContactLog, Solution, System, dense
 from solvers.problem import event_list as at
 from solvers.problem.friction import tell_sliders
 from solvers.sensitivities.elements import motion_of
-from solvers.sensitivities.events import GRAZING, NoDerivativeError, called, cross
+from solvers.sensitivities.events import GRAZING, NoDerivativeError, called, cross, knot_shift
 from solvers.sensitivities.flow import Flow, begun_numbers, latched_columns
 from solvers.sensitivities.nearby import Change, Nearby, unchanged
 from solvers.sensitivities.panels import Panels, S, coefficients, interpolated, largest, zeros
@@ -293,6 +294,13 @@ class _Contact:
             self.top, self.peak = force, change
 
 
+def _ends_on_knot(row: Array, following: Array | None) -> bool:
+    """Whether a border is met on a knot that is logged next, as where N jumps up and a slip ends."""
+    if following is None or row[at.GUARD] < 0.0 or following[at.GUARD] != at.KNOT:
+        return False
+    return bool(row[at.ELEMENT] == following[at.ELEMENT] and min(following[at.FROM], following[at.TO]) > 0.0)
+
+
 class _Walk:
     """One pass over a run."""
 
@@ -378,9 +386,11 @@ class _Walk:
 
     def _pass_events(self, t: float) -> None:
         """Apply all events at a time."""
-        last, own = None, self.flow.own
-        for row in self.events.get(t, ()):
+        last, own, rows = None, self.flow.own, self.events.get(t, ())
+        for row, following in zip_longest(rows, rows[1:]):
             s = int(row[at.ELEMENT])
+            if _ends_on_knot(row, following):
+                last = knot_shift(self.flow, t, following, self.acting, float(self.asked.span[s]))
             ends, begins = row[at.FROM] > 0.0 and row[at.TO] == 0.0, row[at.FROM] == 0.0 and row[at.TO] > 0.0
             known = self._at_instant(t) if t > 0.0 else {}
             before = self.flow.impulse[s].copy()

@@ -206,6 +206,8 @@ def _crossing_theta(problem, state, space, h, s, j):
     for value in values:
         largest = max(largest, abs(value))
     overshot = state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0 and values[0] > -_MISSED * largest
+    if rubs(problem, s) and values[0] < -max(rounding, _MISSED * largest):  # N has jumped down on a knot
+        return 0.0
     for i in range(1, n):
         if values[i] < -rounding and not (overshot and values[i] > values[i - 1]):
             return _zero_between(known, _NODES[i - 1], _NODES[i]) if inside else _falls_from_zero(known, _NODES[i])

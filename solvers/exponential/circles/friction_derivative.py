@@ -8,9 +8,9 @@ s is latched at entry, ds = dξ + ξ̇ dt*, and where slip ends, at s = ξ - F_t
 
     ds = dξ - dF_t/k_t + (ξ̇ - Ḟ_t/k_t) dt*.
 
-There ṡ = ξ̇ - Ḟ_t/k_t falls to zero, so that dt* does not matter, unless ṡ jumps with Ṅ, at a knot or an event of
-another element; then dt* is that of this event. F_t is continuous at all borders. A parameter adds the change of the
-forces at fixed motion, a difference of the two laws ahead and behind.
+There ṡ = ξ̇ - Ḟ_t/k_t falls to zero, so that dt* does not matter, unless ṡ jumps with Ṅ, or N jumps up, at a knot or an
+event of another element; then dt* is that of this event. F_t is continuous at all borders, unless N has jumped down on
+a knot. A parameter adds the change of the forces at fixed motion, a difference of the two laws ahead and behind.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from __future__ import annotations
 from solvers.compiled.friction import friction_force
 from solvers.compiled.kernels import (
     acceleration_of,
+    add_tangential,
     contact_forces,
     copy,
     dot,
@@ -33,7 +34,15 @@ from solvers.compiled.kernels import (
     slider_of,
     xi_and_rate_at,
 )
-from solvers.compiled.sliding import begin_slider, end_slider, normal_force, renew_slider, slopes_of
+from solvers.compiled.sliding import (
+    begin_slider,
+    begins_beyond_zero,
+    end_slider,
+    normal_force,
+    renew_slider,
+    slider_force,
+    slopes_of,
+)
 from solvers.compiled.state import LAST_EVENT, T
 from solvers.exponential.circles.derivative import change_of, explicit_change, is_parameter, row_change
 from solvers.exponential.circles.friction import (
@@ -136,9 +145,11 @@ def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
     """Cross border j of a slider: renew it, and its derivative ds if it sticks from then on.
 
     Where slip ends, dt* is that of the event which ended it, if one did; where N begins to grow, ds = dξ + ξ̇ dt* with
-    dt* = -dN/Ṅ.
+    dt* = -dN/Ṅ, unless it has jumped there. So has F_t where N has jumped below its limit.
     """
     t, slider, entry = past.now[T], slider_of(problem, s), past.entry_rate[s]
+    jumped = begins_beyond_zero(problem, s, entry, past.segment[s], past.x)
+    friction_jump = -slider_force(problem, s, past.segment[s], entry, t, past.x)
     rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
     code_before, share, by_law = (
         slider[CODE],
@@ -152,6 +163,7 @@ def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
     normal_rate, xi_rate = by_delta * rate + by_rate * acceleration, xi_and_rate_at(problem, s, t, past.x)[1]
     out = derivatives.batch[5:8]
     renew_slider(problem, s, j, entry, past.segment[s], t, past.x, derivatives.rate[0], out)
+    friction_jump += slider_force(problem, s, past.segment[s], entry, t, past.x)
     for c in range(derivatives.y.shape[0]):
         normal_change = by_delta * change_of(problem, variation, derivatives, past.x, c, s, 0, t)
         normal_change += by_rate * change_of(problem, variation, derivatives, past.x, c, s, 1, t)
@@ -159,10 +171,12 @@ def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
         change = xi_change(problem, variation, derivatives, past.x, c, s, t) - share * normal_change
         if is_parameter(variation, derivatives, c):
             normal_change, change = normal_change + by_law[0], change + by_law[1]
-        if code_before == FREE:
+        shift = derivatives.shift[c, problem.law.size] if past.now[LAST_EVENT] == t else 0.0
+        if code_before == FREE and not jumped:
             change -= xi_rate * normal_change / normal_rate if normal_rate != 0.0 else 0.0
-        elif past.now[LAST_EVENT] == t:
-            change += (xi_rate - share * normal_rate) * derivatives.shift[c, problem.law.size]
+        else:
+            change += (xi_rate - share * normal_rate) * shift
+            add_tangential(problem, s, -friction_jump * shift, past.x, derivatives.y[c])
         derivatives.latched[c, _latched_place(problem, s)] = change if slider[CODE] == 0.0 else 0.0
     _copy_slider(problem, ahead, behind, variation, s)
 
@@ -178,6 +192,17 @@ def store_row_directions(problem, scratch, s):
             scratch.node_directions[6 * s + 2 * a, i], scratch.node_directions[6 * s + 2 * a + 1, i] = by_delta, by_xi
 
 
+@inlined
+def _friction_of_side(radius, slider, xi, normal):
+    """F_t at another value of the parameter; in slip in proportion to N also where N < 0, beyond the end of the slip.
+
+    Where N falls to zero one of both values is there, and half of the difference would be lost.
+    """
+    if slider[CODE] == 0.0:
+        return friction_force(radius, slider, xi, normal)
+    return friction_by_normal(slider) * normal
+
+
 @inner
 def _forces_of_side(side, past, scratch, s, place, normals, frictions):
     """N and F_t at the nodes by the laws of one ``side`` of the parameter, for the motion found."""
@@ -186,7 +211,7 @@ def _forces_of_side(side, past, scratch, s, place, normals, frictions):
     contact_forces(side, s, scratch.clipped, motion[1], past.entry_rate[s], normals)
     xi_and_rate_at_nodes(side, scratch, s)
     for i in range(S):
-        frictions[i] = friction_force(radius, slider, slid[NODE_XI, i], normals[i])
+        frictions[i] = _friction_of_side(radius, slider, slid[NODE_XI, i], normals[i])
 
 
 @inner
@@ -248,6 +273,13 @@ def rubbing_residual(problem, tables, scratch, derivatives, variation, node_set,
 
 
 @inner
+def _friction_in_state(side, s, t, w, normal):
+    """F_t at another value of the parameter, in the state w of a landing."""
+    xi = xi_and_rate_at(side, s, t, w)[0]
+    return _friction_of_side(radius_of(side, s), slider_of(side, s), xi, normal)
+
+
+@inner
 def _forces_in_state(problem, s, entry_rate, t, w, delta, rate, batch):
     """N and F_t in the state w of a landing, where δ and δ̇ are given."""
     normal = force_at(problem, s, delta, rate, entry_rate, batch)
@@ -260,21 +292,17 @@ def _forces_in_state(problem, s, entry_rate, t, w, delta, rate, batch):
 def add_rubbing_change(problem, ahead, behind, derivatives, variation, s, entry_rate, w, t, delta, factor, out):
     """Add the changes of an element's forces, in the state w of a landing, to the rates of all columns.
 
-    The slopes of the law are in ``derivatives.batch[2:5]``.
+    The slopes of the law are in ``derivatives.batch[2:5]``, N ahead and behind in the next two.
     """
     first, m, size, batch = row_of(problem, s), count_of(problem, s), 2 * problem.k.size, derivatives.batch
     by_delta, by_rate, by_entry, rate = batch[2], batch[3], batch[4], indentation_rate(problem, s, w)
     motion, slopes, slider = derivatives.at_rows, derivatives.turned, slider_of(problem, s)
     normal_by_parameter, friction_by_parameter = 0.0, 0.0
     if variation.law_step > 0.0:
-        normal_by_parameter, friction_by_parameter = _forces_in_state(
-            ahead, s, entry_rate, t, w, delta, rate, batch[5:8]
-        )
-        press, rub = _forces_in_state(behind, s, entry_rate, t, w, delta, rate, batch[5:8])
-        normal_by_parameter, friction_by_parameter = (
-            (normal_by_parameter - press) / (2.0 * variation.law_step),
-            (friction_by_parameter - rub) / (2.0 * variation.law_step),
-        )
+        width = 2.0 * variation.law_step
+        normal_by_parameter = (batch[5] - batch[6]) / width
+        friction_by_parameter = _friction_in_state(ahead, s, t, w, batch[5]) / width
+        friction_by_parameter -= _friction_in_state(behind, s, t, w, batch[6]) / width
     normal, tangential = _forces_in_state(problem, s, entry_rate, t, w, delta, rate, batch[5:8])
     for a in range(m):
         motion[a, 0, 0] = dot(problem.read[first + a], w, size) - problem.gap[first + a]
