@@ -251,6 +251,21 @@ def _stops(frame: Frame, places: Sequence[Any]) -> list[Vector]:
     return [np.array(sorted(one)) for one in wanted]
 
 
+def spaced(frame: Frame, places: Sequence[Any], apart: float) -> list[Any]:
+    """Those of some places that are so far, in lengths of their members, from the ends and from those before them."""
+    known = {index: [0.0, float(length)] for index, length in enumerate(frame.lengths)}
+    kept = []
+    for place in places:
+        site = frame.site(place, "places of Frame.assembled")
+        if not isinstance(site, str):
+            index, s = site
+            if min(abs(s - other) for other in known[index]) <= apart * frame.lengths[index]:
+                continue
+            known[index].append(s)
+        kept.append(place)
+    return kept
+
+
 def _waves(frame: Frame, omega: float) -> Iterator[float]:
     """The largest wavenumber γ (1/m) of every member at omega."""
     for one, length in zip(frame.members, frame.lengths, strict=True):
