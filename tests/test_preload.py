@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fembeam as fb
+from contacts import KelvinVoigt
 
 UNIT = fb.Section(E=1.0, rho=1.0, A=1.0, I=1.0)
 CLAMPED = [fb.Clamped(0.0)]
@@ -166,6 +167,28 @@ def test_cantilever_under_a_dead_axial_load(force):
     beam = fb.Beam(1.0, UNIT, axial_force=force)
     for omega in omegas(fb.Scene(beam, CLAMPED), 3):
         assert exact_near(omega, beam) == pytest.approx(omega, rel=1e-6)
+
+
+@pytest.mark.parametrize("apart", [1.5e-4, 1e-3, 5e-3])
+@pytest.mark.parametrize("frame", [False, True])
+def test_stops_close_together_under_compression(apart, frame):
+    """Rounding of short elements made the first frequency 0, or the static shapes were refused."""
+    law, beam = KelvinVoigt(1e3, 0.1), fb.Beam(1.0, UNIT, axial_force=-1.0)
+    places = (0.77, 0.77 + apart)
+    if frame:
+        stiff = fb.Section(E=1.0, rho=1e-4, A=1e4, I=1.0)  # along itself
+        column = fb.Frame({"A": (0, 0), "B": (1, 0)}, [fb.Member("A", "B", stiff, axial_force=-1.0)])
+        stops = [fb.Stop(("A-B", s), law, 1.0, direction="-y") for s in places]
+        scene = fb.Scene(column, [fb.Clamped("A")], stops=stops)
+    else:
+        scene = fb.Scene(beam, CLAMPED, stops=[fb.Stop(z, law, 1.0) for z in places])
+    model = scene.reduce(2, residual=True)
+    for omega in scene.reduce(1).omega:
+        assert exact_near(omega, beam) == pytest.approx(omega, rel=1e-6)
+    first = model.directions[0]
+    a, b = places[0], places[0] - 1.0  # u = A (1 - cos z) - (z - sin z) to the load at a, then C + D sin(z - 1)
+    A, _ = np.linalg.solve([[math.cos(a), math.sin(b)], [math.sin(a), -math.cos(b)]], [math.sin(a), 1 - math.cos(a)])
+    assert first**2 @ (1 / model.omega**2) == pytest.approx(A * (1 - math.cos(a)) - a + math.sin(a), rel=1e-6)
 
 
 def test_a_buckled_beam_is_refused():

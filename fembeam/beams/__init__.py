@@ -21,6 +21,7 @@ from fembeam.beams.mesh import (
     FREQUENCY_TOLERANCE,
     SAME_PLACE,
     SHORTEST,
+    SHORTEST_PRESSED,
     WAVE_STEP,
     divided,
     on_beam,

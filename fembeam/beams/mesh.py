@@ -24,6 +24,7 @@ ERROR_CONSTANT = 1 / 1440  # relative error of omega of a cubic Hermite mesh: (b
 WAVE_STEP = (0.65 * FREQUENCY_TOLERANCE / ERROR_CONSTANT) ** 0.25  # beta h = 0.175, a third below the promise
 SAME_PLACE = 1e-9  # of the length: features closer than this share a node
 SHORTEST = 1e-4  # of the length: rounding of K grows like (length/h)³, 2e-4 of the first omega² here
+SHORTEST_PRESSED = 4e-3  # the same under compression, where K has no root that keeps rounding away from frequencies
 INSIDE = np.array([1e-9, 0.5, 1 - 1e-9])  # where a tapered interval is sampled
 
 

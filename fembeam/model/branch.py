@@ -18,14 +18,15 @@ from fembeam.model.equations import load_period
 from fembeam.model.orbit import Orbit, checked_period, orbit
 from fembeam.scene import changes_structure, path_of, replaced, value_of
 from fembeam.support import Part, Printed, counting, note, require, write_rows, written_whole
-from solvers.branches import restarted
+from solvers.branches import recorded, restarted
 from solvers.problem import counted, dataframe
 
 if TYPE_CHECKING:
     from fembeam.model.model import Model
 
 Vector = NDArray[np.float64]
-RECORDED = {"name", "period", "scene", "modes", "span", "step", "status", "walks"}  # of a saved branch
+RECORDED = {"name", "period", "scene", "modes", "omega", "walks"}  # of a saved branch
+SAME = 1e-9  # relative: frequencies of one model, made again
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,18 +169,11 @@ class Branch(Printed):
         return [head, (("", self.family.name, "stable"), rows), self.status]
 
     def save(self, path: str | Path) -> None:
-        """Write all that is known as .npz, enough to go on from; written whole or not at all."""
-        walks = []
-        for walk in self.found.walks:
-            walks.append([
-                {"parameter": one.parameter, "state": one.whole.tolist(), "phase": one.phase, "mark": one.mark,
-                 "residual": one.residual, "iterations": one.iterations}
-                for one in walk.orbits
-            ])  # fmt: skip
+        """Write all that is known as .npz, enough to go on as if it had not been saved; whole or not at all."""
+        model = self.family.model
         record = {
-            **{"name": self.family.name, "period": self.family.period, "scene": repr(self.family.model.scene)},
-            **{"modes": list(self.family.model.modes), "span": self.found.walks[0].span},
-            **{"step": self.found.walks[0].largest, "status": [s.name for s in self.found.status], "walks": walks},
+            **{"name": self.family.name, "period": self.family.period, "scene": repr(model.scene)},
+            **{"modes": list(model.modes), "omega": model.omega.tolist(), "walks": recorded(self.found)},
         }
         with written_whole(Path(path)) as file:
             np.savez_compressed(file, branch=np.array(json.dumps(record)))
@@ -210,10 +204,12 @@ def resumed(model: Model, path: str | Path) -> Branch:
     """A saved branch of this model, to be continued."""
     record = _record_of(path)
     same = record["scene"] == repr(model.scene) and tuple(record["modes"]) == tuple(model.modes)
-    require(same, f"{path} belongs to another scene or other modes", record["modes"], "Model.resume",
+    omega = np.array(record["omega"])
+    same = same and omega.shape == model.omega.shape and bool(np.allclose(omega, model.omega, rtol=SAME, atol=0.0))
+    require(same, f"{path} belongs to another scene, other modes or another mesh", record["modes"], "Model.resume",
             f"use the model of {record['scene']}")  # fmt: skip
     family = Family(model, record["name"], record["period"])
-    return Branch(family, restarted(family, tuple(record["span"]), record["walks"], record["status"], record["step"]))
+    return Branch(family, restarted(family, record["walks"]))
 
 
 def _record_of(path: str | Path) -> dict[str, Any]:

@@ -192,8 +192,8 @@ class Histories:
         """All section forces (k,) at a place on a member of a frame, such as ("A-B", 0.4), by name.
 
         N in N (tension, the given axial force included); Q in N and M in N m of bending along `up` of the member, M
-        positive where it stretches the lower fibre, Q = M'; Q2 and M2 of bending across; T in N m. In the plane N, Q
-        and M. At a point load those of the side ahead. Accuracy: see `moment`.
+        positive where it stretches the lower fibre, Q = M' but for rotary inertia; Q2 and M2 of bending across; T in
+        N m. In the plane N, Q and M. At a point load those of the side ahead. Accuracy: see `moment`.
         """
         place = self._beam(body).place(place)
         forces = frame_forces_of(self, body)

@@ -166,8 +166,8 @@ class Scene:
         modes :
             How many modes will be kept; None: 10. With `elements` it is only checked against the dofs.
         probes :
-            Further coordinates that shall be nodes. (A feature or probe closer than 1e-4 of the length to
-            another one is interpolated inside its element instead, for rounding.)
+            Further coordinates that shall be nodes. (A feature or probe closer than 1e-4 of the length, under
+            compression 4e-3, to another one is interpolated inside its element instead, for rounding.)
 
         Returns
         -------

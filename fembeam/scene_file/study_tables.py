@@ -421,10 +421,12 @@ class BranchTable:
     def _check(self, branch: Branch, model: Model, path: Path) -> None:
         """A saved branch answers this table."""
         walk = branch.found.walks[0]
-        theirs = branch.family.name, branch.family.period, *map(float, walk.span), walk.largest
-        mine = path_of(model.scene, self.parameter), self.period, *map(float, self.span), self.step
+        begun = walk.first.chain.parameter
+        theirs = branch.family.name, branch.family.period, *map(float, walk.span), walk.largest, begun
+        at = begun if self.at is None else float(self.at)
+        mine = path_of(model.scene, self.parameter), self.period, *map(float, self.span), self.step, at
         require(theirs == mine, f"{path} belongs to another branch", theirs, "[branch]",
-                f"parameter, period, span, step are {mine} here; choose another folder or delete it")  # fmt: skip
+                f"parameter, period, span, step, at are {mine} here; choose another folder or delete it")  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,12 @@ The forces at both ends of every element,
 
 balance its stiffness against its inertia a (ω² φ for a mode), so that they are as accurate as the frequencies and
 exact for static shapes. Between the ends M, Q and all others run as cubics with the right values and slopes:
-M' = Q, N' = -ρA a along the member, T' = -ρ (I + I2) a about it.
+M' = Q - ρI a' (the last where sections have rotary inertia, a' of their rotation), N' = -ρA a along the member,
+T' = -ρ (I + I2) a about it.
 
 Signs, seen along the member with `up` upwards, are those of a straight beam: N tension; M = E (I v'' + I12 w'') with
 the deflection v along `up`, which stretches the lower fibre, and Q = M'; M2 = E (I2 w'' + I12 v'') with w `across`,
-Q2 = M2'; T = GJ θ'.
+Q2 = M2'; T = GJ θ'. With rotary inertia Q and Q2 are the forces across, not M' and M2'.
 """
 
 from __future__ import annotations
@@ -144,8 +145,10 @@ def frame_forces(made: FrameMatrices, vectors: Vector, inertia: Vector, stresses
         turning, sign, suffix = (ACROSS, -1.0, "") if plane == UP else (UP, 1.0, "2")  # v' = -φ, w' = ψ
         moment, tension = side * sign * along(turn, turning), p["N"][:, None, None]
         shear = -side * along(push, plane) + tension * _slopes(elements, plane, u)
-        ends["M" + suffix], slopes["M" + suffix] = moment, shear
-        ends["Q" + suffix], slopes["Q" + suffix] = shear, _bend(moment, shear, elements.h[:, None])
+        turned, bent = (p["turning" + suffix][:, None, None] * one for one in _turns(elements, plane, a))
+        rise = shear - turned
+        ends["M" + suffix], slopes["M" + suffix] = moment, rise
+        ends["Q" + suffix], slopes["Q" + suffix] = shear, _bend(moment, rise, elements.h[:, None]) + bent
     if elements.twists:
         ends["T"], slopes["T"] = side * along(turn, ALONG), -p["rho_Ip"][:, None, None] * along(tilt, ALONG)
     order = [name for name in FORCES if name in ends]
@@ -162,6 +165,13 @@ def _slopes(elements: Elements, plane: int, u: Vector) -> Vector:
     """(e, 2, n): v' or w' at both ends."""
     every = np.arange(elements.count)
     return np.stack([elements.bending(every, np.full(len(every), x), plane, 1) @ u for x in (0.0, 1.0)], axis=1)
+
+
+def _turns(elements: Elements, plane: int, u: Vector) -> tuple[Vector, Vector]:
+    """(e, 2, n) twice: the section's rotation at both ends, and its derivative along the member."""
+    every, ends = np.arange(elements.count), (0.0, 1.0)
+    found = [[elements.turning(every, np.full(len(every), x), plane, d) @ u for x in ends] for d in (0, 1)]
+    return np.stack(found[0], axis=1), np.stack(found[1], axis=1)
 
 
 def _bend(value: Vector, slope: Vector, h: Vector) -> Vector:

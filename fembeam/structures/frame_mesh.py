@@ -20,6 +20,7 @@ from fembeam.beams import (
     FREQUENCY_TOLERANCE,
     SAME_PLACE,
     SHORTEST,
+    SHORTEST_PRESSED,
     WAVE_STEP,
     Section,
     divided,
@@ -240,13 +241,29 @@ def assemble(
 def _stops(frame: Frame, places: Sequence[Any]) -> list[Vector]:
     """For every member the distances that must be nodes, ends included, ascending."""
     wanted: list[list[float]] = [[0.0, float(length)] for length in frame.lengths]
+    shortest = SHORTEST_PRESSED if any(one.axial_force < 0 for one in frame.members) else SHORTEST
     for place in places:
         site = frame.site(place, "places of Frame.assembled")
         if not isinstance(site, str):
             known, s = wanted[site[0]], site[1]
-            if min(abs(s - other) for other in known) > SHORTEST * frame.lengths[site[0]]:
+            if min(abs(s - other) for other in known) > shortest * frame.lengths[site[0]]:
                 known.append(s)
     return [np.array(sorted(one)) for one in wanted]
+
+
+def spaced(frame: Frame, places: Sequence[Any], apart: float) -> list[Any]:
+    """Those of some places that are so far, in lengths of their members, from the ends and from those before them."""
+    known = {index: [0.0, float(length)] for index, length in enumerate(frame.lengths)}
+    kept = []
+    for place in places:
+        site = frame.site(place, "places of Frame.assembled")
+        if not isinstance(site, str):
+            index, s = site
+            if min(abs(s - other) for other in known[index]) <= apart * frame.lengths[index]:
+                continue
+            known[index].append(s)
+        kept.append(place)
+    return kept
 
 
 def _waves(frame: Frame, omega: float) -> Iterator[float]:

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from fembeam.beams import SHORTEST_PRESSED
 from fembeam.structures.assembled import COMPONENTS, Assembled
 from fembeam.structures.directions import nearest
+from fembeam.structures.frame import Frame
 from fembeam.structures.frame_forces import FrameForces
-from fembeam.structures.frame_mesh import FrameMatrices
+from fembeam.structures.frame_mesh import FrameMatrices, spaced
 from fembeam.structures.joints import Joint, joined_fields, joining, shared_dofs, translations_of
 from fembeam.support import is_numbered, require
 
@@ -241,7 +243,11 @@ class JoinedBodies:
         """Places by their bodies, those of joints too."""
         located = [self.located(place, "places") for place in places]
         located += [end for joint in self.joints for end in ((joint.body, joint.place), joint.to)]
-        return [[place for number, place in located if number == own] for own in range(len(self.bodies))]
+        each = [[place for number, place in located if number == own] for own in range(len(self.bodies))]
+        if not any(_rootless(body) for body in self.bodies):
+            return each
+        pairs = zip(self.bodies, each, strict=True)  # K of all bodies has no root then, and short elements lose digits
+        return [spaced(one, own, SHORTEST_PRESSED) if isinstance(one, Frame) else own for one, own in pairs]
 
     def joined(self, made: Sequence[Assembled]) -> JoinedMatrices:
         """The matrices of all bodies from those of each; a place is (number of the body, its place)."""
@@ -386,6 +392,12 @@ def has_place(body: Any, place: Any) -> bool:
     except (ValueError, TypeError):
         return False
     return True
+
+
+def _rootless(body: Any) -> bool:
+    """Whether no R with RᵀR = K comes with a body: of pressed frames, and of structures by their matrices."""
+    pressed = any(one.axial_force < 0 for one in getattr(body, "members", ()))
+    return pressed or (hasattr(body, "root") and body.root is None)
 
 
 def _node(body: Any, place: Any) -> Any:

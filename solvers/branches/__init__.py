@@ -8,7 +8,7 @@ over a second parameter. Imports: `orbits` and what that may. Begin with `contin
 """
 
 from solvers.branches.folds import FoldCurve, fold_curve
-from solvers.branches.restart import restarted
+from solvers.branches.restart import recorded, restarted
 from solvers.branches.walk import BranchStatus
 
-__all__ = ["BranchStatus", "FoldCurve", "fold_curve", "restarted"]
+__all__ = ["BranchStatus", "FoldCurve", "fold_curve", "recorded", "restarted"]

@@ -1,64 +1,112 @@
-"""A branch restored from records of its orbits, to be continued."""
+"""A branch as plain numbers, all that its next steps need; and restored from them, to be continued.
+
+Shots are integrated again from their states, which gives the same bits: a branch goes on as if it had not been saved.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from solvers.branches.continuation import Branch
-from solvers.branches.point import Point, metric_of, point_of
+from solvers.branches.point import Point
 from solvers.branches.walk import BranchStatus, Walk
-from solvers.orbits import PeriodicProblem, checked, newton
+from solvers.exponential.method import Exponential
+from solvers.orbits import Orbit, PeriodicProblem, orbit_of
 from solvers.problem import System
 
+Make = Callable[[float], tuple[System, float]]
 
-def restarted(
-    make_system: Callable[[float], tuple[System, float]],
-    span: tuple[float, float],
-    walks: list[list[dict[str, Any]]],
-    status: list[str],
-    step: float,
-) -> Branch:
-    """A branch restored from records of its orbits per direction.
 
-    A record has parameter, state (as `Orbit.whole`), phase, mark, iterations.
+def recorded(branch: Branch) -> list[dict[str, Any]]:
+    """Every direction as numbers, lists and text: its orbits, the points passed, where it is and its step size.
+
+    ValueError for a branch by another method than `Exponential`.
     """
-    upwards = [walks[0][0]["parameter"] < span[1], False]  # of one direction alone only one has room
-    return Branch(
-        [
-            _restarted_walk(make_system, span, records, BranchStatus[name], step, up)
-            for records, name, up in zip(walks, status, upwards, strict=False)
-        ]
-    )
+    method = branch.walks[0].first.problem.method
+    if type(method) is not Exponential:
+        raise ValueError(f"a branch to be saved must be by Exponential, got {method!r}; run it to its end at once")
+    return [_recorded(walk) for walk in branch.walks]
 
 
-def _restarted_walk(
-    make: Any, span: tuple[float, float], records: list[dict[str, Any]], status: BranchStatus, step: float, up: bool
-) -> Walk:
-    """One direction, up or down from its first orbit; orbits are integrated again, their states are not changed."""
-    points: list[Point] = []
-    system, period = make(records[0]["parameter"])
-    method, width = checked(system, period, None, 1), span[1] - span[0]
-    for record in records:
-        _, period = make(record["parameter"])
-        x = np.array([record["state"]])
-        problem = PeriodicProblem(make, method, (record["phase"] / period,), 1e-6 * width)
-        chain, error, _ = newton(problem, x, record["parameter"], slope=True)
-        metric = points[0].metric if points else metric_of(problem, chain, width)
-        moved = np.append(np.zeros(x.size), 1.0 if up else -1.0)
-        if points:
-            moved = np.append(x.ravel(), record["parameter"]) - points[-1].unknowns
-            moved[:-1] *= problem.fractions == points[-1].problem.fractions
-        point = point_of(problem, chain, error, record["iterations"], metric, moved)
-        points.append(replace(point, orbit=replace(point.orbit, mark=record["mark"])))
-    first = points[0]
-    if len(points) > 1:  # the first tangent points to the second orbit
-        ahead = first.tangent @ first.metric @ (points[1].unknowns - first.unknowns)
-        first = replace(first, tangent=first.tangent * np.sign(ahead))
-    walk = Walk(first, span, step)
-    walk.point, walk.orbits, walk.status = points[-1], [point.orbit for point in points], status
-    walk.passed, walk.values = [first, *points[1:]], [point.chain.parameter for point in points]
+def _recorded(walk: Walk) -> dict[str, Any]:
+    """One direction."""
+    last = None if walk.before is None else walk.before[0]
+    points = list(dict.fromkeys([*walk.passed, walk.first, walk.point, *([] if last is None else [last])]))
+    problems = list(dict.fromkeys(point.problem for point in points))
+    metrics = {id(point.metric): point.metric for point in points}
+    numbers = {id(orbit): number for number, orbit in enumerate(walk.orbits)}
+    return {
+        **{"span": list(walk.span), "largest": walk.largest, "step": walk.step, "status": walk.status.name},
+        **{"hop": walk.hop, "at_jump": walk.at_jump, "method": asdict(walk.first.problem.method)},
+        "problems": [{"fractions": list(one.fractions), "step": one.step} for one in problems],
+        "metrics": [metric.tolist() for metric in metrics.values()],
+        "points": [
+            {
+                **{"problem": problems.index(point.problem), "metric": list(metrics).index(id(point.metric))},
+                **{"tangent": point.tangent.tolist(), "x": point.chain.x.tolist()},
+                "listed": numbers.get(id(point.orbit)),
+                **_of_orbit(point.orbit),
+            }
+            for point in points
+        ],
+        "orbits": [_of_orbit(orbit) | {"shots": _shots_of(orbit)} for orbit in walk.orbits],
+        "passed": [points.index(point) for point in walk.passed],
+        **{"first": points.index(walk.first), "point": points.index(walk.point)},
+        "before": None if walk.before is None else [points.index(walk.before[0]), walk.before[1]],
+    }
+
+
+def _of_orbit(orbit: Orbit) -> dict[str, Any]:
+    """What integration does not give again."""
+    names = "parameter", "residual", "iterations", "mark"
+    return {name: getattr(orbit, name) for name in names}
+
+
+def _shots_of(orbit: Orbit) -> dict[str, Any]:
+    """When its shots began, and their states."""
+    assert orbit.shots is not None
+    return {"fractions": list(orbit.shots[0]), "x": orbit.shots[1].tolist()}
+
+
+def restarted(make_system: Make, walks: list[dict[str, Any]]) -> Branch:
+    """A branch restored from what `recorded` made of it."""
+    return Branch([_restarted(make_system, record) for record in walks])
+
+
+def _restarted(make: Make, record: dict[str, Any]) -> Walk:
+    """One direction; its shots are integrated again, their states are not changed."""
+    method = Exponential(**record["method"])
+    problems = [PeriodicProblem(make, method, tuple(one["fractions"]), one["step"]) for one in record["problems"]]
+    metrics = [np.array(metric) for metric in record["metrics"]]
+    points = [_point(one, problems[one["problem"]], metrics[one["metric"]]) for one in record["points"]]
+    known = {one["listed"]: point.orbit for one, point in zip(record["points"], points, strict=True)}
+    orbits = [known.get(i) or _orbit(one, make, method) for i, one in enumerate(record["orbits"])]
+    walk = Walk(points[record["first"]], tuple(record["span"]), record["largest"])
+    walk.point, walk.orbits, walk.status = points[record["point"]], orbits, BranchStatus[record["status"]]
+    walk.step, walk.hop, walk.at_jump = record["step"], record["hop"], record["at_jump"]
+    walk.passed = [points[i] for i in record["passed"]]
+    walk.values = [point.chain.parameter for point in walk.passed]
+    walk.before = None if record["before"] is None else (points[record["before"][0]], record["before"][1])
     return walk
+
+
+def _point(record: dict[str, Any], problem: PeriodicProblem, metric: Any) -> Point:
+    """A point passed."""
+    chain = problem.evaluate(np.array(record["x"]), record["parameter"])
+    return Point(_named(record, problem, chain), problem, chain, np.array(record["tangent"]), metric)
+
+
+def _orbit(record: dict[str, Any], make: Make, method: Exponential) -> Orbit:
+    """An orbit between two points."""
+    problem = PeriodicProblem(make, method, tuple(record["shots"]["fractions"]))
+    return _named(record, problem, problem.evaluate(np.array(record["shots"]["x"]), record["parameter"]))
+
+
+def _named(record: dict[str, Any], problem: PeriodicProblem, chain: Any) -> Orbit:
+    """The orbit of a chain, with its mark."""
+    known = {name: record[name] for name in ("parameter", "mark")}
+    return orbit_of(problem, chain, record["residual"], record["iterations"], **known)

@@ -46,6 +46,7 @@ class Orbit:
     system, method : of what, and how it was integrated.
     doubt : why `stable` may be wrong; empty when no reason was found.
     parameter : value of the branch's parameter, NaN outside a branch.
+    shots : when the runs began that it was made of, in periods, and their states (m, 2n + l); None where unknown.
     mark : "fold", "flip", "neimark-sacker", "branch point", "grazing", "stick", "floor" or "merging" at special points
         of a branch, else empty. Two orbits marked "merging" follow each other where a branch jumps because two contacts
         become one. At a "grazing" or "floor" (an entry rate meets its law's floor) multipliers jump, and the branch may
@@ -75,6 +76,7 @@ class Orbit:
     memory: tuple[Array, ...] = ()
     family: tuple[tuple[int, int], ...] = ()
     transitions: Transitions = field(default_factory=lambda: Transitions.of_events(NO_EVENTS, ()))
+    shots: tuple[tuple[float, ...], Array] | None = None
 
     def __repr__(self) -> str:
         kind = "stable" if self.stable else "unstable"
@@ -167,6 +169,7 @@ def orbit_of(problem: PeriodicProblem, chain: Chain, residual: float, iterations
     return Orbit(
         *(state, period, phase, matrix, residual, iterations),
         *(ContactLog.of_period(logs, starts, period), system, problem.method),
+        shots=(problem.fractions, chain.x),
         **more,
     )
 
