@@ -192,17 +192,6 @@ def store_row_directions(problem, scratch, s):
             scratch.node_directions[6 * s + 2 * a, i], scratch.node_directions[6 * s + 2 * a + 1, i] = by_delta, by_xi
 
 
-@inlined
-def _friction_of_side(radius, slider, xi, normal):
-    """F_t at another value of the parameter; in slip in proportion to N also where N < 0, beyond the end of the slip.
-
-    Where N falls to zero one of both values is there, and half of the difference would be lost.
-    """
-    if slider[CODE] == 0.0:
-        return friction_force(radius, slider, xi, normal)
-    return friction_by_normal(slider) * normal
-
-
 @inner
 def _forces_of_side(side, past, scratch, s, place, normals, frictions):
     """N and F_t at the nodes by the laws of one ``side`` of the parameter, for the motion found."""
@@ -211,7 +200,7 @@ def _forces_of_side(side, past, scratch, s, place, normals, frictions):
     contact_forces(side, s, scratch.clipped, motion[1], past.entry_rate[s], normals)
     xi_and_rate_at_nodes(side, scratch, s)
     for i in range(S):
-        frictions[i] = _friction_of_side(radius, slider, slid[NODE_XI, i], normals[i])
+        frictions[i] = friction_force(radius, slider, slid[NODE_XI, i], normals[i])
 
 
 @inner
@@ -275,8 +264,7 @@ def rubbing_residual(problem, tables, scratch, derivatives, variation, node_set,
 @inner
 def _friction_in_state(side, s, t, w, normal):
     """F_t at another value of the parameter, in the state w of a landing."""
-    xi = xi_and_rate_at(side, s, t, w)[0]
-    return _friction_of_side(radius_of(side, s), slider_of(side, s), xi, normal)
+    return friction_force(radius_of(side, s), slider_of(side, s), xi_and_rate_at(side, s, t, w)[0], normal)
 
 
 @inner
