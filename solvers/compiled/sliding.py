@@ -164,7 +164,8 @@ def slider_force(problem, s, segment, entry_rate, t, x):
     radius, slider, rows = radius_of(problem, s), slider_of(problem, s), rows_at(problem, s, x)
     u, _, w, _, turned, _ = rows
     xi = xi_of(radius, slider, t, u, w, turned) if slider[CODE] == 0.0 else 0.0
-    return friction_force(radius, slider, xi, normal_force(problem, s, segment, entry_rate, *delta_of(radius, rows)))
+    normal = normal_force(problem, s, segment, entry_rate, *delta_of(radius, rows))
+    return friction_force(radius, slider, xi, normal if slider[CODE] == 0.0 else max(normal, 0.0))
 
 
 @inner
