@@ -197,6 +197,17 @@ def test_cells_balance_without_tables(monkeypatch, stops):
         np.testing.assert_allclose(getattr(by_series, name), known, atol=1e-6 * np.abs(known).max())
 
 
+@pytest.mark.parametrize("seed", [1, 4, 10])
+def test_a_dashpot_across_modes_of_one_frequency_balances(seed):
+    """One of two equal modes is not damped: the rounding of what damping reads of it, 1e-15, is not magnified."""
+    X, damping = np.random.default_rng(seed).standard_normal((4, 4)), np.zeros((4, 4))
+    damping[:2, :2], damping[2:, 2:] = np.outer([0.22, -0.66], [0.22, -0.66]), [[125.0, 34.0], [34.0, 28.0]]
+    system = System(X.T @ X, X.T @ damping @ X, X.T @ np.diag([5.29e3, 5.29e3, 5.18e5, 5.18e5]) @ X)
+    start = np.linalg.solve(X, [1e-3, 2e-3, -1e-3, 5e-4])
+    energy = integrate(system, start, np.zeros(4), 0.02, 1e-3, Exponential(1e-10), check=False).energy
+    assert np.abs(energy.residual).max() < 1e-12 * energy.damping[-1]
+
+
 @pytest.mark.parametrize("dashpot", [0.0, 4.0])
 def test_parts_of_cells_of_a_rough_signal_balance(dashpot):
     """Flights that begin and end within a cell: the power of a quintic there is of the eleventh power of the time."""
