@@ -53,6 +53,16 @@ def test_refused(tmp_path):
         fb.Frame.from_mesh(tmp_path / "none.msh", FLAT)
 
 
+@pytest.mark.parametrize("more", [[1, 2], [2, 1], [0, 2]])
+def test_lines_that_lie_on_each_other_are_refused(tmp_path, more):
+    """A line in two groups with sections comes twice from gmsh: it counted twice, 1.4 times the frequency."""
+    points = np.array([[0.0, 0, 0], [0.3, 0, 0], [0.6, 0, 0], [0.6, 0.5, 0]])
+    lines, groups = np.array([[0, 1], [1, 2], [2, 3], more]), {"section": [np.array([1, 1, 1, 2])]}
+    meshio.Mesh(points, [("line", lines)], cell_data=groups).write(tmp_path / "twice.vtu")
+    with pytest.raises(ValueError, match=r"lines must not lie on each other, got \(0.\d, 0.0, 0.0\) in"):
+        fb.Frame.from_mesh(tmp_path / "twice.vtu", {1: FLAT, 2: FLAT})
+
+
 def shuffled_shaft(path, seed, both_ways=True):
     """A straight shaft of three groups, its nodes, its lines and their ways in any order."""
     rng, z = np.random.default_rng(seed), np.linspace(0.0, 1.0, 11)

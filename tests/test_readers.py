@@ -472,6 +472,22 @@ def test_one_matrix_is_not_stiffness_and_mass(tmp_path):
         Structure.read(tmp_path / "cut.npz", tmp_path / "cut.npz")
 
 
+def test_mass_follows_the_labels_given_for_the_stiffness(tmp_path):
+    """A mass with dofs of its own beside a stiffness without; and a stiffness whose own dofs contradict the labels."""
+    stiffness, own = np.array([[3.0, -1.0], [-1.0, 1.0]]), [(2, "x"), (1, "x")]
+    np.save(tmp_path / "K.npy", stiffness)
+    np.savez(tmp_path / "M.npz", M=np.diag([2.0, 5.0]), labels=own)
+    np.savez(tmp_path / "both.npz", K=stiffness, M=np.diag([2.0, 5.0]), labels=own)
+    body = Structure.read(tmp_path / "K.npy", tmp_path / "M.npz", labels=own[::-1])
+    assert body.M.diagonal().tolist() == [5.0, 2.0]
+    with pytest.raises(ValueError, match=r"M.npz, its dofs: expected those of K.npy, got \(2, 'x'\)"):
+        Structure.read(tmp_path / "K.npy", tmp_path / "M.npz", labels=[("a", "x"), ("b", "x")])
+    with pytest.raises(ValueError, match=r"its dofs: expected the order of labels, \(1, 'x'\), got \(2, 'x'\) there"):
+        Structure.read(tmp_path / "both.npz", tmp_path / "both.npz", labels=own[::-1])
+    renamed = Structure.read(tmp_path / "both.npz", tmp_path / "both.npz", labels=[("a", "x"), ("b", "x")])
+    assert renamed.labels == (("a", "x"), ("b", "x"))
+
+
 def test_labels_from_files(tmp_path):
     for name, matrix in (("K", K), ("M", M)):
         io.mmwrite(tmp_path / f"{name}.mtx", matrix)

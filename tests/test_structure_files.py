@@ -141,6 +141,7 @@ def test_the_command_line_runs_and_checks_it(folder, capsys):
         ('stiffness = "K.mtx"\n', "", r"\[structure\]: the key 'stiffness' is missing"),
         ('mass = "M.npz"', 'mass = "gone.npz"', "gone.npz: No such file"),
         ('mass = "M.npz"', 'mass = "dofs.csv"', "dofs.csv, its suffix: expected one of"),
+        ('nodes = "nodes.csv"', "nodes = [[0, 0, 0]]", r"nodes must be the path of a file or a table"),
         ('mass = "M.npz"', 'mas = "M.npz"', "unknown key 'mas'; did you mean 'mass'"),
         ("[structure]", '[structure]\nscale = ["mm"]', "scale must be a list of three units"),
         ("[structure]", '[structure]\nscale = ["mm", "stone", "s"]', "mass must be one of kg"),

@@ -123,7 +123,8 @@ def without_baseline(t: ArrayLike, acceleration: ArrayLike) -> Vector:
     times, values = np.asarray(t, dtype=float), np.asarray(acceleration, dtype=float)
     powers = (times / times[-1])[:, None] ** np.arange(3)
     velocities = cumulative_trapezoid(np.column_stack([powers, values]), times, axis=0, initial=0.0)
-    weight = np.sqrt(np.gradient(times))[:, None]
+    steps = np.pad(np.diff(times), 1)
+    weight = np.sqrt((steps[1:] + steps[:-1]) / 2)[:, None]  # trapezia: the ends count half
     found = np.linalg.lstsq(weight * velocities[:, :3], (weight * velocities[:, 3:])[:, 0])[0]
     return np.asarray(values - powers @ found)
 

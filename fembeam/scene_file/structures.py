@@ -28,6 +28,9 @@ def fixed(z: float, dofs: Sequence[str] = (), motion: Any = None, name: str | No
 def structure(reader: TableReader, table: Mapping[str, Any]) -> Structure | GivenModes:
     """The structure of a table: files of stiffness, mass and damping, or modes; labels, nodes, points, lines, scale."""
     where = "[structure]"
+    nodes = table.get("nodes", {})
+    if not isinstance(nodes, (str, dict)):
+        reader.fail(where, f"nodes must be the path of a file or a table {{ node = [x, y, z] }}, got {nodes!r}")
     if any(key in table for key in MODES[:3]):
         return _of_modes(reader, table, where)
     reader.check_keys(table, KEYS, where, "key")

@@ -136,6 +136,8 @@ def _chains(
     at = shown(points[lines[thin, 0]])
     require(not thin.size, "lines must have a length", at, where, "remove the line there")
     along = spans / lengths[:, None]
+    for node, mine in meeting.items():
+        _require_apart(points[node], [along[i] if lines[i, 0] == node else -along[i] for i in mine], where)
 
     def passes(node: int) -> bool:
         first, *rest = meeting[node]
@@ -148,6 +150,14 @@ def _chains(
             back = _walk(lines, meeting, used, i, int(line[0]), passes)
             ahead = _walk(lines, meeting, used, i, int(line[1]), passes)
             yield [*reversed(back), *ahead], groups[i]
+
+
+def _require_apart(at: Vector, ways: list[Vector], where: str) -> None:
+    """Lines must not lie on each other, as of groups that share lines: stiffness and mass would count twice."""
+    apart = np.linalg.norm(np.subtract(ways, np.array(ways)[:, None]), axis=2)
+    double = bool(np.any(apart[np.triu_indices(len(ways), 1)] < STRAIGHT))
+    require(not double, "lines must not lie on each other", shown([at]) if double else None, where,
+            "remove one of those that leave there the same way")  # fmt: skip
 
 
 def _walk(lines: Any, meeting: dict[int, list[int]], used: Any, line: int, node: int, passes: Any) -> list[int]:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 from scipy import sparse
 
+from fembeam.structures.checks import labelled
 from fembeam.structures.readers.abaqus import read_abaqus
 from fembeam.structures.readers.calculix import read_calculix, read_dof
 from fembeam.structures.readers.dmig import read_dmig
@@ -88,11 +90,13 @@ def structure_arguments(
 ) -> dict[str, Any]:
     """K, M, C, labels and nodes from files, on one order of dofs: what `Structure` takes.
 
-    Dofs that the stiffness marks as held are left out of all; those of it that the mass does not name have none.
+    Dofs that the stiffness marks as held are left out of all; those of it that the mass does not name have none. A mass
+    or damping with dofs of its own goes by them, also where the stiffness has its names from `labels`.
     """
     K = _chosen(stiffness, "K")
     places = read_nodes(Path(nodes)) if isinstance(nodes, (str, os.PathLike)) else nodes
     names = _labels(labels, K, places)
+    K = _named(K, names)
     M = _chosen(mass, "M")
     if _which(M) == _which(K):
         raise wrong(K[0].path, "as a whole", "a stiffness and a mass", f"{K[0].matrices[_which(K)[1]][0]} for both")
@@ -150,7 +154,7 @@ def _labels(given: Any, K: tuple[Given, sparse.csr_matrix], places: Mapping[Any,
     if isinstance(given, (str, os.PathLike)):
         return _of_file(Path(given))
     if given is not None:
-        return given
+        return labelled(given, K[1].shape[0], "Structure.read")
     size = K[1].shape[0]
     if K[0].labels is not None or places is None:
         return K[0].labels
@@ -160,6 +164,20 @@ def _labels(given: Any, K: tuple[Given, sparse.csr_matrix], places: Mapping[Any,
             f"{len(places)} nodes; give labels=[(node, 'x'), …] in the order of the rows"
         )
     return [(node, name) for node in sorted(places) for name in COMPONENT.values()]
+
+
+def _named(K: tuple[Given, sparse.csr_matrix], names: Any) -> tuple[Given, sparse.csr_matrix]:
+    """The stiffness with the names of its rows, by which the others are put in order."""
+    given, matrix = K
+    if names is None or given.held:
+        return K
+    if given.labels is None:
+        return replace(given, labels=tuple(names)), matrix
+    other = next((pair for pair in zip(given.labels, names, strict=False) if pair[0] != pair[1]), None)
+    if other and set(given.labels) == set(names):
+        expected = f"the order of labels, {other[1]!r}"
+        raise wrong(given.path, "its dofs", expected, f"{other[0]!r} there; leave labels out")
+    return K
 
 
 def _of_file(path: Path) -> tuple[Label, ...]:
