@@ -273,10 +273,9 @@ def _loss_rows(problem: Problem) -> Array:
     n = len(problem.k)
     if not problem.loss.size:
         return np.hstack((np.zeros((n, n)), np.diag(np.sqrt(np.maximum(problem.c, 0.0)))))
-    size = np.sqrt(np.maximum(np.diag(problem.loss), 0.0))  # of p and v, which differ by the unit of time
-    least = (
-        1e-4 * np.repeat([np.sqrt(np.abs(problem.k).max()), 1.0], n) * size[n:].max()
-    )  # what is less may be rounding
+    size = np.sqrt(np.maximum(np.diag(problem.loss), 0.0))
+    unit = np.sqrt(np.abs(problem.k).max())  # of p over that of v
+    least = 1e-4 * np.repeat([unit, 1.0], n) * size[n:].max()  # what is less may be rounding
     size = np.maximum(size, np.where(least > 0.0, least, 1.0))
     values, vectors = np.linalg.eigh(0.5 * (problem.loss + problem.loss.T) / np.outer(size, size))
     return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * size
