@@ -620,13 +620,10 @@ def _bisect(low, high):
 
 
 @inlined
-def _rounded(problem, tables, scratch, variable, stop, size):
-    """Change of a landing's variable by the rounding of δ where it has ended."""
-    x = scratch.stages[LANDED]
+def _rounded(problem, tables, scratch, stop, size):
+    """Change of u, of `ROOT` or `SINCE`, by the rounding of δ where the landing has ended."""
+    x, kappa = scratch.stages[LANDED], tables.time_exponent[1 + stop]
     time = surface_tolerance(problem, stop, x) / max(abs(indentation_rate(problem, stop, x)), 1e-300)
-    if variable == TIME:
-        return time
-    kappa = tables.time_exponent[1 + stop]
     return time / max(kappa * raised(abs(x[size + 1]), kappa - 1.0), 1e-300)
 
 
@@ -661,8 +658,8 @@ def _locate(problem, tables, state, scratch, stop, border, search):
         if slope == 0.0:
             slope = (value - value_before) / (span - span_before)
         rounding = _STAGNATION * largest
-        if border >= 0:
-            of_delta = slope * _rounded(problem, tables, scratch, variable, stop, state.x.size)
+        if rubs(problem, stop) and variable != TIME:
+            of_delta = slope * _rounded(problem, tables, scratch, stop, state.x.size)
             rounding = max(rounding, 10.0 * tolerance, min(abs(of_delta), _MOST_ROUNDING * largest))
         next_span, slope = span - value / slope, 0.0
         stagnates = abs(next_span - span) <= 1e-15 * span and border >= 0
