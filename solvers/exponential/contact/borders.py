@@ -427,8 +427,7 @@ def renew_all(problem, state, scratch, element, border):
             margins_later(problem, state, scratch, s, state.now[T], x, -time, just_before)
         for j in range(count):
             before, rounding = max(begun[j], just_before[j]), max(scratch.noise[s, j], missed * scratch.largest[s, j])
-            if not rubs(problem, s):  # N falls to zero just after a stick, but not with it
-                rounding = max(rounding, _TOGETHER * before)
+            rounding = max(rounding, _TOGETHER * before)
             landed = (s == element and j == border) or (before > rounding and margin[j] <= rounding)
             scratch.fired[j] = max(rounding, margin[j]) if landed else -np.inf
         for j in range(count):
