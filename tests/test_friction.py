@@ -276,6 +276,17 @@ def test_a_run_goes_on_from_the_middle_of_a_stick(method):
 
 
 @every_method
+def test_a_start_where_the_law_pulls_is_free_whatever_is_latched(method):
+    """N = 4 N - 40 N, cut at zero: a spring that was drawn before holds nothing."""
+    system, start = wall(KelvinVoigt(4e5, 50.0, clamp=True)), ([1e-5, 0.0], [-0.8, 0.1])
+    free, latched = (
+        integrate(system, *start, 0.004, method=method, memory=memory) for memory in (None, [np.array([0.0, -1e-5])])
+    )
+    assert latched.end.tolist() == free.end.tolist()
+    assert len(latched.transitions) == 0
+
+
+@every_method
 @pytest.mark.parametrize("cut", [0.0014, 0.0017, 0.002])
 def test_the_log_of_a_contact_cut_in_slip_or_stick(method, cut):
     """Loss and slip of both parts add up to those of the whole contact: what the spring holds belongs to neither."""

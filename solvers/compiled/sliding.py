@@ -32,7 +32,6 @@ from solvers.compiled.kernels import (
     call_gradient,
     delta_of,
     force_at,
-    indentation,
     indentation_and_rate,
     indentation_rate,
     inlined,
@@ -219,6 +218,13 @@ def _growth_at(problem, s, entry_rate, delta, rate):
 
 
 @inner
+def pulls(problem, s, entry_rate, x):
+    """Whether N, which may fall to zero within a contact, does not press in a state."""
+    delta, rate = indentation_and_rate(problem, s, x)
+    return problem.border_count[s] > PRESSES and normal_force(problem, s, 1, entry_rate, delta, rate) <= 0.0
+
+
+@inner
 def begin_slider(problem, s, t, x, entry_rate, under_way):
     """Latch stick, slip or freedom of a slider as a contact begins.
 
@@ -231,11 +237,10 @@ def begin_slider(problem, s, t, x, entry_rate, under_way):
         latch_angle(slider, u, w)
     (xi, xi_rate), rate = xi_and_rate_at(problem, s, t, x), indentation_rate(problem, s, x)
     slider[PEAK] = 0.0
-    normal = normal_force(problem, s, 1, entry_rate, indentation(problem, s, x) if under_way else 0.0, rate)
-    if under_way and normal <= 0.0 and problem.border_count[s] > PRESSES:
+    if under_way and pulls(problem, s, entry_rate, x):
         slider[CODE], slider[SLIDER] = FREE, 0.0
         return
-    if not under_way and normal <= 0.0:
+    if not under_way and normal_force(problem, s, 1, entry_rate, 0.0, rate) <= 0.0:
         growth = max(
             _growth_at(problem, s, entry_rate, _JUST_INSIDE, rate),
             _growth_at(problem, s, entry_rate, WITHIN_ROUNDING * surface_tolerance(problem, s, x), rate),

@@ -28,7 +28,7 @@ from solvers.compiled.kernels import (
     xi_and_rate_at,
 )
 from solvers.compiled.parts import addresses_of
-from solvers.compiled.sliding import SLIPPED, begin_slider, end_slider, is_held, renew_slider, slider_force
+from solvers.compiled.sliding import SLIPPED, begin_slider, end_slider, is_held, pulls, renew_slider, slider_force
 from solvers.problem import Array, Contact, Forcing, Law, Status, System
 from solvers.problem import event_list as at
 from solvers.problem.friction import ACCOUNTS, BEGUN, CODE, FREE, PEAK, SLIDES, STIFFNESS
@@ -156,9 +156,9 @@ def begin_contacts(problem, state):
 
 @inner
 def _begin_in_contact(problem, state, s, under_way):
-    """Begin the friction of a contact that is closed as the run begins, or continue with what is latched already."""
+    """Begin the friction of a contact that is closed as the run begins, or continue what is latched while N presses."""
     slider = slider_of(problem, s)
-    if slider[CODE] == FREE:
+    if slider[CODE] == FREE or (under_way and pulls(problem, s, state.entry_rate[s], state.x)):
         begin_slider(problem, s, state.now[T], state.x, state.entry_rate[s], under_way)
     slider[BEGUN] = slider_force(problem, s, state.segment[s], state.entry_rate[s], state.now[T], state.x)
     if slider[CODE] != 0.0:

@@ -34,6 +34,7 @@ from drawn_friction import draw
 from drawn_memory import disturbed
 
 MOST_TRANSITIONS = 30
+LEAST_FORCE = 1e-9  # of a contact's largest force: borders are met to about this part of their largest margin
 HALF_A_TURN = "drawn by half a turn"  # of a spring of friction in a circle: runs are refused, by all methods
 TINY = 1e-300
 
@@ -107,11 +108,17 @@ def at_openings(solution: Any, scene: Scene) -> Any:
     A slip back under N = k δ^p, which falls at the rate Ṅ = p k δ^{p-1} δ̇, ends where μ|Ṅ| = k_t |ξ̇|: at the depth
     δ = (k_t |ξ̇| / μ p k |δ̇|)^{1/(p-1)}, which may be any power of ten: 1e-17 m where p = 1.2 and the base is 4e-4. δ is
     known to the rounding ε of what it is read from, and the opening to ε/|δ̇|: what is nearer to it may as well not be.
+    Nor is N told from zero, and a slip from a free slider, where it is `LEAST_FORCE` of its peak.
     """
     rows, log = solution.transitions, solution.contacts
     spread = rounding_of_surfaces(scene)[log.stop.astype(int)] / np.maximum(np.abs(log.speed_out), TINY)
     apart = np.abs(rows.t[:, None] - log.t_out)  # NaN of a contact that is still closed
-    return np.any((rows.contact[:, None] == log.stop) & (apart <= spread + 4e-16 * scene.duration), axis=1)
+    close = apart <= spread + 4e-16 * scene.duration
+    for i, j in zip(*np.nonzero(apart < 1e-6 * (log.t_out - log.t_in)), strict=True):
+        law, speed = scene.system.contacts[int(log.stop[j])].law, log.speed_out[j]
+        normal = law.force(speed * apart[i, j], -speed, max(log.speed_in[j], law.entry_rate_floor))
+        close[i, j] |= abs(float(normal)) <= LEAST_FORCE * log.peak_force[j]
+    return np.any((rows.contact[:, None] == log.stop) & close, axis=1)
 
 
 def of_transitions(found: dict[str, Any], solution: Any, scene: Scene, unit: dict[str, Any]) -> None:
