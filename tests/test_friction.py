@@ -275,6 +275,15 @@ def test_a_run_goes_on_from_the_middle_of_a_stick(method):
     assert np.isnan(part.friction.t_out).tolist() == [True]
 
 
+@pytest.mark.parametrize("method", [Exponential(1e-8), Exponential(1e-12), SHARP])
+def test_the_last_slip_before_an_opening_is_one(method):
+    """Under N ~ δ^{6/5} a slip sticks 3e-13 s before the opening, where N is 1e-10 of its peak, and slips again."""
+    run = integrate(wall(Hertz(4e6, exponent=1.2)), [-1e-3, 0.0], [0.8, 0.025], 0.006, 1e-4, method)
+    assert run.transitions.event.tolist() == ["stick", "slip", "stick", "slip"]
+    before = run.contacts.t_out[0] - run.transitions.t
+    np.testing.assert_allclose(before, [1.0299075e-3, 3.668486e-5, 2.7209e-13, 2.955e-14], rtol=1e-3)
+
+
 @every_method
 def test_a_start_where_the_law_pulls_is_free_whatever_is_latched(method):
     """N = 4 N - 40 N, cut at zero: a spring that was drawn before holds nothing."""

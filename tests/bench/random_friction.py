@@ -34,7 +34,7 @@ from drawn_friction import draw
 from drawn_memory import disturbed
 
 MOST_TRANSITIONS = 30
-LEAST_FORCE = 1e-9  # of a contact's largest force: borders are met to about this part of their largest margin
+LEAST_FORCE = 1e-11  # of a contact's largest force: rounding of the margin N
 HALF_A_TURN = "drawn by half a turn"  # of a spring of friction in a circle: runs are refused, by all methods
 TINY = 1e-300
 

@@ -43,7 +43,7 @@ from solvers.exponential.contact.slider_margins import (
     slider_margins_in,
     slider_margins_on_step,
 )
-from solvers.problem.friction import CODE
+from solvers.problem.friction import CODE, PRESSES
 
 UNRESOLVED = -2  # in place of an element: the step is too long to tell whether a border is crossed
 _ON_BORDER = 1e-9  # margin, in units of its largest on the step, up to which the step counts as begun on the border
@@ -428,6 +428,8 @@ def renew_all(problem, state, scratch, element, border):
         for j in range(count):
             before, rounding = max(begun[j], just_before[j]), max(scratch.noise[s, j], missed * scratch.largest[s, j])
             rounding = max(rounding, _TOGETHER * before)
+            if s == element and j == PRESSES and rubs(problem, s):  # N may be 1e-10 of its largest as a slip ends
+                rounding = scratch.noise[s, j]
             landed = (s == element and j == border) or (before > rounding and margin[j] <= rounding)
             scratch.fired[j] = max(rounding, margin[j]) if landed else -np.inf
         for j in range(count):
