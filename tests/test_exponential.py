@@ -578,6 +578,22 @@ def test_samples_on_the_way_to_a_landing_are_finite_at_the_loosest_tolerance(see
     assert np.all(run.contacts.speed_out[~np.isnan(run.contacts.t_out)] >= 0.0)
 
 
+@pytest.mark.parametrize(
+    "dashpot", [KelvinVoigt(1.0, 100.0, clamp=True), *[Viscoelastic(1.0, 100.0, p, clamp=True) for p in (2.0, 1.5)]]
+)
+def test_what_leaves_decelerated_leaves_at_the_speed_of_its_closed_form(dashpot):
+    """A cut dashpot holds nothing back; q'' = -q does. Landings in δ, δ^{1/2} and δ^{1/4} on δ = q + 1 = 0.
+
+    Where the embedded difference changes its sign, at a speed that falls to 0.65, one in δ^{1/4} missed by 28 `rtol`.
+    """
+    stop = Contact([-1.0], dashpot, -1.0)
+    system = System(np.eye(1), np.zeros((1, 1)), np.eye(1), [stop])
+    for ratio in np.linspace(1.02, 2.0, 26):  # 1 would just come back to δ = 0
+        q, v = -0.99, -math.sqrt(0.02 * ratio)
+        run = integrate(system, [q], [v], 0.3, method=Exponential(1e-6))
+        assert run.contacts.speed_out[0] == pytest.approx(math.sqrt(q * q + v * v - 1.0), abs=3e-6 * abs(v))
+
+
 def tones(omega, scale=1.0):
     """Loads along vectors of two coordinates: two harmonics, a constant, and a signal that is sampled."""
     signals = [fb.Harmonic(amplitude=scale, omega=omega), fb.Harmonic(amplitude=2e-3, omega=77.0, phase=0.4)]

@@ -95,7 +95,7 @@ _HALVINGS, _LEAST_SHARE = 30, 1e-3  # of an interval that contains a root; least
 _MOST_VERTICES = 6  # parabolas to the maximum of |F_t| inside a landing
 _MOST_BORDER_TRIALS = 40  # the same on a border: its margin may change only near the start, which bisection must find
 _ERROR_SHARE = 0.1  # part of the embedded difference that counts as the error
-_ERROR_SHARE_FOURTH_ROOT = 1e-2  # the same with u = δ^{1/4}: terms t² = u⁸, exact in the step, make up the difference
+_ERROR_SHARE_FOURTH_ROOT = 3e-2  # the same with u = δ^{1/4}: terms t² = u⁸, exact in the step, make up the difference
 _DERIVATIVE_SHARE, _MOST_FACTOR = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
 _ROUNDING = 1e-11  # rounding of a margin, in units of its largest
 _SHARE_OF_CONTACT = 0.2  # longest landing in time on a border of friction, in units of the contact's duration × reach
@@ -103,6 +103,7 @@ _SHARE_SINCE_ENTRY = 0.04  # the same of one from the entry on
 _NEAR_SURFACE = 1e-6  # δ, in units of its peak, below which its rounding may hide a border
 _LEAST_MARGIN = 0.1  # part of a margin's error that counts, in units of the tolerance of δ̇
 _LEAST_RATE = 0.5  # δ̇ at the end of a landing, in units of that at its start, below which it is too long
+_LEAST_RATE_FOURTH_ROOT = 0.8  # the same with u = δ^{1/4}: under constant deceleration the difference is zero at 0.65
 _LAST_STEP = 0.09  # indentation, in units of the deepest, below which a landing on δ = 0 is tried
 _LAST_STEP_ROOT, _MOST_ROOT = 0.2, 0.25  # the same with u = δ^{1/2}, over reach², and at most: errors grow like u⁹
 
@@ -402,10 +403,16 @@ def may_land(problem, tables, state, scratch, stop, direction, time_to_border):
     return state.segment[stop] == 0 or abs(level - delta) <= 0.2 * max(level, delta)
 
 
+@inlined
+def _in_fourth_root(tables, variable, stop):
+    """Whether the variable of a landing is u = δ^{1/4}."""
+    return variable == ROOT and tables.time_exponent[1 + stop] == 4.0
+
+
 @merged
 def _error_share(problem, tables, state, scratch, variable, stop):
     """Share of the embedded difference of the landing just taken that counts as its error."""
-    share = _ERROR_SHARE_FOURTH_ROOT if variable == ROOT and tables.time_exponent[1 + stop] == 4.0 else _ERROR_SHARE
+    share = _ERROR_SHARE_FOURTH_ROOT if _in_fourth_root(tables, variable, stop) else _ERROR_SHARE
     if scratch.viscous[stop] > 0.0:  # set where the dashpot is too strong for an explicit step
         share = 1.0
     if state.event_record.shape[0]:
@@ -423,9 +430,10 @@ def _is_resolved(problem, tables, state, scratch, variable, stop):
     """
     before, after = scratch.start_motion[stop, 1], indentation_rate(problem, stop, scratch.stages[LANDED])
     share = _error_share(problem, tables, state, scratch, variable, stop)
+    least = _LEAST_RATE_FOURTH_ROOT if _in_fourth_root(tables, variable, stop) else _LEAST_RATE
     return (
         _time_increases(scratch, state.x.size)
-        and before * after >= _LEAST_RATE * before * before
+        and before * after >= least * before * before
         and _rate_error(problem, scratch, share) <= 1.0
     )
 
