@@ -170,6 +170,21 @@ def test_a_run_that_ends_in_contact_logs_the_peak_so_far(made, end):
     assert solution.contacts.peak_force[0] == pytest.approx(force.max(), rel=1e-6)
 
 
+@pytest.mark.parametrize("rtol", [1e-8, 1e-11, 1e-12])
+def test_stops_that_are_left_as_others_are_entered(rtol):
+    """Pairs on both sides without a gap; forces left end like δ^{1/4}, and what is entered is met at that instant."""
+    law = Viscoelastic(5e9, 7e3, 1.5)
+    stops = [Contact([a, b], law) for a, b in ((1.17, 0.73), (1.17, -0.73), (-1.17, -0.73), (-1.17, 0.73))]
+    system = System.modal([112.6, 450.4], 0.03, stops)
+    found, exact = (
+        integrate(system, [4.2e-4, 0.0], [0.074, 0.0], 4e-4, method=method)
+        for method in (Exponential(rtol), DormandPrince(1e-13, 1e-16))
+    )
+    assert sorted(found.contacts.stop[:2]) + sorted(found.contacts.stop[2:4]) == [2, 3, 0, 1]
+    np.testing.assert_allclose(found.contacts.t_out[:4], exact.contacts.t_out[:4], rtol=10.0 * rtol)
+    np.testing.assert_allclose(found.contacts.speed_out[:4], exact.contacts.speed_out[:4], rtol=10.0 * rtol)
+
+
 def test_symmetric_stops_that_close_within_a_rounding_have_the_same_log():
     """Pinned pipe, stops at 1/3 and 2/3 of its span on both sides, its even modes moved by a hair."""
     n, z = np.arange(1, 5), np.array([1.0, 2.0]) / 3.0

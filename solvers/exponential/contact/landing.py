@@ -84,6 +84,7 @@ from solvers.exponential.contact.peaks import state_peaks
 from solvers.problem.friction import CODE, FREE, MU, PEAK, SLIDES, STIFFNESS
 
 OPENED = 2  # place in `Scratch.landed`: 1 + stop whose opening the step in ``scratch.stages`` ends at, or 0
+LAST_RESORT = 3  # the same: 1 where a step across the border would be the shortest one, else 0
 _MOST_TRIALS = 8  # iterations for the step that ends at an output time, or on a bend
 _MIDPOINT_UP_TO = 1e-4  # change of a landing's length, relative, that the midpoint rule makes: its error is the cube
 _CLASSICAL_UP_TO = 4e-3  # the same by the classical rule, of order 4
@@ -102,6 +103,7 @@ _SHARE_OF_CONTACT = 0.2  # longest landing in time on a border of friction, in u
 _SHARE_SINCE_ENTRY = 0.04  # the same of one from the entry on
 _NEAR_SURFACE = 1e-6  # δ, in units of its peak, below which its rounding may hide a border
 _LEAST_MARGIN = 0.1  # part of a margin's error that counts, in units of the tolerance of δ̇
+_ANY_ERROR = 1e300  # but NaN
 _LEAST_RATE = 0.5  # δ̇ at the end of a landing, in units of that at its start, below which it is too long
 _LEAST_RATE_FOURTH_ROOT = 0.8  # the same with u = δ^{1/4}: under constant deceleration the difference is zero at 0.65
 _LAST_STEP = 0.09  # indentation, in units of the deepest, below which a landing on δ = 0 is tried
@@ -426,7 +428,8 @@ def _is_resolved(problem, tables, state, scratch, variable, stop):
     """Whether the landing just taken in δ or δ^{1/κ} is within the tolerance, and the stop has not nearly turned back.
 
     A stop that turns soon after it has left is near a pole of 1/δ̇. The embedded difference changes its sign there: it
-    may be zero where the step errs by 1e-3 of the rate.
+    may be zero where the step errs by 1e-3 of the rate. As the last resort a landing of any error is taken: a step
+    across the border errs by more.
     """
     before, after = scratch.start_motion[stop, 1], indentation_rate(problem, stop, scratch.stages[LANDED])
     share = _error_share(problem, tables, state, scratch, variable, stop)
@@ -434,7 +437,7 @@ def _is_resolved(problem, tables, state, scratch, variable, stop):
     return (
         _time_increases(scratch, state.x.size)
         and before * after >= least * before * before
-        and _rate_error(problem, scratch, share) <= 1.0
+        and _rate_error(problem, scratch, share) <= (_ANY_ERROR if scratch.landed[LAST_RESORT] > 0 else 1.0)
     )
 
 

@@ -118,7 +118,7 @@ class Scratch(NamedTuple):
     largest: Annotated[Any, "E, B"]  # largest margins on the step tried last
     noise: Annotated[Any, "E, B"]  # their rounding
     border: Annotated[Any, "int 1"]  # border that the step tried last crosses first, -1 if it is a bend
-    landed: Annotated[Any, "int 3"]  # element and border that a landing would cross first, else -1; see `landing`
+    landed: Annotated[Any, "int 4"]  # element and border that a landing would cross first, else -1; see `landing`
     block_motion: Annotated[Any, "2*M, S"]  # p and v at the nodes; as the next two see `many_stops`
     block_force: Annotated[Any, "2*M, S"]  # state rates of the blocks by the forces at the nodes
     pair_weights: Annotated[Any, "M8"]  # products of a read row with the push of another row

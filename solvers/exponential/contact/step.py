@@ -65,7 +65,7 @@ from solvers.exponential.contact.first_step import (
     latest_entered,
     level_of,
 )
-from solvers.exponential.contact.landing import may_land
+from solvers.exponential.contact.landing import LAST_RESORT, may_land
 from solvers.exponential.contact.node_response import force_of, free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_run, finish_step, record_forces, sample_step
@@ -109,6 +109,8 @@ def _nearest_surface(problem, state, scratch):
         segment = state.segment[s]
         if rate < 0.0 and segment > 0:
             time, side = (delta - problem.knots[s, segment - 1]) / -rate, -1
+            if segment == 1 and problem.law.size > 1:  # its force may end like a root, and others begin at that instant
+                time -= surface_tolerance(problem, s, state.x) / -rate
         elif rate > 0.0:
             time, side = (problem.knots[s, segment] - delta) / rate, 1
         else:
@@ -269,6 +271,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
     if control[NEW] == ENTRY and problem.parts[PRESSED] and _switch_pressed(problem, state):
         begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
+    scratch.landed[LAST_RESORT] = 1 if time_to_border < tables.contact_step[shortest] else 0
     if (
         stop >= 0
         and may_land(problem, tables, state, scratch, stop, direction, time_to_border)
