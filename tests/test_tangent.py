@@ -8,7 +8,18 @@ from numpy.testing import assert_allclose
 from oscillators import Tone
 from scipy.linalg import expm
 
-from contacts import BoucWen, Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic, WaltonBraun, law
+from contacts import (
+    BoucWen,
+    ElastoPlastic,
+    Hertz,
+    Hysteretic,
+    Jenkins,
+    KelvinVoigt,
+    PiecewiseLinear,
+    Viscoelastic,
+    WaltonBraun,
+    law,
+)
 from solvers import Contact, DormandPrince, Exponential, Parameter, SolverError, System, integrate, lyapunov, orbit
 
 OMEGA, ZETA = np.array([109.13, 790.6, 2303.7, 4700.0, 7800.0]), np.array([0.02, 0.01, 0.01, 0.01, 0.01])
@@ -227,6 +238,18 @@ def test_at_rest_in_contact_the_neighbours_are_resolved(law, rtol):
     found = integrate(system, rest, np.zeros(2), 10.0, method=Exponential(rtol), tangent=True)
     exact = expm(10.0 * stiffened(system, row, law))
     assert_allclose(found.tangent, exact, rtol=0.0, atol=10.0 * rtol * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("rtol", [1e-8, 1e-9, 1e-11])
+@pytest.mark.parametrize("law", [KelvinVoigt(40.0, 0.5), ElastoPlastic(40.0, 1e3)], ids=["dashpot", "elastic"])
+def test_neighbours_that_move_in_a_fast_mode_feel_a_slow_element(law, rtol):
+    """The motion is slow and takes long steps; an element turns the phase of what is beside it in the third mode."""
+    omega, row = np.array([3.0, 13.0, 5e3]), np.array([1.0, 0.8, 0.7])
+    system = System.modal(omega, 1e-5, [Contact(row, law, always=True)])
+    found = integrate(system, [0.1, 0.05, 0.0], [0.2, 0.1, 0.0], 1.3, method=Exponential(rtol), tangent=True).tangent
+    exact = expm(1.3 * stiffened(system, row, KelvinVoigt(law.stiffness, getattr(law, "damping", 0.0))))
+    unit = np.append(1.0 / omega, np.ones(3))  # of equal energy
+    assert_allclose(found * unit / unit[:, None], exact * unit / unit[:, None], rtol=0.0, atol=1000.0 * rtol)
 
 
 def test_multipliers_under_a_slow_drive_of_a_stiff_element():

@@ -80,6 +80,8 @@ from solvers.problem.friction import STIFFNESS as FRICTION_STIFFNESS
 _END_ERROR, _INNER_ERROR = 1.5e-19, 2.7e-11  # of ẍ = -ω² x: at the end, over (ωh)^17; inside, over (ωh)^9; ωh < 6
 _TOO_MUCH, _LITTLE = 6.0, 0.03  # part of a force left out, in its tolerances: what may be rounding, and what is kept
 _OF_SURFACE, _FLOOR = 0.2, 1e-20  # rounding of δ at a node, in units of `surface_tolerance` without its floor, m
+_MEAN_OF_RIPPLE = 0.03  # of what oscillates between the nodes: what a step's mean force misses
+_SHARE_OF_BLOCKS = 0.01  # the derivative of a run may err by a hundred tolerances of the motion
 _FADED, _MOST_RADIANS = 100.0, 1e5  # e^-100 counts as zero; more radians in a run take over 25 000 steps
 
 
@@ -240,7 +242,7 @@ def step_error(problem, tables, state, scratch, node_set, level):
         if rubs(problem, s):
             damped, stiffness = False, max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
         span = h * _undamped_part(problem, tables, scratch, node_set, h, s) if damped else h
-        scratch.unresolved[u] = span * (unresolved + 0.03 * stiffness * ripple)
+        scratch.unresolved[u] = span * (unresolved + _MEAN_OF_RIPPLE * stiffness * ripple)
     worst = max(worst, _sum_errors(problem, tables, state, scratch, node_set, h))
     for r in range(problem.gap.size):
         speed = scratch.reference_speed[element_of(problem, r)]
@@ -252,7 +254,7 @@ def step_error(problem, tables, state, scratch, node_set, level):
             if error != error:
                 return worst
     if state.event_record.shape[0]:
-        worst = max(worst, _derivative_error(problem, tables, state, scratch, h))
+        worst = max(worst, _derivative_error(problem, tables, state, scratch, node_set, level))
     return worst
 
 
@@ -278,7 +280,7 @@ def _force_rounding(problem, state, scratch, s):
 
 
 @merged
-def _derivative_error(problem, tables, state, scratch, h):
+def _derivative_error(problem, tables, state, scratch, node_set, level):
     """Error of the derivative of a step, in units of rtol: the step must resolve what the contacts stiffen.
 
     A motion at rest, or slow, lets steps grow, but neighbouring motions oscillate. Collocation at eight nodes of Gauss
@@ -286,7 +288,8 @@ def _derivative_error(problem, tables, state, scratch, h):
     2.7e-11 (ωh)^9; ẍ = -c ẋ with less than that for ω = c. A strong dashpot that would take too many steps is ignored
     once its motion has decayed since the last event; then only the slow decay rate k/c counts.
     """
-    square, out, since = 0.0, scratch.local_motion[FORCES], state.now[T] - max(state.now[LAST_EVENT], 0.0)
+    h, square, unresolved = tables.contact_step[level], 0.0, 0.0
+    out, since = scratch.local_motion[FORCES], state.now[T] - max(state.now[LAST_EVENT], 0.0)
     for s in range(problem.law.size):
         if state.segment[s] == 0:
             continue
@@ -294,18 +297,29 @@ def _derivative_error(problem, tables, state, scratch, h):
         copy(motion[0], scratch.clipped, S)
         slopes = out[:S], out[S : 2 * S], out[2 * S :]
         contact_gradient(problem, s, scratch.clipped, motion[1], state.entry_rate[s], slopes[0], slopes[1], slopes[2])
-        for r in range(row_of(problem, s), row_of(problem, s + 1)):
-            mobility += abs(tables.accelerance[r, r])
-        stiffness = largest_size(slopes[0])
+        stiffness, damping = largest_size(slopes[0]), largest_size(slopes[1])
         if rubs(problem, s):
             stiffness = max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
-        stiffness, damping = stiffness * mobility, largest_size(slopes[1]) * mobility
+        for r in range(row_of(problem, s), row_of(problem, s + 1)):
+            mobility += abs(tables.accelerance[r, r])
+            unresolved += h * _unresolved_blocks(problem, tables, r, node_set, level, stiffness, damping)
+        stiffness, damping = stiffness * mobility, damping * mobility
         faded = damping**2 > 4.0 * stiffness and damping * since > _FADED and damping * state.now[T_END] > _MOST_RADIANS
         square += (stiffness / damping if faded else math.sqrt(stiffness) + damping) ** 2
     scratch.stiffened[0] = math.sqrt(square)
     angle = scratch.stiffened[0] * h
     error = _INNER_ERROR * angle**9 if state.now[T] + h >= state.now[T_END] else _END_ERROR * angle**17
-    return error / scratch.accuracy[RTOL]
+    return max(error, _SHARE_OF_BLOCKS * unresolved) / scratch.accuracy[RTOL]
+
+
+@merged
+def _unresolved_blocks(problem, tables, r, node_set, level, stiffness, damping):
+    """Rate, per s, at which a block that oscillates between the nodes is moved wrongly by the slopes at row r."""
+    alias, n, worst = tables.alias[tables.kind[node_set], level], problem.k.size, 0.0
+    for b in range(int(tables.own_blocks)):
+        slope = stiffness + damping * math.sqrt(problem.k[b])
+        worst = max(worst, slope * tables.ripple_weight[r, b] * alias[n + b] * abs(problem.push[r, n + b]))
+    return _MEAN_OF_RIPPLE * worst
 
 
 @merged
