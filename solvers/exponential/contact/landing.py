@@ -396,6 +396,8 @@ def may_land(problem, tables, state, scratch, stop, direction, time_to_border):
         problem, stop, state.x
     ):
         return False
+    if scratch.landed[LAST_RESORT] > 0:
+        return True
     if direction < 0 and state.segment[stop] == 1:
         limit = _LAST_STEP
         if tables.time_exponent[1 + stop] == 2.0:
