@@ -594,6 +594,23 @@ def test_what_leaves_decelerated_leaves_at_the_speed_of_its_closed_form(dashpot)
         assert run.contacts.speed_out[0] == pytest.approx(math.sqrt(q * q + v * v - 1.0), abs=3e-6 * abs(v))
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+@pytest.mark.parametrize("slower", [1.001, 1.01, 1.03])
+def test_a_force_that_is_cut_on_the_way_out_pushes_again_before_the_opening(slower, rtol):
+    """The law pushes below a rate of leaving; q'' = -q slows the mass down to less just before the opening."""
+    q, v = -0.99, -math.sqrt(0.03)
+    least = slower * math.sqrt(q * q + v * v - 1.0)
+    stop = Contact([-1.0], Hysteretic(1e5, -v / least, clamp=True), -1.0)  # the start is the entry: its rate is |v|
+    system = System(np.eye(1), np.zeros((1, 1)), np.eye(1), [stop])
+    found, exact = (integrate(system, [q], [v], 0.2, method=method).contacts for method in (Exponential(rtol), RK))
+    for name in ("t_out", "speed_out"):
+        assert getattr(found, name) == pytest.approx(getattr(exact, name), rel=rtol), name
+    assert found.peak_force == pytest.approx(exact.peak_force, rel=100.0 * rtol)
+    assert found.impulse == pytest.approx(
+        exact.impulse, rel=0.02
+    )  # of 4e-11 to 5e-6 N s, from forces of 60 N before the cut
+
+
 def tones(omega, scale=1.0):
     """Loads along vectors of two coordinates: two harmonics, a constant, and a signal that is sampled."""
     signals = [fb.Harmonic(amplitude=scale, omega=omega), fb.Harmonic(amplitude=2e-3, omega=77.0, phase=0.4)]

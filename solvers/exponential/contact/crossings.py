@@ -51,6 +51,8 @@ CLEAR, TOO_LONG = -1, -2  # results of `before_landing`: no other event, or one 
 _ON_BEND = 1e-9  # event function, in units of its largest on the step, up to which a stop counts as on its bend
 _TOGETHER = 1e-6  # the same, relative to its value at the start, by which a bend may be crossed as another stop lands
 _ROUNDING = 1e-11  # the same, in units of its largest on the step, up to which a node may be on the wrong side
+_WITHIN = 8  # a stage of DOP853 inside its step, at 0.65
+_JUST_INSIDE = 1e-3  # δ, in units of that at the start of a landing on δ = 0, at which the sign of a force is told
 
 
 @inner
@@ -305,9 +307,21 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
                 return TOO_LONG
             if s == stop and scratch.side[s] > 0.0 and side_at(problem, tables, state, s, x, scratch.trial) < 0.0:
                 return TOO_LONG  # behind the last stage, where the force of a light dashpot turns
+            if s == stop and scratch.side[s] < 0.0 and _pushes_at_end(problem, tables, state, scratch, s, w, x):
+                return TOO_LONG  # its cut ends on the way
         if force_turns(scratch.stages, size + 3 + 2 * s, width, state.active[s, PEAK_FORCE], 1.0):
             return TOO_LONG
     return CLEAR
+
+
+@merged
+def _pushes_at_end(problem, tables, state, scratch, s, w, x):
+    """Whether a law that is cut at zero in the state w pushes just inside of where a landing ends, in the state x."""
+    batch = scratch.trial
+    batch[0] = max(indentation(problem, s, x), _JUST_INSIDE * indentation(problem, s, w))
+    batch[1] = indentation_rate(problem, s, x)
+    _sides(problem, tables, state, s, 1, batch[0:1], batch[1:2], batch[2:3])
+    return batch[2] > 0.0
 
 
 @merged
@@ -317,8 +331,11 @@ def force_turns(work, column, width, known, sign):
     At a stage the force is the rate of its impulse, in a ``column`` of the stages, over that of time, in column
     ``width``.
     """
-    if work[0, width] == 0.0 or _force_at_stage(work, column, width, sign, 0) < 0.5 * known:
-        return False  # it begins at an entry, or is too far below the peak for a higher maximum
+    if work[0, width] == 0.0:
+        return False  # it begins at an entry
+    begun = max(_force_at_stage(work, column, width, sign, 0), _force_at_stage(work, column, width, sign, _WITHIN))
+    if begun < 0.5 * known:
+        return False  # it is too far below the peak for a higher maximum
     last, highest = STAGES - 1 if work[STAGES - 1, width] != 0.0 else STAGES - 2, known
     for i in range(1, last):
         if _force_at_stage(work, column, width, sign, i) > highest:
