@@ -13,6 +13,7 @@ import solvers
 from contacts import Hertz, Jenkins, KelvinVoigt
 from fembeam import scene_file
 from fembeam.cli import main
+from fembeam.model import Model
 from fembeam.study import ModeCount, NotMetError, measure, mode_count, smallest_model
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import cut
@@ -421,6 +422,49 @@ def test_a_part_of_a_run_reads_as_the_run():
     assert 0 < len(log) < len(whole)
     among = (whole.t >= 0.1234) & (whole.t < 0.2888)
     np.testing.assert_allclose(log.t + 0.1234, whole.t[among], rtol=1e-12)
+
+
+# --- settled responses to periodic loads, without a duration -----------------------------------------------
+
+
+def settled(names, base, zeta, **options):
+    """Quantities of the response of the paper's beam without its stop, and H (k,) at the tones."""
+    scene = replace(FREE, damping=fb.ModalDamping(zeta), base=base)
+    found = fb.study.vary(scene, {"beam.length": [PAPER_BEAM.length]}, names, modes=2, **options)
+    response = scene.reduce(modes=2).frequency_response(base.tones()[0], "base")
+    return [found[name][0] for name in names], response.values
+
+
+@pytest.mark.parametrize(("share", "zeta"), [(0.9, 1e-3), (6.0, 5e-3)])
+def test_a_settled_response_has_settled(share, zeta):
+    # 240 periods of the load are not enough where damping is light, or the load quick beside the lowest mode
+    omega = share * FREE.reduce(modes=2).omega[0]
+    (amplitude, rms), H = settled(["amplitude", "rms"], fb.Harmonic(1e-3, omega), zeta)
+    np.testing.assert_allclose([amplitude, np.sqrt(2.0) * rms], 1e-3 * abs(H[0]), rtol=2e-6)
+
+
+def test_a_settled_response_is_sampled_by_its_fastest_tone():
+    # 1 and 200 rad/s have a period of 6.3 s, of which 128 samples meet every second swing
+    (amplitude,), H = settled(["amplitude"], fb.Multisine([1e-3, 1e-3], [1.0, 200.0], [0.0, 0.0]), 0.05)
+    t = np.linspace(0.0, 2.0 * np.pi, 1_000_001)
+    u = (1e-3 * H[0] * np.exp(1j * t) + 1e-3 * H[1] * np.exp(200j * t)).real
+    assert amplitude == pytest.approx(np.ptp(u) / 2.0, rel=1e-4)
+
+
+def test_a_settled_response_takes_dt_and_discard_as_asked_for(monkeypatch):
+    asked = []
+    simulate = Model.simulate
+    monkeypatch.setattr(Model, "simulate", lambda *given: asked.append(given[1:3]) or simulate(*given))
+    base = fb.Harmonic(1e-3, 2.0 * np.pi * 20.0)
+    settled(["amplitude"], base, 0.05, dt=1e-3, discard=20.0)
+    duration, times = asked[-1]
+    assert duration == pytest.approx(20.0 + 6.0)
+    np.testing.assert_allclose([times[0], times[1] - times[0], times[-1]], [20.0, 1e-3, 26.0])
+
+
+def test_a_response_without_damping_is_not_called_settled():
+    with pytest.warns(UserWarning, match="decays by friction alone, or not at all"):
+        settled(["amplitude"], fb.Harmonic(1e-3, 100.0), 0.0)
 
 
 # --- spectra as a quantity -------------------------------------------------------------------------------

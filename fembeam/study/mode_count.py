@@ -182,9 +182,12 @@ def mode_count(
     scene : Scene.
     counts : numbers of modes, each ≥ 1.
     quantity : a name of `quantities`, or a function of a run that gives a number or an array.
-    duration : s; None: the settled response to harmonic motion (360 drive periods, the last 120 in ten groups).
+    duration : s; None: the settled response to harmonic motion (120 drive periods in ten groups, after 240, or after
+        14 correlation times of the structure if that is longer).
     dt : output sampling in s; None keeps contact log and end only, enough for forces, contact times, impact rates.
-    discard : s at the beginning that the quantity does not see; the times it sees count from there.
+        Without duration None takes 128 samples of a period, or 16 of its fastest tone and of the lowest mode.
+    discard : s at the beginning that the quantity does not see; the times it sees count from there. Without duration
+        the least time to settle.
     seeds : of the noise, three or more; the same for all counts.
     residual : with static shapes of stops and forces (True), without (False), both (None, if there are any).
     reference : a count, or "full" for all modes of the finest count's mesh; None: the finest of the counts.
