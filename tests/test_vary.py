@@ -3,6 +3,7 @@
 import math
 import re
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -261,6 +262,18 @@ def test_failed_points_are_told_and_the_rest_survives(monkeypatch):
     assert found.failures[0][0] == 1
     with pytest.raises(RuntimeError, match=r"a run failed at stops\[0\].gap = 0.0005"):
         fb.study.minimise(paper_scene(), {"gap": (0.0, 1e-3)}, "peak_force", duration=0.1)
+
+
+def test_points_that_buckle_fail_and_the_rest_survives():
+    scene = replace(paper_scene(), supports=[fb.Clamped(0.0), fb.Pinned(0.2599)], stops=[], masses=[])
+    call = partial(fb.study.vary, scene, quantity="rms", duration=0.1, dt=1e-3)
+    with pytest.warns(
+        UserWarning, match=r"1 of 3 points failed; beam.axial_force = -1e\+06: axial_force must stay above"
+    ):
+        found = call({"beam.axial_force": [0.0, -1e6, 10.0]})
+    assert np.isfinite(found["rms"]).tolist() == [True, False, True]
+    with pytest.raises(ValueError, match=r"where the beam buckles.*at beam.axial_force = -1e\+06, and at all others"):
+        call({"beam.axial_force": [-1e6, -2e6]})
 
 
 # --- minima -----------------------------------------------------------------------------------------------------------
