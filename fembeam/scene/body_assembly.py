@@ -68,8 +68,7 @@ class BodyMatrices(Matrices):
         found = _of(scene, self.assembled, self.modes, held=np.zeros(0, dtype=int), condense=False)
         if self.carried is None:
             return found
-        dashpots = _dashpots(scene, self.assembled)
-        return replace(found, **moving(found.M, found.K, dashpots, found.spread, self.carried))
+        return replace(found, **moving(found.M, found.K, found.dashpots, found.spread, self.carried))
 
     def frequency_error(self, omega: ArrayLike) -> Vector:
         """Zeros: the matrices are what the structure is."""
