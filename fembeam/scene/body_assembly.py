@@ -220,7 +220,8 @@ def _of(scene: Scene, assembled: Assembled, modes: int | None, held: Any, conden
     S = sparse.eye(M.shape[0], format="csr")[:, free]
     S = S if T is None else (S @ T).tocsr()
     directions = [c for c in COMPONENTS[:3] if c in getattr(scene.beam, "base_directions", scene.beam.components)]
-    moved = {c: S.T @ (M @ r) for c, r in zip(directions, assembled.translations.T, strict=True)}
+    loads = assembled.base_loads + (M - assembled.M) @ assembled.translations
+    moved = {c: S.T @ load for c, load in zip(directions, loads.T, strict=True)}
     G = gyroscopic(scene, assembled)
     M, K, C = ((S.T @ A @ S).tocsr() for A in (M, K, C))
     return BodyMatrices(
