@@ -7,11 +7,12 @@ are made anew, as few as the modes need, so that a file's element size changes n
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import groupby, pairwise
+from itertools import combinations, groupby, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,10 @@ Vector = NDArray[np.float64]
 Names = list[set[str]]
 
 LINES = ("line", "line3", "line4")  # of higher ones the ends are used
+ABAQUS = {
+    **dict.fromkeys(("B23", "B23H", "B33", "B33H", "B31R"), "line"),
+    "B32R": "line3",
+}  # meshio has none, or B33 wrong
 WRITERS: dict[str, dict[str, Any]] = {  # suffixes, and what meshio needs to know
     ".msh": {"file_format": "gmsh22", "binary": False},
     ".inp": {},
@@ -46,7 +51,7 @@ def beam_of(
     """The beam in a file; `Beam.from_mesh` explains it."""
     where = f"{path}"
     mesh = read_mesh(path)
-    lines, names = lines_of(mesh, data, where)
+    lines, names = lines_of(mesh, data, sections, where)
     z = _along(np.asarray(mesh.points, dtype=float), lines, where)
     chain, order = _chained(z, lines, mesh.points, where)
     chosen = _chosen(sections, [names[i] for i in order], chain, where)
@@ -65,24 +70,60 @@ def beam_of(
 def read_mesh(path: str | os.PathLike[str]) -> Any:
     """The file, or a ValueError that says why not."""
     import meshio
+    from meshio.abaqus import _abaqus
 
     if not Path(path).is_file():
         raise FileNotFoundError(f"{path} does not exist")
+    _abaqus.abaqus_to_meshio_type.update(ABAQUS)
     try:
-        return meshio.read(path)
+        mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio raises many kinds, and exits for unknown suffixes
-        raise ValueError(f"{path} cannot be read as a mesh: {error or 'unknown format'}") from error
+        grouped = "Incompatible cell data 'gmsh:physical'" in str(error)
+        advice = "; gmsh wrote cells without a group too: save without 'all elements', or in its format 2.2" * grouped
+        raise ValueError(f"{path} cannot be read as a mesh: {error or 'unknown format'}{advice}") from error
+    if Path(path).suffix == ".inp":
+        _mend_sets(mesh, Path(path))
+    return mesh
 
 
-def lines_of(mesh: Any, data: str | None, where: str) -> tuple[NDArray[np.int64], Names]:
-    """Ends (e, 2) of all line elements and the names each goes by."""
+def _mend_sets(mesh: Any, path: Path) -> None:
+    """Sets of elements as an Abaqus file has them: of several blocks of one name meshio keeps the last one's size."""
+    heads = [line for line in path.read_text(errors="replace").splitlines() if re.match(r"\*element\b", line, re.I)]
+    named = [re.search(r"elset\s*=\s*([^,\s]+)", line, re.I) for line in heads]
+    none = np.zeros(0, dtype=np.int64)
+    for name, cells in mesh.cell_sets.items():
+        cells += [none] * (len(mesh.cells) - len(cells))  # of blocks that come after the set
+        mine = [found is not None and found[1] == name for found in named]
+        if any(mine) and len(named) == len(mesh.cells):  # else blocks are in other files
+            whole = zip(mine, mesh.cells, cells, strict=True)
+            mesh.cell_sets[name] = [np.arange(len(block)) if all_of_it else own for all_of_it, block, own in whole]
+
+
+def lines_of(mesh: Any, data: str | None, sections: Any, where: str) -> tuple[NDArray[np.int64], Names]:
+    """Ends (e, 2) of all line elements and the names each goes by.
+
+    Gmsh's format 2.2 has a line of several groups once for each: those of groups without a section are left out.
+    """
     others = Counter({block.type: len(block.data) for block in mesh.cells if block.type not in (*LINES, "vertex")})
     require(not others, "cells must be lines", dict(others), where, "mesh the axes only")
     blocks = [i for i, block in enumerate(mesh.cells) if block.type in LINES and len(block.data)]
     require(bool(blocks), "the mesh must hold lines", [b.type for b in mesh.cells], where, "mesh the axis")
-    lines = np.concatenate([np.asarray(mesh.cells[i].data)[:, :2] for i in blocks]).astype(np.int64)
+    points = np.asarray(mesh.points, dtype=float)
+    lines = np.concatenate([_ends(points, np.asarray(mesh.cells[i].data, dtype=np.int64)) for i in blocks])
     names = [name for i in blocks for name in _names(mesh, i, data, where)]
-    return lines, names
+    if not isinstance(sections, Mapping):
+        return lines, names
+    wanted, pairs = {str(key) for key in sections}, [frozenset(line) for line in lines.tolist()]
+    known = {pair for pair, found in zip(pairs, names, strict=True) if found & wanted}
+    kept = [i for i, found in enumerate(names) if found & wanted or pairs[i] not in known]
+    return lines[kept], [names[i] for i in kept]
+
+
+def _ends(points: Vector, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The two nodes (e, 2) of each line that are farthest apart; Abaqus has the one in the middle second."""
+    pairs = list(combinations(range(nodes.shape[1]), 2))
+    apart = [np.linalg.norm(points[nodes[:, a]] - points[nodes[:, b]], axis=1) for a, b in pairs]
+    return np.take_along_axis(nodes, np.array(pairs)[np.argmax(apart, axis=0)], axis=1)
 
 
 def _names(mesh: Any, block: int, data: str | None, where: str) -> Names:
