@@ -316,7 +316,7 @@ def test_every_study_is_run_and_kept(tmp_path, capsys):
     again = "run", path, "--out", out, "--resume", "--quiet"
     printed(capsys, *again, "--set", "mode_count.counts=[1, 3]")
     changed = [p.name for p in written if p.stat().st_mtime_ns != written[p]]
-    assert sorted(changed) == [*(f"mode_count.{kind}" for kind in ("csv", "json", "png", "txt")), "studies.json"]
+    assert sorted(changed) == [*(f"mode_count.{kind}" for kind in ("csv", "json", "npz", "png", "txt")), "studies.json"]
     other = "--set", "mode_count.counts=[1, 3]", "--set", "branch.span=[150.0, 200.0]"
     assert "belongs to another branch" in said_on_failure(capsys, 2, *again, *other)
     (out / "studies.json").write_text("{")

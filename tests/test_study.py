@@ -2,6 +2,7 @@
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -183,6 +184,37 @@ largest_forces.sampled = False
 
 
 @pytest.mark.chaotic
+def test_studies_of_modes_go_on_where_they_were_interrupted(tmp_path, monkeypatch):
+    """Model by model, to the same bits, and to other counts; those of another quantity are refused."""
+    runs = {"duration": 0.3, "dt": 1e-3, "discard": 0.1}
+    studies = (partial(mode_count, SCENE, [1, 2, 3]), partial(smallest_model, SCENE, tolerance=0.4, residual=False))
+    reduce, left = fb.Scene.reduce, [0]
+
+    def interrupted(*given, **options):
+        left[0] -= 1
+        if left[0] == 0:
+            raise KeyboardInterrupt
+        return reduce(*given, **options)
+
+    for study in studies:
+        call = partial(study, quantity="amplitude", **runs)
+        kept = tmp_path / f"{study.func.__name__}.npz"
+        whole = call()
+        for calls in (3, 2):
+            left[0] = calls
+            monkeypatch.setattr(fb.Scene, "reduce", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                call(checkpoint=kept)
+        monkeypatch.undo()
+        found = call(checkpoint=kept)
+        one, other = ([{**row, "seconds": 0.0} for row in each.table()] for each in (whole, found))
+        np.testing.assert_equal(one, other)
+        with pytest.raises(ValueError, match="belongs to another study: study is amplitude there and rms here"):
+            study(quantity="rms", checkpoint=kept, **runs)
+    rows = mode_count(SCENE, [1, 4], "amplitude", checkpoint=tmp_path / "mode_count.npz", **runs).rows
+    assert [row.modes for row in rows] == [1, 4, 1, 4]
+
+
 def test_mode_count_doubts_a_chaotic_transient():
     """Errors and sensitivity are distances of realisations in eight numbers each.
 
@@ -374,7 +406,9 @@ def test_studies_of_a_file(tmp_path, capsys):
         (tmp_path / "out" / f"{study}.txt").read_text() for study in ("mode_count", "smallest_model")
     )
     path.write_text(FILE.replace("0.01\nmost = 2", "1e-9\nmost = 1"))
-    assert main(["run", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == 1
+    assert main(["run", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == 2
+    assert "mode_count.npz holds results of [mode_count]: add --resume" in capsys.readouterr().err
+    assert main(["run", str(path), "--out", str(tmp_path / "out"), "--quiet", "--resume"]) == 1
     said = capsys.readouterr()
     assert "NOT MET" in said.err
     assert "NOT MET" in said.out

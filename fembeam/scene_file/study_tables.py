@@ -67,7 +67,8 @@ if TYPE_CHECKING:
     from fembeam.scene import Scene
     from fembeam.scene_file.reader import SceneFile
 
-NOT_IN_A_FILE = "scene", "start", "solver", "executor", "elements"  # Python objects; and what [reduce] says of the mesh
+# Python objects, what [reduce] says of the mesh, and what the folder of results has
+NOT_IN_A_FILE = "scene", "start", "solver", "executor", "elements", "checkpoint"
 MOST_SEEDS = 100_000
 
 
@@ -96,10 +97,10 @@ class ModeStudy:
         Plan(**runs, seeds=self.seeds).check(scene, named(asked["quantity"]))
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> ModeCount | SmallestModel:
-        """The study; NotMetError when there is no such model."""
-        found: ModeCount | SmallestModel = self.study(
-            file.scene, **{**self.arguments, "seeds": self.seeds, **_mesh_of(file)}
-        )
+        """The study, with its checkpoint in the folder; NotMetError when there is no such model."""
+        kept = folder / f"{self.study.__name__}.npz"
+        given = {**self.arguments, "seeds": self.seeds, **_mesh_of(file), "checkpoint": kept}
+        found: ModeCount | SmallestModel = self.study(file.scene, **given)
         return found
 
 

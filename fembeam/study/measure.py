@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import pairwise
@@ -28,6 +29,9 @@ from fembeam.model import Model, Run, load_period
 from fembeam.response import latched_before, mean_force
 from fembeam.scene import Scene, signals_of
 from fembeam.study.decay import correlation_time
+from fembeam.study.execution.checkpoint import Checkpoint, scene_identity
+from fembeam.study.execution.executors import spread
+from fembeam.study.execution.fingerprint import fingerprint
 from fembeam.study.quantities import Quantity, label
 from fembeam.study.realisations import child, renewed, seed_key
 from fembeam.support import is_whole, require, require_non_negative, require_positive
@@ -116,6 +120,12 @@ class Measured:
     share: float
     periods: float
 
+    @classmethod
+    def of(cls, arrays: Mapping[str, Any]) -> Measured:
+        """The one whose fields a checkpoint kept as arrays."""
+        plain = {name: value if name == "values" else value.item() for name, value in arrays.items()}
+        return cls(**plain)
+
     @property
     def mean(self) -> Vector:
         """Over the independent values."""
@@ -140,6 +150,26 @@ class Case:
 
     def __repr__(self) -> str:
         return ", ".join(f"{name}={value}" for name, value in self.reduce)
+
+
+def measured(cases: Sequence[Case], executor: Executor | None, told: str, kept: Checkpoint) -> list[list[Measured]]:
+    """`measure` of each case, spread over an executor; what a checkpoint holds is not measured again."""
+
+    def keys(case: Case) -> list[str]:
+        return [f"{case!r}, {solver!r}" for solver in case.solvers]
+
+    def seen(index: int, found: list[Measured]) -> None:
+        for key, one in zip(keys(missing[index]), found, strict=True):
+            kept.add(key, {name: np.asarray(value) for name, value in vars(one).items()})
+
+    missing = [case for case in cases if not {*keys(case)} <= {*kept.values}]
+    spread(measure, missing, executor, told, seen)
+    return [[Measured.of(kept.values[key]) for key in keys(case)] for case in cases]
+
+
+def identity_of(scene: Scene, plan: Plan, quantity: Quantity) -> dict[str, str]:
+    """What the measures of a model depend on besides how it is reduced and its solver."""
+    return scene_identity(scene) | {"study": f"{label(quantity)} #{fingerprint((plan, quantity), 'the study')}"}
 
 
 def measure(case: Case) -> list[Measured]:
