@@ -186,15 +186,19 @@ def test_lines_of_several_groups(tmp_path):
         assert fb.Beam.from_mesh(tmp_path / name, {"span_1": THICK, "span_2": THIN}).borders == (0.0, 0.4, 1.0)
         assert fb.Beam.from_mesh(tmp_path / name, {"all": THIN}).borders == (0.0, 1.0)
     (tmp_path / "saved_all.msh").write_text(MSH41.replace("2 1 3 2 3 -2", "0 2 3 -2"))
-    with pytest.raises(ValueError, match=r"gmsh:physical.*gmsh wrote cells without a group too: save without"):
-        fb.Beam.from_mesh(tmp_path / "saved_all.msh", THIN)
+    with pytest.raises(ValueError, match="every element must have one section, got 'none for no group'"):
+        fb.Beam.from_mesh(tmp_path / "saved_all.msh", {"all": THIN})
+    beam = fb.Beam.from_mesh(tmp_path / "saved_all.msh", THIN)
+    assert (beam.borders, beam.place("tip"), beam.place("load")) == ((0.0, 1.0), 1.0, 1.0)
 
 
 MSH41 = """$MeshFormat
 4.1 0 8
 $EndMeshFormat
 $PhysicalNames
-3
+5
+0 4 "tip"
+0 5 "load"
 1 1 "span_1"
 1 2 "span_2"
 1 3 "all"
@@ -203,7 +207,7 @@ $Entities
 3 2 0 0
 2 0.4 0 0 0
 3 0 0 0 0
-4 1 0 0 0
+4 1 0 0 2 4 5
 1 0.4 0 0 1 0 0 2 2 3 2 2 -4
 2 0 0 0 0.4 0 0 2 1 3 2 3 -2
 $EndEntities
@@ -223,7 +227,9 @@ $Nodes
 0.7 0 0
 $EndNodes
 $Elements
-2 3 1 3
+3 4 1 4
+0 4 15 1
+4 9
 1 1 1 2
 1 7 20
 2 20 9

@@ -71,19 +71,27 @@ def read_mesh(path: str | os.PathLike[str]) -> Any:
     """The file, or a ValueError that says why not."""
     import meshio
     from meshio.abaqus import _abaqus
+    from meshio.gmsh import _gmsh41
 
     if not Path(path).is_file():
         raise FileNotFoundError(f"{path} does not exist")
     _abaqus.abaqus_to_meshio_type.update(ABAQUS)
+    _gmsh41.Mesh = _even_mesh
     try:
         mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio raises many kinds, and exits for unknown suffixes
-        grouped = "Incompatible cell data 'gmsh:physical'" in str(error)
-        advice = "; gmsh wrote cells without a group too: save without 'all elements', or in its format 2.2" * grouped
-        raise ValueError(f"{path} cannot be read as a mesh: {error or 'unknown format'}{advice}") from error
+        raise ValueError(f"{path} cannot be read as a mesh: {error or 'unknown format'}") from error
     if Path(path).suffix == ".inp":
         _mend_sets(mesh, Path(path))
     return mesh
+
+
+def _even_mesh(points: Any, cells: Any, cell_data: Any = None, **rest: Any) -> Any:
+    """A mesh of gmsh's format 4.1 without data that meshio has for some cells only, those in groups; sets name them."""
+    import meshio
+
+    even = {name: data for name, data in (cell_data or {}).items() if len(data) == len(cells)}
+    return meshio.Mesh(points, cells, cell_data=even, **rest)
 
 
 def _mend_sets(mesh: Any, path: Path) -> None:
@@ -244,9 +252,18 @@ def named_nodes(mesh: Any) -> Iterator[tuple[str, int]]:
     tags = mesh.cell_data.get("gmsh:physical")
     known = {int(tag): name for name, (tag, dimension) in mesh.field_data.items() if dimension == 0}
     for i, block in enumerate(mesh.cells):
-        if block.type == "vertex" and tags is not None:
+        if block.type != "vertex":
+            continue
+        found = []
+        if tags is not None:
             pairs = zip(np.asarray(tags[i]), block.data[:, 0], strict=True)
-            yield from ((known[int(tag)], int(node)) for tag, node in pairs if int(tag) in known)
+            found += [(known[int(tag)], int(node)) for tag, node in pairs if int(tag) in known]
+        for name in known.values():  # sets have all groups of a point, tags the first one
+            cells = mesh.cell_sets.get(name, [None] * len(mesh.cells))[i]
+            found += (
+                [] if cells is None else [(name, int(node)) for node in block.data[np.asarray(cells, dtype=int), 0]]
+            )
+        yield from dict.fromkeys(found)
 
 
 def to_mesh(beam: Beam, path: str | os.PathLike[str], elements: int = 100) -> dict[str, Section | Taper]:
