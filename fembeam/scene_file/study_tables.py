@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import inspect
+import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
+from multiprocessing import parent_process
+from multiprocessing.connection import wait
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -758,7 +762,18 @@ def _check_trials(table: VaryTable | MinimiseTable, scene: Scene, names: list[st
 
 def _pool(workers: int) -> AbstractContextManager[ProcessPoolExecutor | None]:
     """So many processes, None of one."""
-    return ProcessPoolExecutor(workers) if workers > 1 else nullcontext()
+    return ProcessPoolExecutor(workers, initializer=_end_with_parent) if workers > 1 else nullcontext()
+
+
+def _end_with_parent() -> None:
+    """A process of the pool ends when what began it was killed; else it waits for work, and holds its output open."""
+
+    def watch(sentinel: int) -> None:
+        wait([sentinel])
+        os._exit(1)
+
+    if (parent := parent_process()) is not None:
+        Thread(target=watch, args=(parent.sentinel,), daemon=True).start()
 
 
 STUDIES: Constructors = {
