@@ -192,6 +192,23 @@ def test_lines_of_several_groups(tmp_path):
     assert (beam.borders, beam.place("tip"), beam.place("load")) == ((0.0, 1.0), 1.0, 1.0)
 
 
+def test_families_of_med_have_the_names_of_their_groups(tmp_path):
+    """As Salome writes them: a number for each combination of groups, of lines and of points; and a field beside."""
+    pytest.importorskip("h5py")
+    points = np.array([[0.0, 0, 0], [0.4, 0, 0], [0.2, 0, 0], [1.0, 0, 0], [0.7, 0, 0]])
+    lines = np.array([[3, 4], [0, 2], [2, 1], [1, 4]])
+    data = {"cell_tags": [np.array([-7, -6, -6, -7])], "load": [np.array([1.0, 2.0, 3.0, 4.0])]}
+    mesh = meshio.Mesh(points, [("line", lines)], {"point_tags": np.array([1, 0, 0, 2, 0])}, data)
+    mesh.cell_tags = {-6: ["span_1", "all"], -7: ["span_2", "all"]}
+    mesh.point_tags = {1: ["clamp"], 2: ["tip", "load"]}
+    mesh.write(tmp_path / "a.med")
+    for names in (("span_1", "span_2"), (-6, -7)):
+        beam = fb.Beam.from_mesh(tmp_path / "a.med", dict(zip(names, (THICK, THIN), strict=True)))
+        assert (beam.borders, [section for _, section in beam.spans]) == ((0.0, 0.4, 1.0), [THICK, THIN])
+        assert beam.places == (("clamp", 0.0), ("load", 1.0), ("tip", 1.0))
+    assert fb.Beam.from_mesh(tmp_path / "a.med", {"all": THIN}).borders == (0.0, 1.0)
+
+
 MSH41 = """$MeshFormat
 4.1 0 8
 $EndMeshFormat

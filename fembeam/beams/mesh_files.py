@@ -149,17 +149,25 @@ def _names(mesh: Any, block: int, data: str | None, where: str) -> Names:
         require(data in mesh.cell_data, f"data must be one of {', '.join(mesh.cell_data) or 'none'}", data, where,
                 "name a cell data array of the file")  # fmt: skip
         numbers = np.asarray(mesh.cell_data[data][block])
-        known = {int(tag): name for name, (tag, dimension) in mesh.field_data.items() if dimension == 1}
+        known = {tag: [name] for tag, name in _physical(mesh, 1).items()}
+        known |= getattr(mesh, "cell_tags", {})  # families of MED: one for each combination of groups
         for cell, number in enumerate(numbers):
             whole = int(number) if float(number).is_integer() else number
-            found[cell] |= {str(whole)} | ({known[whole]} if whole in known else set())
+            found[cell] |= {str(whole), *known.get(whole, ())}
     return found
+
+
+def _physical(mesh: Any, dimension: int) -> dict[int, str]:
+    """{number: name} of gmsh's groups of points (0) or lines (1); of MED there stand names of fields instead."""
+    groups = {name: pair for name, pair in mesh.field_data.items() if name != "med:nom"}
+    return {int(pair[0]): name for name, pair in groups.items() if pair[1] == dimension}
 
 
 def _numbering(mesh: Any) -> str | None:
     """The cell data that numbers the sections: gmsh's, or the only array of whole numbers."""
-    if "gmsh:physical" in mesh.cell_data:
-        return "gmsh:physical"
+    for name, known in (("gmsh:physical", True), ("cell_tags", bool(getattr(mesh, "cell_tags", None)))):
+        if known and name in mesh.cell_data:
+            return name
     whole = [name for name, blocks in mesh.cell_data.items()
              if all(np.asarray(b).ndim == 1 and np.all(np.mod(b, 1) == 0) for b in blocks)]  # fmt: skip
     own = [name for name in whole if not name.startswith("gmsh:")]
@@ -249,8 +257,11 @@ def named_nodes(mesh: Any) -> Iterator[tuple[str, int]]:
     """(name, node) of every point set and every group of vertices."""
     for name, nodes in mesh.point_sets.items():
         yield from ((name, int(node)) for node in np.asarray(nodes).ravel())
+    for family, names in getattr(mesh, "point_tags", {}).items():
+        nodes = np.flatnonzero(np.asarray(mesh.point_data["point_tags"]) == family)
+        yield from ((name, int(node)) for name in names for node in nodes)
     tags = mesh.cell_data.get("gmsh:physical")
-    known = {int(tag): name for name, (tag, dimension) in mesh.field_data.items() if dimension == 0}
+    known = _physical(mesh, 0)
     for i, block in enumerate(mesh.cells):
         if block.type != "vertex":
             continue
