@@ -141,6 +141,14 @@ def test_cantilever_frequencies(masses, beta_L):
     np.testing.assert_allclose(omegas(scene, len(beta_L)), np.square(beta_L), rtol=1e-6)
 
 
+def test_a_mass_of_nothing_changes_nothing():
+    beam, clamp = Beam(1.0, UNIT), [Clamped(0.0)]
+    light = Scene(beam, clamp, masses=[LumpedMass(0.5, 0.0)]).reduce(modes=3)
+    np.testing.assert_allclose(light.omega, Scene(beam, clamp).reduce(modes=3).omega, rtol=1e-6)
+    turned, dense = (Scene(beam, clamp, masses=[LumpedMass(0.5, mass, 0.1)]).reduce(modes=3) for mass in (0.0, 1e-12))
+    np.testing.assert_allclose(turned.omega, dense.omega, rtol=1e-9)
+
+
 def test_units_scale():
     beam = Beam(0.7, Section(E=2.1e11, rho=7800.0, A=1e-4, I=2e-10))
     expected = np.square(np.array(CLAMPED_FREE) / 0.7) * math.sqrt(2.1e11 * 2e-10 / (7800.0 * 1e-4))

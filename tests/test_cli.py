@@ -184,6 +184,20 @@ def check_partial(out, said):
     assert (out / "psd.png").exists()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="processes elsewhere do not end by signals")
+def test_the_exit_code_of_a_signal_within_code_that_is_text(tmp_path):
+    """As dataclasses run: by itself ``python -m`` then ends by SIGINT, whatever `sys.exit` says."""
+    loaded = "import sys, fembeam.support.interrupts\nfrom fembeam.cli.messages import interrupted\n"
+    codes = []
+    for name, then in (("plain", "pass"), ("known", "interrupted()")):
+        text = f"{loaded}try: exec('raise KeyboardInterrupt')\nexcept KeyboardInterrupt: {then}\nsys.exit(143)"
+        (tmp_path / f"{name}.py").write_text(text)
+        path = os.pathsep.join([str(tmp_path), str(EXAMPLE.parents[1])])
+        done = subprocess.run([sys.executable, "-m", name], env={**os.environ, "PYTHONPATH": path}, check=False)
+        codes.append(done.returncode)
+    assert codes == [-signal.SIGINT, 143]
+
+
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_leaves_what_was_computed(tmp_path, capsys, monkeypatch, number, code):
@@ -316,7 +330,7 @@ def test_every_study_is_run_and_kept(tmp_path, capsys):
     again = "run", path, "--out", out, "--resume", "--quiet"
     printed(capsys, *again, "--set", "mode_count.counts=[1, 3]")
     changed = [p.name for p in written if p.stat().st_mtime_ns != written[p]]
-    assert sorted(changed) == [*(f"mode_count.{kind}" for kind in ("csv", "json", "png", "txt")), "studies.json"]
+    assert sorted(changed) == [*(f"mode_count.{kind}" for kind in ("csv", "json", "npz", "png", "txt")), "studies.json"]
     other = "--set", "mode_count.counts=[1, 3]", "--set", "branch.span=[150.0, 200.0]"
     assert "belongs to another branch" in said_on_failure(capsys, 2, *again, *other)
     (out / "studies.json").write_text("{")

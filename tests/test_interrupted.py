@@ -1,5 +1,6 @@
 """Ctrl-C while a result is made of several runs: none of them is taken for a whole one, and what was found is kept."""
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -8,8 +9,9 @@ import pytest
 import fembeam as fb
 import solvers
 from contacts import Hertz
-from fembeam.study import ensemble, vary
+from fembeam.study import ensemble, stationary, vary
 from fembeam.study.execution import executors
+from fembeam.study.execution.checkpoint import Checkpoint
 from solvers.exponential.method import Engine as Engine
 
 SCENE = fb.Scene(
@@ -92,3 +94,41 @@ def test_an_interrupted_branch_goes_on_as_if_it_had_not_been(interrupt):
     branch.run()
     np.testing.assert_array_equal(branch.parameter, whole.parameter)
     assert [one.mark for one in branch.orbits] == [one.mark for one in whole.orbits]
+
+
+NOISE = fb.BandNoise(std=3e-4, band=(0.0, 1226.6), seed=3)
+TWO_TONES = fb.Multisine([4e-4, 3e-4], [108.0, 171.0], [0.0, 0.4])
+RECORD = fb.Record(
+    np.arange(0.0, 30.0, 0.01), 20.0 * np.sin(40.0 * np.arange(0.0, 30.0, 0.01)), quantity="acceleration"
+)
+
+
+@pytest.mark.parametrize(("base", "segments", "every"), [(NOISE, 16, 3), (TWO_TONES, 2, 1), (RECORD, 1, 1)])
+def test_a_stationary_response_goes_on_as_if_it_had_not_been_interrupted(base, segments, every, tmp_path, monkeypatch):
+    """To the last bit; what was asked of another motion is refused."""
+    model = replace(SCENE, base=base, damping=fb.ModalDamping(0.05)).reduce(modes=2)
+    asked = {"duration": 25.0, "dt": 2e-3, "segment": 512, "discard": 0.5 if base is RECORD else None}
+    whole, path, add, written = stationary(model, **asked), tmp_path / "kept.npz", Checkpoint.add, []
+
+    def stopped(self, *given):
+        add(self, *given)
+        written.append(given)
+        if len(written) % every == 0:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Checkpoint, "add", stopped)
+    for _ in range(20):
+        try:
+            found = stationary(model, checkpoint=path, **asked)
+            break
+        except KeyboardInterrupt:
+            continue
+    assert len(written) == segments
+    numbers = [{name: (*one.interval(), one.value) for name, one in each.numbers().items()} for each in (whole, found)]
+    np.testing.assert_equal(numbers[1], numbers[0])
+    for name, signal in whole.signals.items():
+        np.testing.assert_array_equal(found[name].psd.density, signal.psd.density)
+        np.testing.assert_array_equal(found[name].pdf.density, signal.pdf.density)
+    assert (found.duration, found.discarded, found.settling) == (whole.duration, whole.discarded, whole.settling)
+    with pytest.raises(ValueError, match="belongs to another study: stationary"):
+        stationary(model, checkpoint=path, **asked | {"segment": 500})

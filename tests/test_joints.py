@@ -78,3 +78,29 @@ def test_refused_alone():
     bodies = [legs()[0], fb.Frame({"A": (0, 0), "B": (1.0, 0)}, [fb.Member("A", "B", FLAT)])]
     with pytest.raises(ValueError, match=r"they share x, y, rz, got .'z'. in joints.0."):
         JoinedBodies(bodies, [Joint("B", to=(1, "A"), dofs="xyz")])
+
+
+def test_a_superelement_held_by_its_own_stiffness_is_loaded_as_it_is_moved():
+    """Base motion and weight of a chain with springs to the frame inside: reduced, turned, joined, and the whole."""
+    rng = np.random.default_rng(3)
+    nodes = range(6)
+    labels = [(node, c) for node in nodes for c in "xy"]
+    bars = np.diff(np.eye(6), axis=0)
+    K = np.kron(bars.T @ np.diag(rng.uniform(1e4, 3e4, 5)) @ bars, np.array([[2.0, 0.3], [0.3, 1.0]]))
+    K[4:8, 4:8] += np.diag(rng.uniform(2e3, 6e3, 4))
+    M = np.diag(rng.uniform(0.5, 2.0, 12))
+    body = fb.Structure(K, M, labels=labels)
+    small, angle = body.reduced([0, 5], modes=8), (0.0, 0.0, 0.7)
+    whole, turned = body.turned(angle), small.turned(angle)
+    post = fb.Structure([[5e3, 0.0], [0.0, 4e3]], np.diag([1.0, 2.0]), labels=[("top", "x"), ("top", "y")])
+    assert small.digest != small.knowing(small.root, 2.0 * small.moved).digest
+    for one, other in ((body, small), (whole, turned), (body, small.reduced([0, 5], modes=8))):
+        for joints, bodies in (((), ()), ((fb.Joint(5, to=(1, "top")),), (fb.Scene(post),))):
+            rest = {"supports": [fb.Fixed(0)], "bodies": bodies, "joints": joints, "masses": [fb.LumpedMass(5, 0.5)]}
+            rest |= {"base": {"x": fb.Harmonic(1e-3, 40.0), "y": fb.Harmonic(2e-3, 55.0)}, "gravity": (3.0, -9.81)}
+            runs = [fb.Scene(b, **rest).reduce(modes="all").simulate(0.3, 1e-3) for b in (one, other)]
+            for c in "xy":
+                exact = runs[0].displacement(5, c)
+                np.testing.assert_allclose(runs[1].displacement(5, c), exact, atol=1e-8 * np.ptp(exact))
+                exact = runs[0].reactions()[0][c]
+                np.testing.assert_allclose(runs[1].reactions()[0][c], exact, atol=1e-8 * np.ptp(exact))

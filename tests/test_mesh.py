@@ -139,3 +139,118 @@ def test_far_too_fine_elements_are_noticed(tmp_path):
     path = written(tmp_path / "a.vtu", [0.0, 0.5, 0.500001, 1.0], [[0, 1], [1, 2], [2, 3]])
     with pytest.warns(UserWarning, match=r"far too fine: 1e-06 m at z = 0.5 m"):
         fb.Beam.from_mesh(path, THIN)
+
+
+INP = """*NODE
+1, 0, 0, 0
+2, 0.05, 0, 0
+3, 0.1, 0, 0
+4, 0.2, 0, 0
+5, 0.3, 0, 0
+6, 0.45, 0, 0
+7, 0.6, 0, 0
+*ELEMENT, TYPE={kind}, ELSET=span_1
+{first}
+*ELEMENT, TYPE={kind}, ELSET=span_2
+{second}
+*Element, type={kind}, elset=span_1
+{third}
+"""
+TWO_NODES = {"first": "1, 1, 2\n2, 2, 3", "second": "3, 3, 4\n4, 4, 5", "third": "5, 6, 5\n6, 6, 7"}
+THREE_NODES = {"first": "1, 1, 2, 3", "second": "2, 3, 4, 5", "third": "3, 7, 6, 5"}  # the middle one second
+
+
+@pytest.mark.parametrize(
+    ("kind", "elements"), [("B33", TWO_NODES), ("B23", TWO_NODES), ("B32", THREE_NODES), ("B32R", THREE_NODES)]
+)
+def test_beams_of_abaqus(tmp_path, kind, elements):
+    """Elements of three nodes are as long as they are, B33 has two, and one set has several blocks of elements."""
+    (tmp_path / "a.inp").write_text(INP.format(kind=kind, **elements))
+    beam = fb.Beam.from_mesh(tmp_path / "a.inp", {"span_1": THICK, "span_2": THIN})
+    np.testing.assert_allclose(beam.borders, (0.0, 0.1, 0.3, 0.6), rtol=1e-12)
+    assert [section for _, section in beam.spans] == [THICK, THIN, THICK]
+    frame = fb.Frame.from_mesh(tmp_path / "a.inp", {"span_1": THICK, "span_2": THIN})
+    np.testing.assert_allclose(frame.lengths, [0.1, 0.2, 0.3], rtol=1e-12)
+
+
+def test_lines_of_several_groups(tmp_path):
+    """The format 2.2 of gmsh has each of them once for a group; 4.1 has them once."""
+    points = np.array([[0.0, 0, 0], [0.4, 0, 0], [1.0, 0, 0]])
+    lines, tags = np.array([[0, 1], [1, 2], [1, 0], [1, 2]]), [np.array([1, 2, 3, 3])]
+    names = {"span_1": np.array([1, 1]), "span_2": np.array([2, 1]), "all": np.array([3, 1])}
+    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    mesh = meshio.Mesh(points, [("line", lines)], cell_data=data, field_data=names)
+    mesh.write(tmp_path / "twice.msh", file_format="gmsh22", binary=False)
+    (tmp_path / "once.msh").write_text(MSH41)
+    for name in ("twice.msh", "once.msh"):
+        assert fb.Beam.from_mesh(tmp_path / name, {"span_1": THICK, "span_2": THIN}).borders == (0.0, 0.4, 1.0)
+        assert fb.Beam.from_mesh(tmp_path / name, {"all": THIN}).borders == (0.0, 1.0)
+    (tmp_path / "saved_all.msh").write_text(MSH41.replace("2 1 3 2 3 -2", "0 2 3 -2"))
+    with pytest.raises(ValueError, match="every element must have one section, got 'none for no group'"):
+        fb.Beam.from_mesh(tmp_path / "saved_all.msh", {"all": THIN})
+    beam = fb.Beam.from_mesh(tmp_path / "saved_all.msh", THIN)
+    assert (beam.borders, beam.place("tip"), beam.place("load")) == ((0.0, 1.0), 1.0, 1.0)
+
+
+def test_families_of_med_have_the_names_of_their_groups(tmp_path):
+    """As Salome writes them: a number for each combination of groups, of lines and of points; and a field beside."""
+    pytest.importorskip("h5py")
+    points = np.array([[0.0, 0, 0], [0.4, 0, 0], [0.2, 0, 0], [1.0, 0, 0], [0.7, 0, 0]])
+    lines = np.array([[3, 4], [0, 2], [2, 1], [1, 4]])
+    data = {"cell_tags": [np.array([-7, -6, -6, -7])], "load": [np.array([1.0, 2.0, 3.0, 4.0])]}
+    mesh = meshio.Mesh(points, [("line", lines)], {"point_tags": np.array([1, 0, 0, 2, 0])}, data)
+    mesh.cell_tags = {-6: ["span_1", "all"], -7: ["span_2", "all"]}
+    mesh.point_tags = {1: ["clamp"], 2: ["tip", "load"]}
+    mesh.write(tmp_path / "a.med")
+    for names in (("span_1", "span_2"), (-6, -7)):
+        beam = fb.Beam.from_mesh(tmp_path / "a.med", dict(zip(names, (THICK, THIN), strict=True)))
+        assert (beam.borders, [section for _, section in beam.spans]) == ((0.0, 0.4, 1.0), [THICK, THIN])
+        assert beam.places == (("clamp", 0.0), ("load", 1.0), ("tip", 1.0))
+    assert fb.Beam.from_mesh(tmp_path / "a.med", {"all": THIN}).borders == (0.0, 1.0)
+
+
+MSH41 = """$MeshFormat
+4.1 0 8
+$EndMeshFormat
+$PhysicalNames
+5
+0 4 "tip"
+0 5 "load"
+1 1 "span_1"
+1 2 "span_2"
+1 3 "all"
+$EndPhysicalNames
+$Entities
+3 2 0 0
+2 0.4 0 0 0
+3 0 0 0 0
+4 1 0 0 2 4 5
+1 0.4 0 0 1 0 0 2 2 3 2 2 -4
+2 0 0 0 0.4 0 0 2 1 3 2 3 -2
+$EndEntities
+$Nodes
+4 4 7 33
+0 2 0 1
+7
+0.4 0 0
+0 3 0 1
+33
+0 0 0
+0 4 0 1
+9
+1 0 0
+1 1 0 1
+20
+0.7 0 0
+$EndNodes
+$Elements
+3 4 1 4
+0 4 15 1
+4 9
+1 1 1 2
+1 7 20
+2 20 9
+1 2 1 1
+3 33 7
+$EndElements
+"""

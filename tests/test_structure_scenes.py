@@ -383,3 +383,31 @@ def test_directions_of_a_beam_are_its_sides():
                   fb.Stop(0.5, LAW, 0.1, "above", of="rotation"))  # fmt: skip
     directions = model(*(fb.Stop(0.5, LAW, 0.1, direction=way) for way in ("y", "-y", "-rx")))
     np.testing.assert_array_equal(sides.directions, directions.directions)
+
+
+@pytest.mark.parametrize("motion", [None, {"x": fb.Harmonic(1e-3, 45.0, 0.3)}])
+def test_reactions_know_where_the_damping_of_a_structure_acts(motion):
+    """A chain between two walls whose dashpots, in its own C, are strong at one end and on the frame."""
+    K, C = (_chain(sizes) for sizes in ([1e4, 2e4, 8e3, 1.5e4], [60.0, 2.0, 1.0, 0.0]))
+    C[2, 2] += 40.0
+    M, labels = np.diag([1.0, 0.7, 1.2, 0.5, 0.9]), [(i, "x") for i in range(5)]
+    force, base = fb.Harmonic(30.0, 60.0, 0.2), None if motion else {"x": fb.Harmonic(2e-3, 50.0)}
+    supports = [fb.Fixed(0, "x", motion=motion), fb.Fixed(4, "x")]
+    scene = fb.Scene(fb.Structure(K, M, C, labels), supports, forces=[fb.PointForce(3, force, "x")], base=base)
+    run = scene.reduce(modes="all").simulate(0.5, 1e-3)
+    u, v, a = (
+        np.array([read(i, "x") for i in range(5)]) for read in (run.displacement, run.velocity, run.acceleration)
+    )
+    if base:
+        a = a + base["x"].derivative(2)(run.t)
+    held = K @ u + C @ v + M @ a
+    held[3] -= force(run.t)
+    np.testing.assert_allclose(held[1:4], 0.0, atol=1e-6)
+    for reaction, exact in zip(run.reactions(), held[[0, 4]], strict=True):
+        np.testing.assert_allclose(reaction["x"], exact, atol=1e-9 * abs(exact).max())
+
+
+def _chain(sizes):
+    """The matrix of springs or dashpots in a row."""
+    ends = np.diff(np.eye(len(sizes) + 1), axis=0)
+    return ends.T @ np.diag(sizes) @ ends

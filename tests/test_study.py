@@ -2,6 +2,7 @@
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,6 +14,7 @@ import solvers
 from contacts import Hertz, Jenkins, KelvinVoigt
 from fembeam import scene_file
 from fembeam.cli import main
+from fembeam.model import Model
 from fembeam.study import ModeCount, NotMetError, measure, mode_count, smallest_model
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import cut
@@ -182,6 +184,37 @@ largest_forces.sampled = False
 
 
 @pytest.mark.chaotic
+def test_studies_of_modes_go_on_where_they_were_interrupted(tmp_path, monkeypatch):
+    """Model by model, to the same bits, and to other counts; those of another quantity are refused."""
+    runs = {"duration": 0.3, "dt": 1e-3, "discard": 0.1}
+    studies = (partial(mode_count, SCENE, [1, 2, 3]), partial(smallest_model, SCENE, tolerance=0.4, residual=False))
+    reduce, left = fb.Scene.reduce, [0]
+
+    def interrupted(*given, **options):
+        left[0] -= 1
+        if left[0] == 0:
+            raise KeyboardInterrupt
+        return reduce(*given, **options)
+
+    for study in studies:
+        call = partial(study, quantity="amplitude", **runs)
+        kept = tmp_path / f"{study.func.__name__}.npz"
+        whole = call()
+        for calls in (3, 2):
+            left[0] = calls
+            monkeypatch.setattr(fb.Scene, "reduce", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                call(checkpoint=kept)
+        monkeypatch.undo()
+        found = call(checkpoint=kept)
+        one, other = ([{**row, "seconds": 0.0} for row in each.table()] for each in (whole, found))
+        np.testing.assert_equal(one, other)
+        with pytest.raises(ValueError, match="belongs to another study: study is amplitude there and rms here"):
+            study(quantity="rms", checkpoint=kept, **runs)
+    rows = mode_count(SCENE, [1, 4], "amplitude", checkpoint=tmp_path / "mode_count.npz", **runs).rows
+    assert [row.modes for row in rows] == [1, 4, 1, 4]
+
+
 def test_mode_count_doubts_a_chaotic_transient():
     """Errors and sensitivity are distances of realisations in eight numbers each.
 
@@ -373,7 +406,9 @@ def test_studies_of_a_file(tmp_path, capsys):
         (tmp_path / "out" / f"{study}.txt").read_text() for study in ("mode_count", "smallest_model")
     )
     path.write_text(FILE.replace("0.01\nmost = 2", "1e-9\nmost = 1"))
-    assert main(["run", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == 1
+    assert main(["run", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == 2
+    assert "mode_count.npz holds results of [mode_count]: add --resume" in capsys.readouterr().err
+    assert main(["run", str(path), "--out", str(tmp_path / "out"), "--quiet", "--resume"]) == 1
     said = capsys.readouterr()
     assert "NOT MET" in said.err
     assert "NOT MET" in said.out
@@ -421,6 +456,49 @@ def test_a_part_of_a_run_reads_as_the_run():
     assert 0 < len(log) < len(whole)
     among = (whole.t >= 0.1234) & (whole.t < 0.2888)
     np.testing.assert_allclose(log.t + 0.1234, whole.t[among], rtol=1e-12)
+
+
+# --- settled responses to periodic loads, without a duration -----------------------------------------------
+
+
+def settled(names, base, zeta, **options):
+    """Quantities of the response of the paper's beam without its stop, and H (k,) at the tones."""
+    scene = replace(FREE, damping=fb.ModalDamping(zeta), base=base)
+    found = fb.study.vary(scene, {"beam.length": [PAPER_BEAM.length]}, names, modes=2, **options)
+    response = scene.reduce(modes=2).frequency_response(base.tones()[0], "base")
+    return [found[name][0] for name in names], response.values
+
+
+@pytest.mark.parametrize(("share", "zeta"), [(0.9, 1e-3), (6.0, 5e-3)])
+def test_a_settled_response_has_settled(share, zeta):
+    # 240 periods of the load are not enough where damping is light, or the load quick beside the lowest mode
+    omega = share * FREE.reduce(modes=2).omega[0]
+    (amplitude, rms), H = settled(["amplitude", "rms"], fb.Harmonic(1e-3, omega), zeta)
+    np.testing.assert_allclose([amplitude, np.sqrt(2.0) * rms], 1e-3 * abs(H[0]), rtol=2e-6)
+
+
+def test_a_settled_response_is_sampled_by_its_fastest_tone():
+    # 1 and 200 rad/s have a period of 6.3 s, of which 128 samples meet every second swing
+    (amplitude,), H = settled(["amplitude"], fb.Multisine([1e-3, 1e-3], [1.0, 200.0], [0.0, 0.0]), 0.05)
+    t = np.linspace(0.0, 2.0 * np.pi, 1_000_001)
+    u = (1e-3 * H[0] * np.exp(1j * t) + 1e-3 * H[1] * np.exp(200j * t)).real
+    assert amplitude == pytest.approx(np.ptp(u) / 2.0, rel=1e-4)
+
+
+def test_a_settled_response_takes_dt_and_discard_as_asked_for(monkeypatch):
+    asked = []
+    simulate = Model.simulate
+    monkeypatch.setattr(Model, "simulate", lambda *given: asked.append(given[1:3]) or simulate(*given))
+    base = fb.Harmonic(1e-3, 2.0 * np.pi * 20.0)
+    settled(["amplitude"], base, 0.05, dt=1e-3, discard=20.0)
+    duration, times = asked[-1]
+    assert duration == pytest.approx(20.0 + 6.0)
+    np.testing.assert_allclose([times[0], times[1] - times[0], times[-1]], [20.0, 1e-3, 26.0])
+
+
+def test_a_response_without_damping_is_not_called_settled():
+    with pytest.warns(UserWarning, match="decays by friction alone, or not at all"):
+        settled(["amplitude"], fb.Harmonic(1e-3, 100.0), 0.0)
 
 
 # --- spectra as a quantity -------------------------------------------------------------------------------

@@ -1,8 +1,14 @@
 """Parameter studies: closed answers over grids and samples, the same bits however they are run, minima, bad input."""
 
 import math
+import multiprocessing
+import os
 import re
+import select
+import signal
+import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -14,6 +20,7 @@ import fembeam as fb
 from contacts import Hertz, Hysteretic
 from fembeam import cli, scene_file
 from fembeam.scene import with_value
+from fembeam.scene_file.study_tables import _pool
 from fembeam.study.execution.executors import spread
 from fembeam.study.quantities import Amplitude, PeakForce
 
@@ -261,6 +268,42 @@ def test_failed_points_are_told_and_the_rest_survives(monkeypatch):
     assert found.failures[0][0] == 1
     with pytest.raises(RuntimeError, match=r"a run failed at stops\[0\].gap = 0.0005"):
         fb.study.minimise(paper_scene(), {"gap": (0.0, 1e-3)}, "peak_force", duration=0.1)
+
+
+def test_points_that_buckle_fail_and_the_rest_survives():
+    scene = replace(paper_scene(), supports=[fb.Clamped(0.0), fb.Pinned(0.2599)], stops=[], masses=[])
+    call = partial(fb.study.vary, scene, quantity="rms", duration=0.1, dt=1e-3)
+    with pytest.warns(
+        UserWarning, match=r"1 of 3 points failed; beam.axial_force = -1e\+06: axial_force must stay above"
+    ):
+        found = call({"beam.axial_force": [0.0, -1e6, 10.0]})
+    assert np.isfinite(found["rms"]).tolist() == [True, False, True]
+    with pytest.raises(ValueError, match=r"where the beam buckles.*at beam.axial_force = -1e\+06, and at all others"):
+        call({"beam.axial_force": [-1e6, -2e6]})
+
+
+def working(end):
+    """Hold the end of a pipe, as the processes of a table do."""
+    with _pool(2) as pool:
+        pids = {pool.submit(os.getpid).result() for _ in range(8)}
+        os.write(end, " ".join(map(str, pids)).encode())
+        time.sleep(300.0)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no such processes")
+def test_workers_of_a_table_end_with_what_began_them():
+    reads, writes = os.pipe()
+    victim = multiprocessing.get_context("fork").Process(target=working, args=(writes,))
+    victim.start()
+    os.close(writes)
+    pids = os.read(reads, 1000).split()
+    victim.kill()
+    victim.join()
+    ready, _, _ = select.select([reads], [], [], 30.0)
+    for pid in () if ready else pids:
+        os.kill(int(pid), signal.SIGKILL)
+    assert ready, "a worker still holds the pipe"
+    os.close(reads)
 
 
 # --- minima -----------------------------------------------------------------------------------------------------------

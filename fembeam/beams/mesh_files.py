@@ -7,11 +7,12 @@ are made anew, as few as the modes need, so that a file's element size changes n
 from __future__ import annotations
 
 import os
+import re
 import tempfile
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import groupby, pairwise
+from itertools import combinations, groupby, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,10 @@ Vector = NDArray[np.float64]
 Names = list[set[str]]
 
 LINES = ("line", "line3", "line4")  # of higher ones the ends are used
+ABAQUS = {
+    **dict.fromkeys(("B23", "B23H", "B33", "B33H", "B31R"), "line"),
+    "B32R": "line3",
+}  # meshio has none, or B33 wrong
 WRITERS: dict[str, dict[str, Any]] = {  # suffixes, and what meshio needs to know
     ".msh": {"file_format": "gmsh22", "binary": False},
     ".inp": {},
@@ -46,7 +51,7 @@ def beam_of(
     """The beam in a file; `Beam.from_mesh` explains it."""
     where = f"{path}"
     mesh = read_mesh(path)
-    lines, names = lines_of(mesh, data, where)
+    lines, names = lines_of(mesh, data, sections, where)
     z = _along(np.asarray(mesh.points, dtype=float), lines, where)
     chain, order = _chained(z, lines, mesh.points, where)
     chosen = _chosen(sections, [names[i] for i in order], chain, where)
@@ -65,24 +70,68 @@ def beam_of(
 def read_mesh(path: str | os.PathLike[str]) -> Any:
     """The file, or a ValueError that says why not."""
     import meshio
+    from meshio.abaqus import _abaqus
+    from meshio.gmsh import _gmsh41
 
     if not Path(path).is_file():
         raise FileNotFoundError(f"{path} does not exist")
+    _abaqus.abaqus_to_meshio_type.update(ABAQUS)
+    _gmsh41.Mesh = _even_mesh
     try:
-        return meshio.read(path)
+        mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio raises many kinds, and exits for unknown suffixes
         raise ValueError(f"{path} cannot be read as a mesh: {error or 'unknown format'}") from error
+    if Path(path).suffix == ".inp":
+        _mend_sets(mesh, Path(path))
+    return mesh
 
 
-def lines_of(mesh: Any, data: str | None, where: str) -> tuple[NDArray[np.int64], Names]:
-    """Ends (e, 2) of all line elements and the names each goes by."""
+def _even_mesh(points: Any, cells: Any, cell_data: Any = None, **rest: Any) -> Any:
+    """A mesh of gmsh's format 4.1 without data that meshio has for some cells only, those in groups; sets name them."""
+    import meshio
+
+    even = {name: data for name, data in (cell_data or {}).items() if len(data) == len(cells)}
+    return meshio.Mesh(points, cells, cell_data=even, **rest)
+
+
+def _mend_sets(mesh: Any, path: Path) -> None:
+    """Sets of elements as an Abaqus file has them: of several blocks of one name meshio keeps the last one's size."""
+    heads = [line for line in path.read_text(errors="replace").splitlines() if re.match(r"\*element\b", line, re.I)]
+    named = [re.search(r"elset\s*=\s*([^,\s]+)", line, re.I) for line in heads]
+    none = np.zeros(0, dtype=np.int64)
+    for name, cells in mesh.cell_sets.items():
+        cells += [none] * (len(mesh.cells) - len(cells))  # of blocks that come after the set
+        mine = [found is not None and found[1] == name for found in named]
+        if any(mine) and len(named) == len(mesh.cells):  # else blocks are in other files
+            whole = zip(mine, mesh.cells, cells, strict=True)
+            mesh.cell_sets[name] = [np.arange(len(block)) if all_of_it else own for all_of_it, block, own in whole]
+
+
+def lines_of(mesh: Any, data: str | None, sections: Any, where: str) -> tuple[NDArray[np.int64], Names]:
+    """Ends (e, 2) of all line elements and the names each goes by.
+
+    Gmsh's format 2.2 has a line of several groups once for each: those of groups without a section are left out.
+    """
     others = Counter({block.type: len(block.data) for block in mesh.cells if block.type not in (*LINES, "vertex")})
     require(not others, "cells must be lines", dict(others), where, "mesh the axes only")
     blocks = [i for i, block in enumerate(mesh.cells) if block.type in LINES and len(block.data)]
     require(bool(blocks), "the mesh must hold lines", [b.type for b in mesh.cells], where, "mesh the axis")
-    lines = np.concatenate([np.asarray(mesh.cells[i].data)[:, :2] for i in blocks]).astype(np.int64)
+    points = np.asarray(mesh.points, dtype=float)
+    lines = np.concatenate([_ends(points, np.asarray(mesh.cells[i].data, dtype=np.int64)) for i in blocks])
     names = [name for i in blocks for name in _names(mesh, i, data, where)]
-    return lines, names
+    if not isinstance(sections, Mapping):
+        return lines, names
+    wanted, pairs = {str(key) for key in sections}, [frozenset(line) for line in lines.tolist()]
+    known = {pair for pair, found in zip(pairs, names, strict=True) if found & wanted}
+    kept = [i for i, found in enumerate(names) if found & wanted or pairs[i] not in known]
+    return lines[kept], [names[i] for i in kept]
+
+
+def _ends(points: Vector, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The two nodes (e, 2) of each line that are farthest apart; Abaqus has the one in the middle second."""
+    pairs = list(combinations(range(nodes.shape[1]), 2))
+    apart = [np.linalg.norm(points[nodes[:, a]] - points[nodes[:, b]], axis=1) for a, b in pairs]
+    return np.take_along_axis(nodes, np.array(pairs)[np.argmax(apart, axis=0)], axis=1)
 
 
 def _names(mesh: Any, block: int, data: str | None, where: str) -> Names:
@@ -100,17 +149,25 @@ def _names(mesh: Any, block: int, data: str | None, where: str) -> Names:
         require(data in mesh.cell_data, f"data must be one of {', '.join(mesh.cell_data) or 'none'}", data, where,
                 "name a cell data array of the file")  # fmt: skip
         numbers = np.asarray(mesh.cell_data[data][block])
-        known = {int(tag): name for name, (tag, dimension) in mesh.field_data.items() if dimension == 1}
+        known = {tag: [name] for tag, name in _physical(mesh, 1).items()}
+        known |= getattr(mesh, "cell_tags", {})  # families of MED: one for each combination of groups
         for cell, number in enumerate(numbers):
             whole = int(number) if float(number).is_integer() else number
-            found[cell] |= {str(whole)} | ({known[whole]} if whole in known else set())
+            found[cell] |= {str(whole), *known.get(whole, ())}
     return found
+
+
+def _physical(mesh: Any, dimension: int) -> dict[int, str]:
+    """{number: name} of gmsh's groups of points (0) or lines (1); of MED there stand names of fields instead."""
+    groups = {name: pair for name, pair in mesh.field_data.items() if name != "med:nom"}
+    return {int(pair[0]): name for name, pair in groups.items() if pair[1] == dimension}
 
 
 def _numbering(mesh: Any) -> str | None:
     """The cell data that numbers the sections: gmsh's, or the only array of whole numbers."""
-    if "gmsh:physical" in mesh.cell_data:
-        return "gmsh:physical"
+    for name, known in (("gmsh:physical", True), ("cell_tags", bool(getattr(mesh, "cell_tags", None)))):
+        if known and name in mesh.cell_data:
+            return name
     whole = [name for name, blocks in mesh.cell_data.items()
              if all(np.asarray(b).ndim == 1 and np.all(np.mod(b, 1) == 0) for b in blocks)]  # fmt: skip
     own = [name for name in whole if not name.startswith("gmsh:")]
@@ -200,12 +257,24 @@ def named_nodes(mesh: Any) -> Iterator[tuple[str, int]]:
     """(name, node) of every point set and every group of vertices."""
     for name, nodes in mesh.point_sets.items():
         yield from ((name, int(node)) for node in np.asarray(nodes).ravel())
+    for family, names in getattr(mesh, "point_tags", {}).items():
+        nodes = np.flatnonzero(np.asarray(mesh.point_data["point_tags"]) == family)
+        yield from ((name, int(node)) for name in names for node in nodes)
     tags = mesh.cell_data.get("gmsh:physical")
-    known = {int(tag): name for name, (tag, dimension) in mesh.field_data.items() if dimension == 0}
+    known = _physical(mesh, 0)
     for i, block in enumerate(mesh.cells):
-        if block.type == "vertex" and tags is not None:
+        if block.type != "vertex":
+            continue
+        found = []
+        if tags is not None:
             pairs = zip(np.asarray(tags[i]), block.data[:, 0], strict=True)
-            yield from ((known[int(tag)], int(node)) for tag, node in pairs if int(tag) in known)
+            found += [(known[int(tag)], int(node)) for tag, node in pairs if int(tag) in known]
+        for name in known.values():  # sets have all groups of a point, tags the first one
+            cells = mesh.cell_sets.get(name, [None] * len(mesh.cells))[i]
+            found += (
+                [] if cells is None else [(name, int(node)) for node in block.data[np.asarray(cells, dtype=int), 0]]
+            )
+        yield from dict.fromkeys(found)
 
 
 def to_mesh(beam: Beam, path: str | os.PathLike[str], elements: int = 100) -> dict[str, Section | Taper]:

@@ -54,4 +54,6 @@ def interrupted() -> int:
 
     from fembeam.support import interrupts
 
+    # interrupted in text that it ran, as of a dataclass, `python -m` else ends by SIGINT whatever the code is
+    exec("")
     return TERMINATED if interrupts.received() == signal.SIGTERM else INTERRUPTED

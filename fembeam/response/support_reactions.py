@@ -4,8 +4,9 @@ At every sample supports and springs balance statically all that acts on the unr
 
     K u_s = f - M (ü + r (ÿ + g)),    reaction = (K_all u_s + M_all (ü + r (ÿ + g)) - f) on the supported dofs,
 
-f the loads, contact forces and dashpots, ü the motion of the kept modes. Modes left out follow statically, so that
-forces and moments balance whatever the number of modes. Structural damping is taken as part of the internal forces.
+f the loads, contact forces, dashpots and the C of a structure, ü the motion of the kept modes. Modes left out follow
+statically, so that forces and moments balance whatever the number of modes. Damping by ratios or Rayleigh's is taken as
+part of the internal forces.
 """
 
 from __future__ import annotations
@@ -253,7 +254,15 @@ def _acting(model: Model, full: Matrices) -> Vector:
             damped += full.interpolation(part.z, derivative, body).T @ rates[[derivative]]
     if full.gyroscopic is not None:
         damped -= full.gyroscopic @ vectors
+    damped -= _own_damping(full) @ vectors
     return np.hstack([pushed, frame, -(full.M @ vectors), damped])
+
+
+def _own_damping(full: Matrices) -> sparse.csr_matrix:
+    """C (N_all, N_all) that bodies came with, whose places are known as those of dashpots are."""
+    own = [beam.assembled.C if isinstance(beam, BodyMatrices) else None for beam in full.beams]
+    parts = [sparse.csr_matrix(beam.M.shape) if C is None else C for beam, C in zip(full.beams, own, strict=True)]
+    return sparse.block_diag([*parts, sparse.csr_matrix(2 * (len(full.impactors),))], format="csr")
 
 
 def _on_all(matrices: Matrices, full: Matrices) -> sparse.csr_matrix:

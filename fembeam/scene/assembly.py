@@ -443,9 +443,10 @@ def moved_by_rows(arms: sparse.csr_matrix, free: Any, r: Vector) -> float:
     """
     columns = arms.tocsc()[:, free]
     touched = columns[:, np.flatnonzero(np.diff(columns.indptr))].toarray()
+    sizes = np.linalg.norm(touched, axis=0)
+    touched = touched[:, sizes > 0.0] / sizes[sizes > 0.0]  # a mass of 0 kg has rows of zeros
     if not touched.size:
         return 0.0
-    touched = touched / np.linalg.norm(touched, axis=0)
     moved = touched @ np.linalg.lstsq(touched, arms @ r)[0]
     return float(moved @ moved)
 

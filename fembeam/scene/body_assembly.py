@@ -68,8 +68,7 @@ class BodyMatrices(Matrices):
         found = _of(scene, self.assembled, self.modes, held=np.zeros(0, dtype=int), condense=False)
         if self.carried is None:
             return found
-        dashpots = _dashpots(scene, self.assembled)
-        return replace(found, **moving(found.M, found.K, dashpots, found.spread, self.carried))
+        return replace(found, **moving(found.M, found.K, found.dashpots, found.spread, self.carried))
 
     def frequency_error(self, omega: ArrayLike) -> Vector:
         """Zeros: the matrices are what the structure is."""
@@ -221,7 +220,8 @@ def _of(scene: Scene, assembled: Assembled, modes: int | None, held: Any, conden
     S = sparse.eye(M.shape[0], format="csr")[:, free]
     S = S if T is None else (S @ T).tocsr()
     directions = [c for c in COMPONENTS[:3] if c in getattr(scene.beam, "base_directions", scene.beam.components)]
-    moved = {c: S.T @ (M @ r) for c, r in zip(directions, assembled.translations.T, strict=True)}
+    loads = assembled.base_loads + (M - assembled.M) @ assembled.translations
+    moved = {c: S.T @ load for c, load in zip(directions, loads.T, strict=True)}
     G = gyroscopic(scene, assembled)
     M, K, C = ((S.T @ A @ S).tocsr() for A in (M, K, C))
     return BodyMatrices(

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import inspect
+import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
+from multiprocessing import parent_process
+from multiprocessing.connection import wait
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -67,7 +71,8 @@ if TYPE_CHECKING:
     from fembeam.scene import Scene
     from fembeam.scene_file.reader import SceneFile
 
-NOT_IN_A_FILE = "scene", "start", "solver", "executor", "elements"  # Python objects; and what [reduce] says of the mesh
+# Python objects, what [reduce] says of the mesh, and what the folder of results has
+NOT_IN_A_FILE = "scene", "start", "solver", "executor", "elements", "checkpoint"
 MOST_SEEDS = 100_000
 
 
@@ -96,10 +101,10 @@ class ModeStudy:
         Plan(**runs, seeds=self.seeds).check(scene, named(asked["quantity"]))
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> ModeCount | SmallestModel:
-        """The study; NotMetError when there is no such model."""
-        found: ModeCount | SmallestModel = self.study(
-            file.scene, **{**self.arguments, "seeds": self.seeds, **_mesh_of(file)}
-        )
+        """The study, with its checkpoint in the folder; NotMetError when there is no such model."""
+        kept = folder / f"{self.study.__name__}.npz"
+        given = {**self.arguments, "seeds": self.seeds, **_mesh_of(file), "checkpoint": kept}
+        found: ModeCount | SmallestModel = self.study(file.scene, **given)
         return found
 
 
@@ -757,7 +762,18 @@ def _check_trials(table: VaryTable | MinimiseTable, scene: Scene, names: list[st
 
 def _pool(workers: int) -> AbstractContextManager[ProcessPoolExecutor | None]:
     """So many processes, None of one."""
-    return ProcessPoolExecutor(workers) if workers > 1 else nullcontext()
+    return ProcessPoolExecutor(workers, initializer=_end_with_parent) if workers > 1 else nullcontext()
+
+
+def _end_with_parent() -> None:
+    """A process of the pool ends when what began it was killed; else it waits for work, and holds its output open."""
+
+    def watch(sentinel: int) -> None:
+        wait([sentinel])
+        os._exit(1)
+
+    if (parent := parent_process()) is not None:
+        Thread(target=watch, args=(parent.sentinel,), daemon=True).start()
 
 
 STUDIES: Constructors = {

@@ -11,7 +11,7 @@ each batch needs a realisation of its own.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -180,6 +180,15 @@ class Batches:
             self.rows[: MOST // 2] = self.rows[0::2] + self.rows[1::2]
             self.rows[MOST // 2 :] = 0.0
             self.full, self.per_row = MOST // 2, 2 * self.per_row
+
+    def arrays(self) -> dict[str, NDArray[np.float64]]:
+        """All it holds, to be kept in a file."""
+        return {"rows": self.rows, "counts": np.array([self.full, self.per_row, self.open_row], dtype=np.float64)}
+
+    def take(self, arrays: Mapping[str, NDArray[np.float64]]) -> None:
+        """Go on from `arrays` of another one of the same size."""
+        self.rows = np.array(arrays["rows"])
+        self.full, self.per_row, self.open_row = (int(count) for count in arrays["counts"])
 
     @property
     def filled(self) -> NDArray[np.float64]:

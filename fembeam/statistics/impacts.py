@@ -6,6 +6,7 @@ row of a batch: [time, time in contact, entries, contacts, Σa, Σa², Σb, Σb�
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -53,6 +54,15 @@ class Impacts:
             row[SUMS + 2 * i : SUMS + 2 * i + 2] = values.sum(), (values**2).sum()
             self.largest[name] = float(np.fmax.reduce([self.largest[name], *values]))
         self.batches.add(row)
+
+    def arrays(self) -> dict[str, Vector]:
+        """All it holds, to be kept in a file."""
+        return {"largest": np.array([self.largest[name] for name in QUANTITIES]), **self.batches.arrays()}
+
+    def take(self, arrays: Mapping[str, Vector]) -> None:
+        """Go on from the `arrays` of another one."""
+        self.largest = dict(zip(QUANTITIES, map(float, arrays["largest"]), strict=True))
+        self.batches.take(arrays)
 
     @staticmethod
     def _columns(log: solvers.ContactLog, kept: NDArray[np.bool_]) -> dict[str, Vector]:

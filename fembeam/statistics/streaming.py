@@ -6,7 +6,7 @@ row of a batch: [n, Σξ, Σξ², Σξ³, Σξ⁴, time, up-crossings | histogra
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import pairwise
 from typing import Any
 
@@ -57,6 +57,20 @@ class Signal:
     def __repr__(self) -> str:
         total = self.batches.total
         return f"<signal of {int(total[N])} samples, std {float(self.std.value):.4g}>" if total[N] else "<empty signal>"
+
+    def arrays(self) -> dict[str, Vector]:
+        """All it holds between two stretches, to be kept in a file."""
+        numbers = [self.origin, float(self._equal), self.welch.segment, self.smallest, self.largest]
+        return {"edges": self.edges, "numbers": np.array(numbers), **self.batches.arrays()}
+
+    @classmethod
+    def of_arrays(cls, arrays: Mapping[str, Vector], dt: float, level: float) -> Signal:
+        """The one that these `arrays` are of, to go on with another stretch."""
+        origin, equal, segment, smallest, largest = (float(one) for one in arrays["numbers"])
+        found = cls(np.array([origin]), dt, int(segment), level, arrays["edges"])
+        found._equal, found.smallest, found.largest = bool(equal), smallest, largest
+        found.batches.take(arrays)
+        return found
 
     def cut(self) -> None:
         """The next samples do not follow the last ones."""

@@ -30,6 +30,7 @@ class Assembled:
     C : (N, N) damping of the body itself, or None.
     gyroscopic : (N, N) skew-symmetric G, or None.
     accuracy : what the mesh promises, a sentence.
+    moved : (N, d): the M r of these translations, where a reduced M does not have them; None: it has.
 
     Examples
     --------
@@ -48,6 +49,12 @@ class Assembled:
     C: sparse.csr_matrix | None = None
     gyroscopic: sparse.csr_matrix | None = None
     accuracy: str = ""
+    moved: NDArray[np.float64] | None = None
+
+    @property
+    def base_loads(self) -> NDArray[np.float64]:
+        """M r (N, d) of the translations."""
+        return np.asarray(self.M @ self.translations) if self.moved is None else self.moved
 
     def rows_of(self, places: Sequence[Any]) -> sparse.csr_matrix:
         """`rows` of several places, one below the other."""

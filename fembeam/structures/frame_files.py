@@ -36,7 +36,7 @@ def frame_of(
     """The frame in a file; `Frame.from_mesh` explains it."""
     where = f"{path}"
     mesh = read_mesh(path)
-    lines, groups = lines_of(mesh, data, where)
+    lines, groups = lines_of(mesh, data, sections, where)
     points = np.zeros((len(mesh.points), 3))
     points[:, : np.shape(mesh.points)[1]] = mesh.points
     middles = [f"{shown(points[line].mean(axis=0, keepdims=True))} m" for line in lines]

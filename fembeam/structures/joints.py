@@ -90,11 +90,14 @@ def joined_fields(bodies: Sequence[Body], made: Sequence[Assembled], T: sparse.c
         "M": (T.T @ sparse.block_diag([one.M for one in made], format="csr") @ T).tocsr(),
         "K": (T.T @ sparse.block_diag([one.K for one in made], format="csr") @ T).tocsr(),
         "labels": tuple(labels[i] for i in free),
-        "translations": _translations(bodies, made)[free],
+        "translations": _shared(bodies, made, "translations")[free],
         "root": None if root is None else root.tocsr(),
         "C": _optional(made, "C", T),
         "gyroscopic": _optional(made, "gyroscopic", T),
         "accuracy": "; ".join(one.accuracy for one in made if one.accuracy),
+        "moved": None
+        if all(one.moved is None for one in made)
+        else np.asarray(T.T @ _shared(bodies, made, "base_loads")),
     }
 
 
@@ -167,12 +170,12 @@ def _independent(B: Vector, names: list[str]) -> None:
         Q = np.vstack([Q, left / size])
 
 
-def _translations(bodies: Sequence[Body], made: Sequence[Assembled]) -> Vector:
-    """Unit translations (N, d) of all bodies, along the axes that all of them have."""
+def _shared(bodies: Sequence[Body], made: Sequence[Assembled], name: str) -> Vector:
+    """`translations` or `base_loads` (N, d) of all bodies, along the axes that all of them have."""
     axes = [translations_of(one) for one in bodies]
-    shared = [name for name in COMPONENTS[:3] if all(name in known for known in axes)]
+    shared = [axis for axis in COMPONENTS[:3] if all(axis in known for known in axes)]
     pairs = zip(made, axes, strict=True)
-    return np.vstack([one.translations[:, [known.index(name) for name in shared]] for one, known in pairs])
+    return np.vstack([getattr(one, name)[:, [known.index(axis) for axis in shared]] for one, known in pairs])
 
 
 def translations_of(body: Any) -> list[str]:

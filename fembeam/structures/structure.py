@@ -70,6 +70,7 @@ class Structure(NamedBody):
     points: dict[str, Hashable]
     edges: tuple[tuple[Hashable, Hashable], ...]
     root: sparse.csr_matrix | None  # R with RᵀR = K, of a superelement of a frame
+    moved: Vector | None  # M r (N, d) of the translations r, of a superelement whose inside is held to the frame
 
     def __init__(
         self,
@@ -97,15 +98,16 @@ class Structure(NamedBody):
         values = {
             **{"K": given["K"], "M": given["M"], "C": given.get("C"), "labels": names},
             **{"nodes": {node: length * place for node, place in at.items()}, "points": named},
-            **{"edges": checked_edges(lines, at, WHERE), "root": None},
+            **{"edges": checked_edges(lines, at, WHERE), "root": None, "moved": None},
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
-    def rooted(self, root: sparse.csr_matrix) -> Structure:
-        """The same with R (k, N), RᵀR = K: low frequencies of stiff bodies to full accuracy."""
+    def knowing(self, root: sparse.csr_matrix | None = None, moved: Vector | None = None) -> Structure:
+        """The same with R (k, N), RᵀR = K: low frequencies of stiff bodies to full accuracy; and with M r (N, d)."""
         found = copy(self)
         object.__setattr__(found, "root", root)
+        object.__setattr__(found, "moved", moved)
         return found
 
     @cached_property
@@ -116,6 +118,7 @@ class Structure(NamedBody):
             if one is not None:
                 made.update(one.indptr.astype(np.int64).tobytes() + one.indices.astype(np.int64).tobytes())
                 made.update(one.data.tobytes())
+        made.update(b"" if self.moved is None else self.moved.tobytes())
         return made.hexdigest()[:12]
 
     def __repr__(self) -> str:
@@ -138,7 +141,8 @@ class Structure(NamedBody):
         kept = [label for label, bare in zip(self.labels, self.M.diagonal() == 0, strict=True) if not bare]
         C = None if self.C is None else T.T @ self.C @ T
         points = {name: node for name, node in self.points.items() if node in {one for one, _ in kept}}
-        return Structure(T.T @ self.K @ T, T.T @ self.M @ T, C, kept, self.nodes, points)
+        found = Structure(T.T @ self.K @ T, T.T @ self.M @ T, C, kept, self.nodes, points)
+        return found if self.moved is None else found.knowing(moved=np.asarray(T.T @ self.moved))
 
     def turned(self, rotation: Sequence[float]) -> Structure:
         """The same structure turned about the origin: dofs stay along the global axes.
@@ -277,6 +281,7 @@ class Structure(NamedBody):
             *(self.M, self.K, self.labels, self.rows, moved.reshape(len(self.labels), len(along))),
             root=self.root,
             C=self.C,
+            moved=self.moved,
             accuracy=f"{len(self.labels)} dofs as they were given",
         )
 

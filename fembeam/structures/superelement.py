@@ -3,7 +3,8 @@
 u = T q̂,    T = [1 0; Ψ Φ],    Ψ = -K_ii⁻¹ K_ib
 
 q̂ are the motions u_b of the interface nodes, then the modes Φ of the rest with these held. K̂ = TᵀKT has no coupling
-between the two; a rigid motion of the body is one of the interface alone, and M̂ keeps its mass.
+between the two. A rigid motion r of a free body is one of the interface alone, and M̂ keeps its mass; of one that its
+own K holds it is none of q̂, so that the load TᵀM r of a base motion is kept too.
 
 R.R. Craig, M.C.C. Bampton, AIAA Journal 6 (1968) 1313.
 """
@@ -20,6 +21,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 import reduction
 from fembeam.structures.assembled import COMPONENTS, Assembled
+from fembeam.structures.joints import translations_of
 from fembeam.support import is_whole, require
 
 if TYPE_CHECKING:
@@ -52,7 +54,8 @@ def reduced(body: Any, made: Assembled, nodes: Sequence[Any], modes: int, where:
     points = {name: node for name, node in getattr(body, "points", {}).items() if hasattr(body, "node") and node in at}
     lines = [pair for pair in _lines(body) if set(pair) <= set(known)]
     found = Structure(K, (M + M.T) / 2, C, labels, known, points, lines)
-    return found if root is None else found.rooted(root)
+    along = [translations_of(body).index(c) for c in translations_of(found)]
+    return found.knowing(root, np.asarray(T.T @ made.base_loads[:, along]))
 
 
 def _dofs(body: Any, made: Assembled, node: Any, where: str) -> dict[str, int]:

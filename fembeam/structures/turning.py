@@ -62,7 +62,9 @@ def turned_structure(body: Structure, rotation: Any) -> Structure:
     C = None if body.C is None else B @ body.C @ B.T
     nodes = {node: R @ at for node, at in body.nodes.items()}
     found = Structure(K, M, C, body.labels, nodes, body.points, body.edges)
-    return found if body.root is None else found.rooted(body.root @ B.T)
+    along = [i for i, name in enumerate(COMPONENTS[:3]) if name in body.components]
+    moved = None if body.moved is None else np.asarray(B @ body.moved @ R[np.ix_(along, along)].T)
+    return found.knowing(None if body.root is None else body.root @ B.T, moved)
 
 
 def _of_dofs(body: Structure, R: Vector) -> sparse.csr_matrix:

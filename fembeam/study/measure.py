@@ -4,13 +4,17 @@ Three kinds of run give them:
 
 * transient: one run of a given duration, one value, no scatter;
 * random: one run per seed of the noise, one value each;
-* periodic (no duration given): one long run under periodic loads, settled, cut into groups of twelve drive periods:
-  an orbit of period 1, 2, 3, 4, 6 or 12 gives ten equal values, a chaotic response ten that scatter.
+* periodic (no duration given): one long run under periodic loads, settled for 240 drive periods or 14 correlation
+  times of the structure, whichever is longer, then cut into groups of twelve drive periods: an orbit of period 1, 2, 3,
+  4, 6 or 12 gives ten equal values, a chaotic response ten that scatter.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from itertools import pairwise
@@ -24,6 +28,10 @@ import solvers
 from fembeam.model import Model, Run, load_period
 from fembeam.response import latched_before, mean_force
 from fembeam.scene import Scene, signals_of
+from fembeam.study.decay import correlation_time
+from fembeam.study.execution.checkpoint import Checkpoint, scene_identity
+from fembeam.study.execution.executors import spread
+from fembeam.study.execution.fingerprint import fingerprint
 from fembeam.study.quantities import Quantity, label
 from fembeam.study.realisations import child, renewed, seed_key
 from fembeam.support import is_whole, require, require_non_negative, require_positive
@@ -32,8 +40,11 @@ from solvers.problem.whole_runs import whole_runs
 Vector = NDArray[np.float64]
 Start = Callable[[Model], Any]
 
-SETTLING, GROUPS, GROUP = 240, 10, 12  # drive periods before, number of groups, periods in each
-SAMPLES = 128  # per drive period
+SETTLING, GROUPS, GROUP = 240, 10, 12  # fewest drive periods before, number of groups, periods in each
+SETTLED = 14.0  # correlation times before, at least: what the start left has fallen to e^-14, 1e-6
+LONGEST = 100_000  # drive periods before, at most
+SAMPLES, FEWEST = 128, 16  # at least: per drive period; per period of its fastest tone and of the lowest mode
+MOST = 2048  # per drive period for the lowest mode's sake
 FEWEST_SEEDS = 3
 
 
@@ -52,9 +63,9 @@ class Plan:
         object.__setattr__(self, "seeds", _checked_seeds(self.seeds))
         require(self.start is None or callable(self.start), "start must be a function of a model", self.start, "study",
                 "e.g. lambda m: m.state(velocity=…)")  # fmt: skip
+        require_non_negative("discard", self.discard, "study", "give s")
         if self.duration is not None:
             require_positive("duration", self.duration, "study", "give s, or None for a periodic response")
-            require_non_negative("discard", self.discard, "study", "give s")
             require(self.discard < self.duration, f"discard must be below the duration of {self.duration:g} s",
                     self.discard, "study", "run longer")  # fmt: skip
         if self.dt is not None:
@@ -109,6 +120,12 @@ class Measured:
     share: float
     periods: float
 
+    @classmethod
+    def of(cls, arrays: Mapping[str, Any]) -> Measured:
+        """The one whose fields a checkpoint kept as arrays."""
+        plain = {name: value if name == "values" else value.item() for name, value in arrays.items()}
+        return cls(**plain)
+
     @property
     def mean(self) -> Vector:
         """Over the independent values."""
@@ -133,6 +150,26 @@ class Case:
 
     def __repr__(self) -> str:
         return ", ".join(f"{name}={value}" for name, value in self.reduce)
+
+
+def measured(cases: Sequence[Case], executor: Executor | None, told: str, kept: Checkpoint) -> list[list[Measured]]:
+    """`measure` of each case, spread over an executor; what a checkpoint holds is not measured again."""
+
+    def keys(case: Case) -> list[str]:
+        return [f"{case!r}, {solver!r}" for solver in case.solvers]
+
+    def seen(index: int, found: list[Measured]) -> None:
+        for key, one in zip(keys(missing[index]), found, strict=True):
+            kept.add(key, {name: np.asarray(value) for name, value in vars(one).items()})
+
+    missing = [case for case in cases if not {*keys(case)} <= {*kept.values}]
+    spread(measure, missing, executor, told, seen)
+    return [[Measured.of(kept.values[key]) for key in keys(case)] for case in cases]
+
+
+def identity_of(scene: Scene, plan: Plan, quantity: Quantity) -> dict[str, str]:
+    """What the measures of a model depend on besides how it is reduced and its solver."""
+    return scene_identity(scene) | {"study": f"{label(quantity)} #{fingerprint((plan, quantity), 'the study')}"}
 
 
 def measure(case: Case) -> list[Measured]:
@@ -160,21 +197,48 @@ def runs(model: Model, plan: Plan, quantity: Quantity, solver: Any) -> list[Run]
     """The runs, or parts of a run, that give independent values; times count from the beginning of each."""
     start = None if plan.start is None else plan.start(model)
     if plan.duration is None:
-        return periodic(model, start, solver, getattr(quantity, "sampled", True))
+        return periodic(model, plan, start, solver, getattr(quantity, "sampled", True))
     models = [_seeded(model, seed) for seed in plan.seeds] if plan.seeds else [model]
     whole = [each.simulate(plan.duration, plan.dt, start, solver) for each in models]
     return [cut(run, plan.discard, plan.duration) for run in whole]
 
 
-def periodic(model: Model, start: Any, solver: Any, sampled: bool) -> list[Run]:
+def periodic(model: Model, plan: Plan, start: Any, solver: Any, sampled: bool) -> list[Run]:
     """Groups of drive periods of the settled response; a simulation rather than shooting, as it may be chaotic."""
     period = load_period(model.scene)
-    dt = period / SAMPLES if sampled else None
-    run = model.simulate((SETTLING + GROUPS * GROUP) * period, dt, start, solver)
-    borders = (SETTLING + GROUP * np.arange(GROUPS + 1)) * period
+    before, per = settling_periods(model, period, plan.discard), samples_per_period(model, period, plan.dt)
+    times = np.arange(before * per, (before + GROUPS * GROUP) * per + 1) / per * period
+    run = model.simulate((before + GROUPS * GROUP) * period, times if sampled else None, start, solver)
+    borders = (before + GROUP * np.arange(GROUPS + 1)) * period
     parts = [cut(run, a, b) for a, b in pairwise(borders)]
     share = replace(run.cost, seconds=run.cost.seconds / GROUPS)
     return [replace(part, cost=share) for part in parts]
+
+
+def settling_periods(model: Model, period: float, discard: float) -> int:
+    """Drive periods after which the response counts as settled; warns where that is not known."""
+    asked = math.ceil(max(SETTLING, discard / period) - 1e-9)
+    try:
+        lasts = math.ceil(SETTLED * correlation_time(model) / period)
+    except ValueError:  # no damping, or that of friction alone
+        if not discard:
+            warnings.warn(f"a mode decays by friction alone, or not at all: {SETTLING} periods of the load may not "
+                          "settle it; give discard=, or duration=", UserWarning, stacklevel=2)  # fmt: skip
+        return asked
+    if lasts > LONGEST > asked:
+        warnings.warn(f"the response takes {lasts} periods of the load to settle, {LONGEST} are run; give discard=, "
+                      "or duration=", UserWarning, stacklevel=2)  # fmt: skip
+    return max(asked, min(lasts, LONGEST))
+
+
+def samples_per_period(model: Model, period: float, dt: float | None) -> int:
+    """Samples of a drive period: as asked for, or enough for its tones and the lowest mode that swings."""
+    if dt is not None:
+        return max(1, math.ceil(period / dt - 1e-9))
+    tones = [float(np.max(signal.tones()[0], initial=0.0)) for signal in signals_of(model.scene).values()]
+    swings = model.omega[model.omega > 1e-6 * float(model.omega.max())]
+    slow = min(FEWEST * float(swings.min(initial=math.inf)), MOST * 2.0 * math.pi / period) if len(swings) else 0.0
+    return max(SAMPLES, math.ceil(max(FEWEST * max(tones), slow) * period / (2.0 * math.pi) - 1e-9))
 
 
 def cut(run: Run, start: float, end: float) -> Run:

@@ -12,6 +12,7 @@ above the resulting change may be due to rounding, as in chaotic motion, and the
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
@@ -23,8 +24,8 @@ import numpy as np
 import solvers
 from fembeam import plot
 from fembeam.scene import Scene
-from fembeam.study.execution.executors import spread
-from fembeam.study.measure import Case, Measured, Plan, Start, measure
+from fembeam.study.execution.checkpoint import Checkpoint
+from fembeam.study.measure import Case, Measured, Plan, Start, identity_of, measured
 from fembeam.study.quantities import Quantity, label, named
 from fembeam.study.result import Result
 from fembeam.support import Part, is_whole, require
@@ -174,6 +175,7 @@ def mode_count(
     solver: Any = None,
     executor: Executor | None = None,
     elements: int | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> ModeCount:
     """How a quantity converges with the number of modes.
 
@@ -182,9 +184,12 @@ def mode_count(
     scene : Scene.
     counts : numbers of modes, each ≥ 1.
     quantity : a name of `quantities`, or a function of a run that gives a number or an array.
-    duration : s; None: the settled response to harmonic motion (360 drive periods, the last 120 in ten groups).
+    duration : s; None: the settled response to harmonic motion (120 drive periods in ten groups, after 240, or after
+        14 correlation times of the structure if that is longer).
     dt : output sampling in s; None keeps contact log and end only, enough for forces, contact times, impact rates.
-    discard : s at the beginning that the quantity does not see; the times it sees count from there.
+        Without duration None takes 128 samples of a period, or 16 of its fastest tone and of the lowest mode.
+    discard : s at the beginning that the quantity does not see; the times it sees count from there. Without duration
+        the least time to settle.
     seeds : of the noise, three or more; the same for all counts.
     residual : with static shapes of stops and forces (True), without (False), both (None, if there are any).
     reference : a count, or "full" for all modes of the finest count's mesh; None: the finest of the counts.
@@ -192,6 +197,8 @@ def mode_count(
     solver : one of `solvers`; None: `Exponential(1e-8)` without energy balance.
     executor : any `concurrent.futures.Executor`; counts are spread over it.
     elements : of the mesh of all counts; None: for each as few as make its frequencies right to 1e-6.
+    checkpoint : file written whole after each count; what it holds is not computed again, also of other counts. It is
+        refused when scene, quantity or runs differ.
 
     Returns
     -------
@@ -240,7 +247,8 @@ def mode_count(
         Case(scene, tuple(a.items()), plan, kept, (method, *(_looser(method, plan) if a == finest else ())))
         for a in arguments
     ]
-    found = spread(measure, items, executor, f"modes for {label(kept)}")
+    finished = Checkpoint(checkpoint, {} if checkpoint is None else identity_of(scene, plan, kept))
+    found = measured(items, executor, f"modes for {label(kept)}", finished)
     exact, *loose = found[arguments.index(finest)]
     rows = _rows(arguments, [first for first, *_ in found], exact)
     study = ModeCount(label(kept), rows, _change(loose[0], exact) if loose else None)

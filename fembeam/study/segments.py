@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -31,6 +31,7 @@ LONGEST = 100.0  # correlation times, and eight segments of the spectrum: the le
 RENEWAL = 5.0  # correlation times left out after noise was renewed: e^-5 of the old noise is left
 MOST_SAMPLES = 2_000_000  # of a segment
 FEWEST_SAMPLES = 64
+REACHED = "index", "dropped", "taken", "kept", "discarded", "time", "seconds"  # fields that change
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +103,8 @@ class Segments:
     def pieces(self) -> Iterator[Segment]:
         """Segment after segment until the duration is reached."""
         if not self.repeats:
+            if self.index:  # kept in a checkpoint
+                return
             run = self._run(self.duration)
             yield Segment(run, self.first_lead, self._border(run, self.first_lead), self.batches)
             return
@@ -153,6 +156,16 @@ class Segments:
         self.kept += kept
         self._go_on(piece)
         self.discarded += self.dt * piece.end - kept
+
+    def arrays(self) -> dict[str, Vector]:
+        """How far it came, to be kept in a file."""
+        return {"state": self.state, "reached": np.array([getattr(self, name) for name in REACHED], dtype=np.float64)}
+
+    def take(self, arrays: Mapping[str, Vector]) -> None:
+        """Go on from the `arrays` of another one of the same plan."""
+        self.state = np.array(arrays["state"])
+        for name, value in zip(REACHED, arrays["reached"].tolist(), strict=True):
+            setattr(self, name, int(value) if name in REACHED[:3] else value)
 
     def _go_on(self, piece: Segment) -> None:
         """Continue from the border of a segment."""

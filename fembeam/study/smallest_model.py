@@ -13,6 +13,7 @@ against twice the modes and a hundredth of rtol.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
@@ -24,8 +25,8 @@ import solvers
 from fembeam import plot
 from fembeam.model import Model
 from fembeam.scene import Scene
-from fembeam.study.execution.executors import spread
-from fembeam.study.measure import Case, Measured, Plan, Start, measure
+from fembeam.study.execution.checkpoint import Checkpoint
+from fembeam.study.measure import Case, Measured, Plan, Start, identity_of, measured
 from fembeam.study.mode_count import check_comparable, difference, kinds_of
 from fembeam.study.quantities import Quantity, label, named
 from fembeam.study.result import Result
@@ -162,6 +163,7 @@ def smallest_model(
     start: Start | None = None,
     executor: Executor | None = None,
     elements: int | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> SmallestModel:
     """The fewest coordinates and the loosest rtol that give a quantity to a relative tolerance.
 
@@ -169,7 +171,7 @@ def smallest_model(
     ----------
     scene, quantity, duration, dt, discard, seeds, residual, start, executor, elements : as for `mode_count`.
     tolerance : relative, in (0, 1); of the norm if the quantity is an array.
-    most : modes that an answer may have, 1 to 64.
+    most : modes that an answer may have, 1 to 64. checkpoint : as for `mode_count`, written after each model.
 
     Returns
     -------
@@ -198,8 +200,9 @@ def smallest_model(
     check_goal(tolerance, most)
     plan, kept = Plan(duration, dt, discard, seeds, start), named(quantity)
     plan.check(scene, kept)
+    finished = Checkpoint(checkpoint, {} if checkpoint is None else identity_of(scene, plan, kept))
     return Search(
-        scene, kept, plan, float(tolerance), int(most), kinds_of(scene, residual), executor, elements
+        scene, kept, plan, float(tolerance), int(most), kinds_of(scene, residual), executor, elements, finished
     ).answer()
 
 
@@ -223,6 +226,7 @@ class Search:
     kinds: tuple[bool, ...]
     executor: Executor | None
     elements: int | None = None
+    finished: Checkpoint = field(default_factory=lambda: Checkpoint(None, {}))
     seen: dict[Choice, Measured] = field(default_factory=dict)
 
     def answer(self) -> SmallestModel:
@@ -251,9 +255,9 @@ class Search:
             for (n, kind), group in zip(models, groups, strict=True)
         ]  # fmt: skip
         if items:
-            found = spread(measure, items, self.executor, f"smallest model for {label(self.quantity)}")
-            for group, measured in zip(groups, found, strict=True):
-                self.seen.update(zip(group, measured, strict=True))
+            found = measured(items, self.executor, f"smallest model for {label(self.quantity)}", self.finished)
+            for group, each in zip(groups, found, strict=True):
+                self.seen.update(zip(group, each, strict=True))
         return [self.seen[choice] for choice in choices]
 
     @property

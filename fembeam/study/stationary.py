@@ -14,6 +14,7 @@ records, which have one realisation only, a segment holds eight.
 from __future__ import annotations
 
 import math
+import os
 import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -31,6 +32,8 @@ from fembeam.scene import signals_of
 from fembeam.statistics import Batches, Estimate, Impacts, Signal
 from fembeam.statistics.initial_transient import Settling, settling
 from fembeam.statistics.spectra import FINEST_RESOLUTION
+from fembeam.study.execution.checkpoint import Checkpoint, scene_identity
+from fembeam.study.execution.fingerprint import fingerprint
 from fembeam.study.result import Result
 from fembeam.study.segments import FEWEST_SAMPLES, Segment, Segments
 from fembeam.support import Part, bar, is_whole, note, number, numbers, require
@@ -150,6 +153,7 @@ def stationary(
     start: ArrayLike | None = None,
     solver: Any = None,
     progress: bool = False,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> Response:
     """Statistics of the stationary response of a model, over ``duration`` seconds in constant memory.
 
@@ -168,6 +172,9 @@ def stationary(
     start : (2n,) as for `Model.simulate`.
     solver : None is ``solvers.Exponential(1e-8, ledger=False)``.
     progress : show a bar (on terminals and in notebooks only).
+    checkpoint : file written whole after each segment; the same call goes on from there and gives the same bits, with
+        another `until` too. It is refused when anything else has changed, as of `ensemble`. Of a record, which is one
+        segment, it holds the end only.
 
     Raises
     ------
@@ -205,9 +212,13 @@ def stationary(
     plan = Segments.of(model, duration, dt, discard, start, solver, segment)
     watched = dict(watch) if watch else watched_by_default(model)
     sums = Sums(watched, dt, segment, dict(bins or {}), dict(levels or {}), len(model.scene.stops))
-    settled, enough = None, None if until is None else False
+    about = {} if checkpoint is None else _identity(model, watched, sums, plan, discard, start, solver)
+    kept = Checkpoint(checkpoint, about)
+    settled, enough = _resumed(kept, plan, sums), None if until is None else False
+    if until is not None and plan.taken >= FEWEST_BATCHES:  # as it was asked before the end of an earlier call
+        enough = _enough(sums.response(plan, settled, enough), of, until)
     with bar(duration, progress) as report:
-        for whole in plan.pieces():
+        for whole in plan.pieces() if not enough else ():
             piece: Segment | None = whole
             seen = {name: _looked(name, look, whole.run) for name, look in watched.items()}
             if settled is None and discard is None:
@@ -215,6 +226,7 @@ def stationary(
             if piece is None:
                 continue
             plan.keep(piece, sums.add(piece, seen))
+            _keep(kept, plan, sums, settled)
             response = sums.response(plan, settled, enough)
             report(min(plan.kept, duration))
             if until is not None and plan.taken >= FEWEST_BATCHES:
@@ -227,6 +239,36 @@ def stationary(
     response = sums.response(plan, settled, enough)
     note("%r, %.4g s before it left out", response, response.discarded)
     return response
+
+
+def _identity(
+    model: Model, watched: Mapping[str, Watch], sums: Sums, plan: Segments, discard: Any, start: Any, solver: Any
+) -> dict[str, str]:
+    """What the segments depend on, seeds among it, as texts that can be compared."""
+    asked = [plan.duration, plan.dt, discard, None if start is None else np.asarray(start), solver]
+    asked += [sums.segment, sums.bins, sums.levels]
+    about = scene_identity(model.scene) | {"modes": repr(model.modes), "frequencies": fingerprint(model.omega)}
+    about |= {"watch": f"{', '.join(watched)} #{fingerprint(dict(watched), 'watch')}"}
+    return about | {"stationary": f"{plan.duration:g} s, dt = {plan.dt:g} s #{fingerprint(asked, 'stationary')}"}
+
+
+def _keep(kept: Checkpoint, plan: Segments, sums: Sums, settled: Settling | None) -> None:
+    """Write what there is so far."""
+    if kept.path is None:
+        return
+    end = [] if settled is None else [settled.time, settled.drift, float(settled.died_out)]
+    kept.add("so far", {"settled": np.array(end), **plan.arrays(), **sums.arrays()})
+
+
+def _resumed(kept: Checkpoint, plan: Segments, sums: Sums) -> Settling | None:
+    """Go on from what a checkpoint holds: the end of the transient, if it was found."""
+    if not kept.values:
+        return None
+    arrays = kept.values["so far"]
+    plan.take(arrays)
+    sums.take(arrays)
+    end = arrays["settled"].tolist()
+    return Settling(end[0], end[1], bool(end[2])) if end else None
 
 
 def characteristics(model: Model, duration: float, dt: float, **options: Any) -> dict[str, Any]:
@@ -417,6 +459,24 @@ class Sums:
         self._add_work(piece.run, borders)
         return self.dt * float(piece.end - first)
 
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """All sums by name, to be kept in a file."""
+        found: dict[str, NDArray[Any]] = {"names": np.array(self.names, dtype=str), "rubbing": np.array(self.rubbing)}
+        parts: dict[str, Batches | Impacts | Signal] = {"work": self.work}
+        parts |= {f"impacts {i}": one for i, one in enumerate(self.impacts)}
+        parts |= {f"signal {name}": one for name, one in self.signals.items()}
+        return found | {f"{part} {key}": array for part, one in parts.items() for key, array in one.arrays().items()}
+
+    def take(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from these sums."""
+        self.names, self.rubbing = tuple(map(str, arrays["names"])), tuple(map(bool, arrays["rubbing"]))
+        self.work.take(_part(arrays, "work"))
+        for i, one in enumerate(self.impacts):
+            one.take(_part(arrays, f"impacts {i}"))
+        for name in self.watched:
+            level = self.levels.get(name, 0.0)
+            self.signals[name] = Signal.of_arrays(_part(arrays, f"signal {name}"), self.dt, level)
+
     def _add_work(self, run: Run, borders: Any) -> None:
         """Take in what each contact took between samples."""
         if not self.names:
@@ -439,3 +499,8 @@ class Sums:
         """The statistics so far."""
         seen = self.signals, self.impacts, plan.kept, plan.discarded, settled, enough, plan.seconds
         return Response(*seen, self.names, self.work, self.rubbing)
+
+
+def _part(arrays: Mapping[str, NDArray[Any]], name: str) -> dict[str, NDArray[Any]]:
+    """The arrays of one part, by their own names."""
+    return {key.removeprefix(f"{name} "): one for key, one in arrays.items() if key.startswith(f"{name} ")}

@@ -71,6 +71,10 @@ def _number(name: str, value: Any) -> float:
     return float(found.reshape(()))
 
 
+class Refused(str):
+    """Why a point has no model; that of all points is bad input."""
+
+
 @dataclass(frozen=True)
 class Trial:
     """What is done at every point: `names` of the parameters, what is asked, how the model is reduced and run.
@@ -143,11 +147,20 @@ class Trial:
         """(k, q) independent values of every quantity, or why the run failed."""
         scene = self.at(point)
         try:
-            model = scene.reduce(**self.reduction) if self.model is None else self.model.under(scene)
+            model = self._model(scene)
+            if isinstance(model, Refused):
+                return model
             with whole_runs():
                 return values_of(self.asked, runs(model, self.plan, self.asked, self.method), self.told(point))
         except (solvers.SolverError, AccuracyError) as error:
             return f"{type(error).__name__}: {error}"
+
+    def _model(self, scene: Scene) -> Model | Refused:
+        """The model at a point, or why there is none, such as a preload that buckles it."""
+        try:
+            return scene.reduce(**self.reduction) if self.model is None else self.model.under(scene)
+        except ValueError as error:
+            return Refused(error)
 
 
 @contextmanager

@@ -20,7 +20,7 @@ from fembeam.study.execution.executors import spread
 from fembeam.study.execution.fingerprint import fingerprint
 from fembeam.study.measure import Plan, Start
 from fembeam.study.result import Result
-from fembeam.study.trial import Asked, Maker, Trial
+from fembeam.study.trial import Asked, Maker, Refused, Trial
 from fembeam.support import Part, is_whole, require
 from solvers.problem import counted
 
@@ -164,7 +164,8 @@ def vary(
     Raises
     ------
     ValueError : a path that does not exist (with the nearest one), values that are no finite numbers or that the scene
-        refuses, an unknown quantity, runs that cannot be made like this: all before computing.
+        refuses, an unknown quantity, runs that cannot be made like this: all before computing. What cannot be reduced
+        at any point, such as a preload that buckles the structure; at some points it is a failure of these.
 
     Warns
     -----
@@ -206,6 +207,8 @@ def computed(
             kept.add(_key(points[i]), {"values": result})
 
     spread(trial, [tuple(points[i].tolist()) for i in missing], executor, progress, seen)
+    if len(failed) == len(points) and all(isinstance(reason, Refused) for _, reason in failed):
+        raise ValueError(f"{failed[0][1]} (at {trial.told(points[failed[0][0]])}, and at all others)")
     return tuple(sorted(failed))
 
 
