@@ -185,6 +185,20 @@ def test_a_shaft_spins_at_its_radius():
     assert scene.reduce(modes=4).contact_rows[0].spin == -150.0
 
 
+def test_an_inclined_shaft_twists_as_one_along_an_axis():
+    """Its twist goes about a vector, which has no name: such scenes were refused."""
+    straight = hole(radius=0.00955, bending_only=False)
+    rotation, ways = (0.0, 0.9, 0.0), ((np.cos(0.9), 0.0, -np.sin(0.9)), (0.0, 1.0, 0.0))
+    pushes = [replace(one, direction=way) for one, way in zip(straight.forces, ways, strict=True)]
+    stop = replace(straight.stops[0], directions=ways)
+    inclined = replace(straight, beam=straight.beam.turned(rotation), stops=[stop], forces=pushes)
+    one, other = (
+        scene.reduce(modes=4, residual=True).simulate(0.06, 1e-4, solver=METHOD) for scene in (straight, inclined)
+    )
+    assert np.abs(one.friction()).max() > 1.0
+    np.testing.assert_allclose(other.friction(), one.friction(), rtol=0.0, atol=1e-5 * np.abs(one.friction()).max())
+
+
 def test_a_run_goes_on_from_a_slider_that_sticks():
     """Also on a shaft that spins slowly, whose loads are constant: time begins anew."""
     scene = hole(spin=0.5, radius=0.00955)
