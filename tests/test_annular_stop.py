@@ -255,6 +255,7 @@ def test_scene_files(file_of):
         ("clearance = 2e-4", "", "the key 'clearance' is missing"),
         ('kind = "annular"', 'kind = "anular"', "kind must be one of stop, annular; got 'anular'; did you mean"),
         ("outer = true", "out = true", "unknown key 'out'"),
+        ("directions = [[", 'directions = "x" #', "directions must be a list of 2 names or vectors, got 'x'"),
     ):
         with pytest.raises(SceneFileError, match=message):
             file_of(TOML.replace(old, new))
@@ -268,8 +269,9 @@ def test_scene_files(file_of):
         ({"clearance": "2 mm"}, "clearance must be a number"),
         ({"centre": (2e-4, 0.0, 0.0)}, "centre must be two finite numbers"),
         ({"centre": (np.nan, 0.0)}, "centre must be two finite numbers"),
-        ({"centre": (3e-4, 4e-4)}, r"lies outside by, got '0.0003 m, towards \(-0.6, -0.8\)'"),
-        ({"outer": True}, "begin outside the circle; it lies inside by, got '0.0002 m'"),
+        ({"centre": (3e-4, 4e-4)}, r"got \(0.0003, 0.0004\) .* 0.0003 m outside, towards \(-0.6, -0.8\)"),
+        ({"outer": 1}, "outer must be True or False, got 1"),
+        ({"outer": True}, r"begin outside the circle round the centre, got \(0.0, 0.0\) .* 0.0002 m inside"),
         ({"law": WaltonBraun(1e3, 2e3, "kept")}, "law must have no memory"),
         ({"law": Hertz}, "law must offer force"),
         ({"directions": "xy"}, "directions must be two"),
@@ -282,6 +284,13 @@ def test_scene_files(file_of):
 def test_bad_stops_are_refused(options, message):
     with pytest.raises((ValueError, TypeError), match=message):
         fb.AnnularStop(**{"z": 0.4, "law": LAW, "clearance": 2e-4, **options})
+
+
+def test_arrays_say_where_the_circle_is():
+    given = fb.AnnularStop(0.4, LAW, 2e-4, centre=np.array([1e-4, 0.0]), directions=np.eye(3)[:2])
+    listed = fb.AnnularStop(0.4, LAW, 2e-4, centre=(1e-4, 0.0), directions=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
+    assert given == listed
+    assert fb.AnnularStop(0.4, LAW, 2e-4, directions=list(np.eye(3)[:2])).directions == listed.directions
 
 
 def test_bad_scenes_are_refused():

@@ -739,3 +739,26 @@ def test_a_hole_hardly_touched_at_rest_takes_few_steps(rtol):
     hole = Contact(np.eye(2), law, np.hypot(*start) - depth, map="annulus", friction=Friction(1.0, 2.5e6))
     system = System(np.eye(2), np.diag([25.0, 32.0]), K, [hole], [load])
     assert integrate(system, start, [0, 0], 0.1, method=Exponential(rtol)).cost.steps < 250
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "mu", "k_t", "v_n", "v_t", "push", "rtol"),
+    [
+        (2528155.5031932, 0.25417813, 75752.24890717775, 0.0646663756922, 0.0007775484294, -9.234541000459, 1.0257e-06),
+        (14870280.8325, 0.316066702, 101923.0315556, 0.34710152194, 0.02585238695653, -950.01027109, 5.0858642e-08),
+        (3346625.9371046, 0.0723452814, 58109.4711982, 0.0898755814463, 0.00042818153163, -8.210559534, 6.8044302e-08),
+    ],
+)
+def test_a_stick_just_after_an_entry_that_turns_round(stiffness, mu, k_t, v_n, v_t, push, rtol):
+    """The polynomial of a margin that N^1.5 and |F_t| = 0 bend began it far below zero, so that it never ended."""
+    system = wall(Hertz(stiffness), mu, k_t, mass=1.0)
+    pushed = replace(system, loads=[([0.0, 1.0], fb.Harmonic(push, 0.0))])
+    start, before = [-1e-5, 0.0], 1e-5 / v_n
+    duration = before + 3.2 * (1.25 / stiffness) ** 0.4 * v_n**-0.2
+    first, second = (
+        integrate(pushed, start, [v_n, v_t - push * before], duration, None, method)
+        for method in (Exponential(rtol), SHARP)
+    )
+    assert first.transitions.event.tolist() == second.transitions.event.tolist()
+    np.testing.assert_allclose(first.transitions.t, second.transitions.t, rtol=0.0, atol=1e-5 * duration)
+    np.testing.assert_allclose(first.q_dot[-1], second.q_dot[-1], rtol=1e-4)

@@ -98,3 +98,13 @@ def test_units_of_frames_that_look_wrong_are_told():
         "stops[0] 'wall': a gap of 500 m on a frame of 1000 m: is it in mm?",
     ]
     assert doubts(elbow(stops=[fb.Stop("C", LAW, gap=1e-3, direction="x")]).reduce(2)) == []
+
+
+def test_friction_in_per_cent_and_radii_in_mm_are_told():
+    shaft = fb.Frame.straight(1.0, fb.Section.circle(2.1e11, 7850.0, 0.02), bending_only=True)
+    hole = fb.AnnularStop("B", LAW, 2e-4, friction=fb.Friction(20.0, 1e6), radius=10.0)
+    said = doubts(fb.Scene(shaft, [fb.Clamped("A")], stops=[hole]).reduce(2))
+    assert said == [
+        "stops[0]: mu = 20 looks like per cent",
+        "stops[0]: a radius of 10 m on a frame of 1 m: is it in mm?",
+    ]

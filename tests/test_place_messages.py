@@ -123,3 +123,14 @@ def test_a_member_is_no_place_where_parts_have_names_either():
         scene.reduce(1).phi(("34-N35", "x"))
     with pytest.raises(ValueError, match=re.escape("write ('34-N35', s) for a place s along the member")):
         fb.Scene(BENT, scene.supports, scene.masses, stops=[fb.Stop("34-N35", LAW, direction="x")])
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+def test_numbers_of_numpy_are_places_of_frames(kind):
+    """They were compared with ("A-B", 0.25) number by number: "truth value of an array"."""
+    tube = fb.Frame.straight(1.0, fb.Section.circle(2.1e11, 7850.0, 0.02))
+    scene = fb.Scene(tube, [fb.Clamped("A")], stops=[fb.Stop(("A-B", 0.25), LAW, 1e-3, direction="x")],
+                     base={"x": fb.Harmonic(1e-3, 90.0)})  # fmt: skip
+    run = scene.reduce(modes=2).simulate(0.01, 1e-3)
+    for z in (0.25, 0.375):
+        np.testing.assert_array_equal(run.displacement(kind(z), "x"), run.displacement(z, "x"))

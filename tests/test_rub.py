@@ -172,6 +172,17 @@ def test_laws_whose_damping_goes_by_the_entry_need_its_speed():
     assert slow.growth < quick.growth
 
 
+def test_a_rotor_without_damping_has_its_rub():
+    """It was refused as not round: gyroscopic moments have nothing on the diagonal to compare with."""
+    twisted = fb.Frame.straight(0.5, fb.Section.circle(2.1e11, 7850.0, 0.04), spin=200.0)
+    for body, options in ((SHAFT, {"modes": 4}), (twisted, {"modes": 5, "residual": True})):
+        scene = overhung(body=body)
+        none, hardly = (replace(scene, damping=fb.ModalDamping(zeta)).reduce(**options).rub() for zeta in (0.0, 1e-7))
+        assert none.radius == pytest.approx(hardly.radius, rel=1e-3)
+        apart = np.abs(none.eigenvalues[:, None] - hardly.eigenvalues).min(axis=1)
+        assert np.all(apart < 1e-5 * np.abs(none.eigenvalues) + 1e-3)
+
+
 @pytest.mark.filterwarnings("ignore:3 modes cut a pair")
 def test_what_is_not_round_is_refused():
     model = overhung().reduce(modes=4)

@@ -329,3 +329,19 @@ def test_a_mass_pressed_between_two_stops_that_bend_together_goes_on(omega, rest
     )
     assert found.cost.steps < 1000
     np.testing.assert_allclose(found.q, exact.q, rtol=1e-5)
+
+
+@pytest.mark.parametrize("late", [1.001, 1.06, 4.0, 25.0])
+@pytest.mark.parametrize("law", [KelvinVoigt(1e4, 0.0), Hertz(1e6)])
+def test_a_graze_just_before_another_stop_is_hit(law, late):
+    """The landing on the second one sees the first contact over: that was left where it began, for ever."""
+    omega, amplitude, speed = 100.0, 1e-3, 0.5
+    depth = 1e-4 * amplitude
+    top, half = 0.5 * np.pi / omega, np.arccos(1.0 - 1e-4) / omega
+    stops = [Contact([-1.0, 0.0], law, amplitude - depth), Contact([0.0, -1.0], law, speed * (top + late * half))]
+    matrices, start = (np.eye(2), np.zeros((2, 2)), np.diag([omega**2, 0.0])), ([0.0, 0.0], [omega * amplitude, speed])
+    both = integrate(System(*matrices, stops), *start, 0.03, None, Exponential(1e-9))
+    for number, stop in enumerate(stops):
+        alone = integrate(System(*matrices, [stop]), *start, 0.03, None, Exponential(1e-9))
+        assert len(alone.contacts) == 1
+        same_log(log_of(both, number), log_of(alone, 0), 1e-6, 0.03)

@@ -185,6 +185,20 @@ def test_a_shaft_spins_at_its_radius():
     assert scene.reduce(modes=4).contact_rows[0].spin == -150.0
 
 
+def test_an_inclined_shaft_twists_as_one_along_an_axis():
+    """Its twist goes about a vector, which has no name: such scenes were refused."""
+    straight = hole(radius=0.00955, bending_only=False)
+    rotation, ways = (0.0, 0.9, 0.0), ((np.cos(0.9), 0.0, -np.sin(0.9)), (0.0, 1.0, 0.0))
+    pushes = [replace(one, direction=way) for one, way in zip(straight.forces, ways, strict=True)]
+    stop = replace(straight.stops[0], directions=ways)
+    inclined = replace(straight, beam=straight.beam.turned(rotation), stops=[stop], forces=pushes)
+    one, other = (
+        scene.reduce(modes=4, residual=True).simulate(0.06, 1e-4, solver=METHOD) for scene in (straight, inclined)
+    )
+    assert np.abs(one.friction()).max() > 1.0
+    np.testing.assert_allclose(other.friction(), one.friction(), rtol=0.0, atol=1e-5 * np.abs(one.friction()).max())
+
+
 def test_a_run_goes_on_from_a_slider_that_sticks():
     """Also on a shaft that spins slowly, whose loads are constant: time begins anew."""
     scene = hole(spin=0.5, radius=0.00955)
@@ -287,6 +301,7 @@ def test_scene_files(file_of):
         ("mu = 0.3,", "mu = -0.3,", "mu of Friction must be finite and >= 0"),
         (", stiffness = 5e5", "", "needs stiffness > 0"),
         ("mu = 0.3", "nu = 0.3", "unknown key 'nu'; did you mean 'mu'"),
+        ("{ mu = 0.3, stiffness = 5e5 }", "0.3", r"friction: must be a table { mu = …, stiffness = …, … }, got 0.3"),
         ("radius = 0.00955", "", "friction on a shaft that spins needs radius="),
         ('tangent = "y"', 'tangent = "x"', "tangent must be a displacement at right angles"),
     ):
@@ -319,7 +334,7 @@ def test_bad_annular_stops_are_refused(options, message):
         ({"tangent": "y"}, "tangent must be a displacement at right angles .* got 'y'"),
         ({"tangent": (0.0, -2.0)}, "tangent must be a displacement at right angles"),
         ({"tangent": "rz"}, "tangent must be a displacement at right angles"),
-        ({"tangent": "up"}, "direction must be one of"),
+        ({"tangent": "up"}, "direction must be one of .* in tangent of Stop"),
         ({"direction": "rz", "tangent": "x"}, "friction is for stops of displacement"),
         ({"law": WaltonBraun(1e3, 2e3, "kept")}, "law of a stop with friction must have no memory"),
     ],
@@ -331,17 +346,21 @@ def test_bad_oblique_stops_are_refused(options, message):
 
 
 def test_bad_scenes_are_refused():
-    beam, space = fb.Beam(1.0, TUBE), fb.Frame.straight(1.0, TUBE)
+    beam, space, flat = fb.Beam(1.0, TUBE), fb.Frame.straight(1.0, TUBE), frame().beam
     bent = fb.Stop("B", LAW, direction="x", friction=RUB)
     for body, stop, message in (
         (beam, fb.Stop(0.5, LAW, friction=RUB), "a Beam bends in one plane, got .*; make the Beam a Frame.straight"),
         (beam, fb.Stop(0.5, LAW, direction="y", friction=RUB, tangent="z"), "a Beam bends in one plane"),
         (space, bent, "friction of a stop in space needs tangent="),
+        (flat, replace(bent, z="C", direction="z"), "must move along z; it has x, y, rz"),
         (fb.Frame.straight(1.0, TUBE, bending_only=True), replace(bent, tangent="z"), "must move along z; it has x, y"),
         (replace(space, spin=50.0), fb.AnnularStop("B", LAW, 1e-3, friction=RUB), "a shaft that spins needs radius="),
     ):
         with pytest.raises(ValueError, match=message):
-            fb.Scene(body, [fb.Clamped(0.0)], stops=[stop])
+            fb.Scene(body, [fb.Clamped("A" if body is flat else 0.0)], stops=[stop])
+    held = fb.Scene(space, [fb.Clamped("A"), fb.Fixed("B", "y")], stops=[replace(bent, tangent="y")])
+    with pytest.raises(ValueError, match="must be free to move along y, got 'B' in stops"):
+        held.reduce(modes=4)
     with pytest.raises(ValueError, match="must move the place of 'stop at C, -y' along its direction and its tangent"):
         frame().reduce(modes=1).simulate(0.01)
 

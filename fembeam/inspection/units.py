@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from fembeam.scene import AnnularStop, Element, Scene, Stop
 
 STEEP = 0.35  # rad; the slope of a beam
+STICKY = 3.0  # a coefficient of friction beyond that of rubber
 
 
 def doubts(model: Model) -> list[str]:
@@ -107,8 +109,17 @@ def of_parts(scene: Scene, weight: float, length: float, body: str) -> list[str]
     for i, part in enumerate(scene.acting):
         count = len(scene.stops)
         at = f"stops[{i}]{part.quoted}" if i < count else f"elements[{i - count}]{part.quoted}"
-        found += [f"{at}: {said}" for said in [_of_gap(part, length, body)] if said]
+        found += [f"{at}: {said}" for said in [_of_gap(part, length, body), *_of_friction(part, length, body)] if said]
     return found
+
+
+def _of_friction(part: Stop | AnnularStop | Element, length: float, body: str) -> Iterator[str]:
+    """What is wrong with the friction of a stop."""
+    friction, radius = getattr(part, "friction", None), getattr(part, "radius", None)
+    if friction is not None and friction.mu >= STICKY:
+        yield f"mu = {friction.mu:g} looks like per cent"
+    if radius is not None and radius > 0.2 * length:
+        yield f"a radius of {radius:g} m on a {body} of {length:.4g} m: is it in mm?"
 
 
 def of_damping(scene: Scene) -> list[str]:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])  # turns x to y
 ROUND = 1e-6  # of the size of matrices and loads: what a rotor may lack of being round
+FELT = 1e-6  # of the size of the largest row of a matrix: what rounding leaves of rows of nothing, as of twist
 DEEPEST, LEAST, TRIED = 1e3, 1e-9, 2000  # indentations looked at, of clearance or free whirl, and how many
 WHERE = "Model.rub"
 
@@ -130,17 +131,20 @@ def quarter_turn(model: Model) -> Vector:
     J: Vector = np.asarray(np.linalg.lstsq(both, turned, rcond=1e-9)[0], dtype=float)
     system = model.system
     lack = np.abs(both @ J - turned).max() / np.abs(both).max()
-    for matrix in (system.K, system.by_rate):
+    for matrix in (system.K, system.C, system.by_rate - system.C):
         lack = max(lack, _apart(np.asarray(matrix), J))
     require(lack < ROUND, "a synchronous rub needs a round rotor on round supports, with both modes of each pair",
-            f"a lack of {lack:.3g}", WHERE, "keep an even number of modes; else ask orbit()")  # fmt: skip
+            f"a lack of {lack:.3g}", WHERE, "keep as many modes as cut no pair; else ask orbit()")  # fmt: skip
     return J
 
 
 def _apart(matrix: Vector, J: Vector) -> float:
-    """How far a matrix and J are from commuting."""
-    size = np.sqrt(np.abs(np.diag(matrix))) + 1e-12 * math.sqrt(np.abs(matrix).max(initial=0.0)) + 1e-300
-    return float(np.abs((matrix @ J - J @ matrix) / np.outer(size, size)).max(initial=0.0))
+    """How far a matrix and J are from commuting; one of gyroscopic moments has nothing on its diagonal."""
+    rows = np.sqrt(np.abs(matrix).max(axis=1, initial=0.0))
+    if not rows.any():
+        return 0.0
+    size = rows + FELT * rows.max()
+    return float(np.abs((matrix @ J - J @ matrix) / np.outer(size, size)).max())
 
 
 def _turning_load(model: Model, J: Vector, omega: float) -> Vector:

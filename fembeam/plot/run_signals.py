@@ -10,7 +10,7 @@ from fembeam.model import places
 from fembeam.plot.style import Vector
 from fembeam.scene import persistent_drive
 from fembeam.statistics import Signal, pdf
-from fembeam.support import require
+from fembeam.support import is_finite, require
 
 if TYPE_CHECKING:
     from fembeam.model import Run
@@ -72,6 +72,8 @@ def sampling_of(run: Run) -> float:
 
 def samples_in(run: Run, window: tuple[float, float] | None, where: str, advice: str = "widen it") -> Any:
     """Numbers of the samples in a window (s), all without one; ValueError below two."""
+    pair = window is None or (isinstance(window, (tuple, list)) and len(window) == 2 and all(map(is_finite, window)))
+    require(pair, "the window must be two numbers", window, where, "give (from, to) in s")
     lo, hi = window or (float(run.t[0]), float(run.t[-1]))
     inside = np.flatnonzero((run.t >= lo) & (run.t <= hi))
     require(len(inside) >= 2, "the window must hold at least 2 samples", (lo, hi), where, advice)

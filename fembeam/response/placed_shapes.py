@@ -104,7 +104,7 @@ class PlacedShapes:
 
     def motion_with_supports(self, place: Any) -> Vector:
         """The same (c, n + k), with what supports that move carry."""
-        place = tuple(place) if isinstance(place, list) else place
+        place = tuple(place) if isinstance(place, list) else place.item() if isinstance(place, np.generic) else place
         if place in self.known:
             return np.asarray(self.whole[self.known.index(place)])
         if self.more is not None:
@@ -194,8 +194,12 @@ def _places(body: BodyMatrices) -> list[Any]:
 
 def _usual(body: BodyMatrices, loaded: Sequence[LocalCoordinate]) -> dict[str, At]:
     """Where something acts, then displacements of named points, a few."""
-    found: list[At] = [(at.z, named(at.along) if sum(map(bool, at.along)) == 1 else at.along[:3]) for at in loaded]
-    found = [(place, along.removeprefix("-") if isinstance(along, str) else along) for place, along in found]
+    single = [(at, sum(map(bool, at.along)) == 1) for at in loaded]
+    found: list[At] = [
+        (at.z, named(at.along).removeprefix("-")) if one else (at.z, at.along[:3])
+        for at, one in single
+        if one or any(at.along[:3])
+    ]  # a rotation about a vector has no name
     ask = getattr(body.beam, "components_at", lambda place: body.beam.components)
     points = getattr(body.beam, "points", {}) or _places(body)[-1:]
     found += [(place, c) for place in points for c in ask(place) if c in COMPONENTS[:3]]

@@ -81,9 +81,12 @@ class AnnularStop(ScenePart):
         where = self.where
         advice = "give the radius of the circle in m; without play it is a spring along each direction"
         require_positive("clearance", self.clearance, where, advice)
-        pair = isinstance(self.centre, (list, tuple)) and len(self.centre) == 2 and all(map(is_finite, self.centre))
+        given = self.centre.tolist() if isinstance(self.centre, np.ndarray) else self.centre
+        pair = isinstance(given, (list, tuple)) and len(given) == 2 and all(map(is_finite, given))
         require(pair, "centre must be two finite numbers", self.centre, where, "give m along the two directions")
-        object.__setattr__(self, "centre", (float(self.centre[0]), float(self.centre[1])))
+        object.__setattr__(self, "centre", (float(given[0]), float(given[1])))
+        require(isinstance(self.outer, (bool, np.bool_)), "outer must be True or False", self.outer, where,
+                "True is a ring around a post")  # fmt: skip
         local_coordinate(self.z, "displacement", self.on, where, "on", "x")
         check_law(self.law, where)
         require(not getattr(self.law, "memory", ()), "law must have no memory", self.law, where,
@@ -96,10 +99,10 @@ class AnnularStop(ScenePart):
         """Raise ValueError unless the directions are two displacements at right angles; lists become tuples."""
         if self.directions is None:
             return
-        given = self.directions
+        given = self.directions.tolist() if isinstance(self.directions, np.ndarray) else self.directions
         two = isinstance(given, (list, tuple)) and len(given) == 2
         require(two, "directions must be two", given, where, "write ('x', 'y'), or two vectors")
-        kept = tuple(tuple(one) if isinstance(one, list) else one for one in given)
+        kept = tuple(tuple(one) if isinstance(one, (list, np.ndarray)) else one for one in given)
         object.__setattr__(self, "directions", kept)
         first, second = (direction_of(one, where) for one in kept)
         require(not (turns(first) or turns(second)), "directions must be displacements", given, where,
@@ -111,13 +114,13 @@ class AnnularStop(ScenePart):
         """Raise ValueError unless the undeflected place is on its side of the circle."""
         off = float(np.hypot(*self.centre))
         if self.outer:
-            require(off >= self.clearance, "the place must begin outside the circle; it lies inside by",
-                    f"{self.clearance - off:.6g} m", where, "move the centre")  # fmt: skip
+            require(off >= self.clearance, "the place must begin outside the circle round the centre", self.centre,
+                    where, f"it lies {self.clearance - off:.6g} m inside: move the centre")  # fmt: skip
             return
         x, y = (-number / max(off, 1e-300) for number in self.centre)
-        require(off <= self.clearance, "the place must begin inside the circle; it lies outside by",
-                f"{off - self.clearance:.6g} m, towards ({x:.3g}, {y:.3g})", where,
-                "move the centre, or widen the clearance")  # fmt: skip
+        require(off <= self.clearance, "the place must begin inside the circle round the centre", self.centre, where,
+                f"it lies {off - self.clearance:.6g} m outside, towards ({x:.3g}, {y:.3g}): move the centre, or widen "
+                "the clearance")  # fmt: skip
 
     @property
     def gap(self) -> float:

@@ -20,7 +20,7 @@ from fembeam.scene.assembly import DEFAULT_MODES, UNIT, Matrices, Vector, moved_
 from fembeam.scene.places import place_words, told
 from fembeam.scene.rotors import Disk, gyroscopic, turned
 from fembeam.scene.signals import support_motion
-from fembeam.structures import COMPONENTS, Assembled, Frame, Six, check_buckling, following
+from fembeam.structures import COMPONENTS, Assembled, Frame, Six, check_buckling, following, named
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -152,13 +152,14 @@ def _check_moving(scene: Scene, matrices: BodyMatrices) -> None:
     """Raise ValueError where a stop or element acts on nothing that can move against something else."""
     for name in ("stops", "elements"):
         for index, part in enumerate(getattr(scene, name)):
-            place = part.coordinate
-            if place.to is None or place.to[0] == 0:
-                moves = abs(place.row(matrices)).max() > UNIT
-                rule = "what stops and elements act on must be free to move"
-                at = place_words(part.z) + (f" on {place.to_words}" if place.to else "")
-                advice = "supports or joints hold it, or both ends are one; move it"
-                require(moves, rule, at, f"{name}[{index}]{part.quoted} of Scene", advice)
+            for place in part.coordinates:
+                if place.to is None or place.to[0] == 0:
+                    moves = abs(place.row(matrices)).max() > UNIT
+                    along = f" along {named(place.along)}" if len(part.coordinates) > 1 else ""
+                    rule = f"what stops and elements act on must be free to move{along}"
+                    at = place_words(part.z) + (f" on {place.to_words}" if place.to else "")
+                    advice = "supports or joints hold it, or both ends are one; move it"
+                    require(moves, rule, at, f"{name}[{index}]{part.quoted} of Scene", advice)
 
 
 def _warn_of_massless(scene: Scene, matrices: BodyMatrices) -> None:

@@ -37,7 +37,7 @@ def check_oblique(stop: Any, where: str) -> None:
     require(not normal.rotation, "friction is for stops of displacement", stop.friction, where, "leave it out")
     if stop.tangent is None or stop.direction is None:  # the body says what that means
         return
-    along = direction_of(stop.tangent, where)
+    along = direction_of(stop.tangent, f"tangent of {where}")
     across = not turns(along) and abs(np.dot(along, normal.along)) < ACROSS
     require(across, "tangent must be a displacement at right angles to the stop's direction", stop.tangent, where,
             f"the stop acts along {stop.direction!r}")  # fmt: skip
@@ -51,7 +51,7 @@ def completed(body: Any, stop: Any, where: str) -> Any:
     require(getattr(own, "in_plane", False), "friction of a stop in space needs tangent=, the way along its surface",
             None, where, "write tangent='y' or a vector")  # fmt: skip
     x, y = stop.coordinate.along[:2]
-    return (-float(y), float(x))
+    return (-float(y), float(x)) if x or y else None  # a direction out of the plane is refused with the others
 
 
 def check_round(stop: Any, where: str) -> None:

@@ -57,6 +57,8 @@ class Source:
         --------
         >>> Source(Path("a.toml"), "[[masses]]\nz = 1\nmas = 2").place("[[masses]] number 1", "unknown key 'mas'")
         'a.toml:3: [[masses]] number 1'
+        >>> Source(Path("a.toml"), "[[stops]]\nkind = 1\n[base.x]\nkind = 2").place("[base.x]", "kind must be")
+        'a.toml:4: [base.x]'
         """
         line = _line(self.text.splitlines(), where, message)
         return f"{self.path}:{line}: {where}" if line else f"{self.path}: {where}"
@@ -101,16 +103,18 @@ def _override(tables: dict[str, Any], text: str) -> None:
 
 def _line(lines: list[str], where: str, message: str) -> int:
     """Number of the line that is meant, 0 when unknown."""
-    named = re.match(r"\[\[?(\w+)\]\]?(?: number (\d+))?(.*)", where)
+    named = re.match(r"\[\[?(\w+)(?:\.(\w+))?\]\]?(?: number (\d+))?(.*)", where)
     inside = re.search(r"(\w+)\[(\d+)\]", message)
     if not named and inside:  # the scene says masses[0]
         found = _table(lines, inside[1], int(inside[2]) + 1)
     else:
-        found = _table(lines, named[1], int(named[2] or 1)) if named else range(len(lines))
+        found = _table(lines, named[1], int(named[3] or 1)) if named else range(len(lines))
+        if named and named[2]:  # [base.x]
+            found = _table(lines, f"{named[1]}.{named[2]}", int(named[3] or 1)) or found
     if not found:
         return 0
     line = found.start
-    for word in re.findall(r"\w+", named[3]) if named else []:
+    for word in re.findall(r"\w+", named[4]) if named else []:
         line = _key(lines, word, range(line, found.stop), line)
     hits = (_key(lines, word, range(line, found.stop), -1) for word in re.findall(r"\w+", message)[:4])
     return 1 + next((hit for hit in hits if hit >= 0), line if named or inside else -1)

@@ -96,9 +96,11 @@ def _words(hint: Any) -> list[str]:
     if get_origin(hint) is Mapping:
         return [f"a table of names, each with {wanted(get_args(hint)[1])}"]
     entry, count = entries_of(hint)
+    number = "" if count is None else f"{count} "
     if get_origin(entry) is Literal:
         return [f"a list of {', '.join(map(repr, get_args(entry)))}"]
-    number = "" if count is None else f"{count} "
+    if str in options(entry):
+        return [f"a list of {number}names" + (" or vectors" if len(options(entry)) > 1 else "")]
     return [] if entry is None else [f"a list of {number}{'whole ' if entry is int else ''}numbers"]
 
 

@@ -175,7 +175,8 @@ class TableReader:
     def choose(self, kinds: Constructors, table: Any, where: str, key: str = "kind", default: str = "") -> Any:
         """Build the constructor that `kind` (or `shape`) names."""
         if not isinstance(table, dict):
-            self.fail(where, f"must be a table {{ {key} = …, … }}, got {table!r}")
+            keys = list(parameters(kinds[default]))[:2] if default else [key]
+            self.fail(where, f"must be a table {{ {', '.join(f'{one} = …' for one in keys)}, … }}, got {table!r}")
         name = table.get(key, default)
         if name not in list(kinds):  # a list: what a file gives need not be hashable
             got = f"got {name!r}{nearest(name, kinds)}" if key in table else "it is missing"

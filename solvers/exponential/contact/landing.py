@@ -389,10 +389,11 @@ def _knot(problem, state, stop, direction):
 def may_land(problem, tables, state, scratch, stop, direction, time_to_border):
     """Whether a landing on the border of ``stop`` in a direction, about ``time_to_border`` s ahead, is worth a trial.
 
-    It reads δ and δ̇ at the start of the step from ``scratch.start_motion``.
+    It reads δ and δ̇ at the start of the step from ``scratch.start_motion``. What moves the other way turns first.
+    One just entered, which the landing of another sees leave, lies on the border: it would leave at once, for ever.
     """
     delta, rate = scratch.start_motion[stop, 0], scratch.start_motion[stop, 1]
-    if time_to_border > _longest_time(problem, tables, state, scratch) or abs(rate) <= rate_tolerance(
+    if time_to_border > _longest_time(problem, tables, state, scratch) or direction * rate <= rate_tolerance(
         problem, stop, state.x
     ):
         return False

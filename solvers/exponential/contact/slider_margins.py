@@ -213,7 +213,8 @@ def _ends_by_polynomial(problem, tables, scratch, s):
     """Ends of a smooth step's margins by the polynomials through their nodes, into ``scratch.ends``.
 
     Returns whether these tell both margins at the start, whether at the end, and whether they are far from zero all
-    over the step. A value is told if it is larger than what the polynomial may leave out.
+    over the step. A value is told if it is larger than what the polynomial may leave out. A negative one at the start
+    is not: no step begins beyond a border, but just after an entry N has a broken power there, which bends the margin.
     """
     begin_told, end_told, far, summary = True, True, True, scratch.local_motion[KNOWN, :S]
     for j in range(problem.border_count[s]):
@@ -221,7 +222,7 @@ def _ends_by_polynomial(problem, tables, scratch, s):
         combine(tables.summary[0], margin, S, None, summary)
         end[0], end[1], values = summary[4], summary[5], load8(margin, 0)
         zero = max(_LEFT_OUT * max(abs(summary[2]), abs(summary[3])), _CLEAR_OF_ZERO * largest8(size8(values)))
-        begin_told &= abs(end[0]) > zero
+        begin_told &= end[0] > zero
         end_told &= abs(end[1]) > zero
         far &= min(end[0], end[1], least8(values)) > zero
     return begin_told, end_told, begin_told and end_told and far
@@ -254,6 +255,7 @@ def slider_margins_on_step(problem, tables, state, scratch, s, node_set, level):
     begin_told, end_told, by = False, False, (0.0, 0.0, 0.0, 0.0)
     if node_set == 0 and ripple == 0.0 and faster == 0.0 and tables.bend[s] == 0.0:  # beyond a bend nothing is smooth
         begin_told, end_told, far = _ends_by_polynomial(problem, tables, scratch, s)
+    begin_told &= scratch.control[NEW] == 0  # a segment begins on its border
     far &= scratch.control[NEW] == 0
     if not far:
         by = _margin_slopes(problem, tables, state, scratch, s)
