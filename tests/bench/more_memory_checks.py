@@ -85,7 +85,11 @@ def _begins_on_jump(scene: Scene) -> bool:
     """Whether a stop begins where its force jumps, as on a knot between two dashpots."""
     for contact in scene.system.contacts:
         delta, rate = (float(np.squeeze(x)) for x in contact.motion(scene.q0, scene.q_dot0)[:2])
-        if contact.always or delta <= 0.0:
+        if contact.always or delta < -1e-12 * abs(contact.gap):
+            continue
+        if delta <= 1e-12 * abs(contact.gap):
+            if contact.law.jump:
+                return True
             continue
         below, at, above = (float(contact.law.force(delta * (1.0 + by), rate, abs(rate))) for by in (-1e-9, 0.0, 1e-9))
         if abs(above - below) > 1e-6 * max(abs(below), abs(at), abs(above)):
