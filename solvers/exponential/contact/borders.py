@@ -31,7 +31,7 @@ from solvers.compiled.kernels import (
 from solvers.compiled.parts import PASSED, part
 from solvers.compiled.renewals import count_event, margins, margins_before, margins_in, renew
 from solvers.compiled.sliding import DELTA, RATE
-from solvers.compiled.state import LAST_EVENT, T, rate_tolerance
+from solvers.compiled.state import AT_ONCE, LAST_EVENT, T, rate_tolerance
 from solvers.exponential.contact.crossings import extremum
 from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, motion_of, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL, S, lagrange
@@ -43,7 +43,7 @@ from solvers.exponential.contact.slider_margins import (
     slider_margins_in,
     slider_margins_on_step,
 )
-from solvers.problem.friction import CODE, PRESSES
+from solvers.problem.friction import CODE, PRESSES, STICK
 
 UNRESOLVED = -2  # in place of an element: the step is too long to tell whether a border is crossed
 _ON_BORDER = 1e-9  # margin, in units of its largest on the step, up to which the step counts as begun on the border
@@ -52,6 +52,7 @@ _TOGETHER = 1e-9  # margin, relative to its value at the start, at which a borde
 _MISSED = 1e-5  # the most, in units of its largest, by which a margin may be negative after a landing on its border
 _SHORTLY = 1e-3  # part of a step or landing over which a margin is extrapolated by the rates at its end
 _FIRST_SHARE, _SHORTER, _MOST_SHARES = 0.1, 1e-2, 6  # shares of the time to the first node: first, ratio, number
+_UNDECIDED = 2  # events at one instant, after the first, from which on a stick is believed until a step denies it
 _LONGER = 8.0  # factor of the time of extrapolation until it is clear whether a margin rises
 _ROOT_FOUND = 1e-6  # value of the polynomial, in units of the largest margin, that ends the search for its root
 _MOST_ILLINOIS = 6  # iterations for a root of the polynomial through the nodes
@@ -224,7 +225,8 @@ def _crossing_time(problem, tables, state, scratch, s, j, node_set, h):
     node: then half the time to that node is returned, for a shorter step to decide. A landing may have missed its
     border by more than the rounding of this step: then the margin begins slightly below zero and rises, and only a
     later fall counts. Slip that begins against its own force, as dashpots can make it, has a strongly negative margin
-    and ends at once.
+    and ends at once. Where N falls to zero just after stick has begun, it rises by less than its noise: told to
+    fall at once, the slider would stick and slip at one instant for ever.
     """
     noise, before, t = scratch.noise[s, j], scratch.ends[ENDS * j], 0.0
     tolerance = max(_ON_BORDER * scratch.largest[s, j], noise)
@@ -237,7 +239,9 @@ def _crossing_time(problem, tables, state, scratch, s, j, node_set, h):
         value = scratch.margin[S * j + i] if i < S else scratch.ends[ENDS * j + 1]
         after = h * tables.times[node_set, i] if i < S else h
         if value < -noise and not (overshot and before < -noise and value > before):
-            if i == 0 and before <= noise and _falls_at_once(problem, tables, state, scratch, s, j, after):
+            believed = state.count[AT_ONCE] >= _UNDECIDED and rubs(problem, s) and slider_of(problem, s)[CODE] == STICK
+            at_once = i == 0 and before <= noise and not believed
+            if at_once and _falls_at_once(problem, tables, state, scratch, s, j, after):
                 return 0.0
             if begins_on and i == 0:
                 return 0.5 * after
