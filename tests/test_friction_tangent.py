@@ -14,7 +14,7 @@ from solvers.orbits import newton
 FINE = Exponential(1e-11)
 
 
-def by_differences(system, q, q_dot, duration, step=1e-6):
+def by_differences(system, q, q_dot, duration, step=1e-6, memory=None):
     """The derivative of the end by the start, by central differences of the independent method."""
     x, columns = np.concatenate((q, q_dot)), []
     for i in range(x.size):
@@ -22,7 +22,7 @@ def by_differences(system, q, q_dot, duration, step=1e-6):
         for sign in (1.0, -1.0):
             moved = x.copy()
             moved[i] += sign * step
-            ends.append(integrate(system, *np.split(moved, 2), duration, method=SHARP).end[: x.size])
+            ends.append(integrate(system, *np.split(moved, 2), duration, method=SHARP, memory=memory).end[: x.size])
         columns.append((ends[0] - ends[1]) / (2.0 * step))
     return np.array(columns).T
 
@@ -148,6 +148,18 @@ def test_the_tangent_where_a_slip_ends_because_the_rate_of_N_jumps(changed, q, q
         [by_differences(changed(0.0), q, q_dot, duration, 1e-7), (ends[0] - ends[1]) / (2.0 * step)]
     )
     assert np.all(abs(run.tangent - expected).max(axis=0) < 1e-6 * abs(expected).max(axis=0))
+
+
+def test_an_entry_at_the_start_does_not_time_what_slips_from_there_on():
+    """The spring of friction is drawn beyond its limit, and the start just touches another stop, moving in."""
+    rub = Contact(-EYE[0], KelvinVoigt(4e5, 0.0), map="oblique", tangent=EYE[1], friction=Friction(0.25, 3e5))
+    met = Contact([0.2, -0.5, -1.0], Hertz(1e6, 2.0))
+    system = System(0.08 * EYE, 0.0 * EYE, np.diag([10.0, 20.0, 30.0]), [rub, met])
+    q, v, memory = [1e-4, 0.0, 2e-5], [-0.3, 0.2, 1.0], [np.array([0.0, -2e-4]), np.empty(0)]
+    found = integrate(system, q, v, 3e-4, method=FINE, memory=memory, tangent=True)
+    assert (found.transitions.t.tolist(), found.transitions.event.tolist()) == ([0.0], ["slip"])
+    exact = by_differences(system, q, v, 3e-4, 1e-8, memory)
+    np.testing.assert_allclose(found.tangent, exact, rtol=0.0, atol=1e-6 * np.abs(exact).max())
 
 
 def test_the_tangent_beside_other_elements():

@@ -219,6 +219,20 @@ def test_a_start_at_rest_on_the_stop_has_a_finite_tangent():
     assert np.all(np.isfinite(tangent))
 
 
+def test_an_entry_at_the_start_does_not_time_what_begins_beyond_its_border():
+    """A spring that is met at t = 0 wherever the start is, and a stop that the start just touches, moving in."""
+    stops = [Contact([1.0, 0.3], WaltonBraun(8e4, 9e4), -0.5), Contact([-0.5, 1.0], Hertz(4e7, 2.0))]
+    system = System.modal([10.0, 40.0], 0.01, stops)
+    q, v, duration = np.zeros(2), np.array([0.2, -1.0]), 5e-3
+    found = integrate(system, q, v, duration, method=Exponential(1e-11), tangent=True)
+    assert found.contacts.t_in[:2].tolist() == [0.0, 0.0]
+    exact = np.empty((4, 4))
+    for i, move in enumerate(1e-6 * np.eye(4)):
+        ends = [end(system, q + side * move[:2], v + side * move[2:], duration) for side in (1.0, -1.0)]
+        exact[:, i] = (ends[0] - ends[1]) / 2e-6
+    assert_allclose(found.tangent, exact, rtol=0.0, atol=1e-4 * np.abs(exact).max())
+
+
 def stiffened(system, row, law):
     """The matrix of the first-order system of a structure with the law as an element of it."""
     n, stiffness = system.size, np.outer(row, row)

@@ -124,7 +124,8 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
     latched, maps = derivatives.renewed[first + 2 + 2 * most : first + 2 + 3 * most], derivatives.renewed
     _slopes_of_margin(problem, past, s, j, delta, rate, derivatives, by)
     margin_rate, own = by[0] * rate + by[1] * acceleration, 0
-    at_once = past.now[LAST_EVENT] == t and _is_left_behind(problem, past, s, j, delta, rate, derivatives, by)
+    begun = past.now[LAST_EVENT] == t and t > 0.0  # what a start is beyond, it passes by itself
+    at_once = begun and _is_left_behind(problem, past, s, j, delta, rate, derivatives, by)
     past.now[LAST_EVENT] = t
     for i in range(most):
         own += 1 if problem.latched[s, i] >= 0 else 0

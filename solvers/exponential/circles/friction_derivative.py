@@ -164,6 +164,7 @@ def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
     out = derivatives.batch[5:8]
     renew_slider(problem, s, j, entry, past.segment[s], t, past.x, derivatives.rate[0], out)
     friction_jump += slider_force(problem, s, past.segment[s], entry, t, past.x)
+    event = problem.law.size if t > 0.0 else s  # at the start only its own entry may be what it falls with
     for c in range(derivatives.y.shape[0]):
         normal_change = by_delta * change_of(problem, variation, derivatives, past.x, c, s, 0, t)
         normal_change += by_rate * change_of(problem, variation, derivatives, past.x, c, s, 1, t)
@@ -171,7 +172,7 @@ def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
         change = xi_change(problem, variation, derivatives, past.x, c, s, t) - share * normal_change
         if is_parameter(variation, derivatives, c):
             normal_change, change = normal_change + by_law[0], change + by_law[1]
-        shift = derivatives.shift[c, problem.law.size] if past.now[LAST_EVENT] == t else 0.0
+        shift = derivatives.shift[c, event] if past.now[LAST_EVENT] == t else 0.0
         if code_before == FREE and not jumped:
             change -= xi_rate * normal_change / normal_rate if normal_rate != 0.0 else 0.0
         else:
