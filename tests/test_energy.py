@@ -13,7 +13,7 @@ from scipy.special import roots_jacobi
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic
-from solvers import Contact, Exponential, SolverError, System, integrate, integrate_many
+from solvers import Contact, DormandPrince, Exponential, SolverError, System, integrate, integrate_many
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.energy import flight_tables
 from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES, contact_table
@@ -155,6 +155,23 @@ def test_coupled_damping_balances():
         handled = np.abs(run.energy.input).max() + run.energy.initial
         assert run.energy.damping[-1] > 1e-2 * handled
         assert np.abs(run.energy.residual).max() < 1e-8 * handled
+
+
+def nearly_critical(by):
+    """Two masses whose dashpots exceed, by a share of themselves, those at which two of the roots fall together."""
+    C = 1.681702842677874 * (1.0 + by) * np.array([[1.0, 0.5], [0.5, 1.5]])
+    return System(np.eye(2), C, np.diag([1.0, 4.0]), [Contact([1.0, 0.3], Hertz(1e4), 0.1)])
+
+
+def test_roots_of_damping_that_nearly_fall_together():
+    """Their blocks are almost alike and cancel in the motion: their energies are known to 1e-7, whatever `rtol`."""
+    start = [0.3, -0.2], [-1.0, 0.4]
+    run = integrate(nearly_critical(1e-5), *start, 10.0, 0.1, Exponential(1e-10))
+    exact = integrate(nearly_critical(1e-5), *start, 10.0, 0.1, DormandPrince(1e-12))
+    np.testing.assert_allclose(run.q, exact.q, rtol=0.0, atol=1e-9)
+    assert run.energy.damping[-1] == pytest.approx(exact.energy.damping[-1], rel=3e-6)
+    with pytest.raises(SolverError, match="does not balance"):  # to 1e-3 only
+        integrate(nearly_critical(1e-7), *start, 10.0, 0.1, Exponential(1e-10))
 
 
 class RoughNodes(Nodes):

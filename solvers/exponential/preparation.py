@@ -34,7 +34,7 @@ from solvers.exponential.contact.nodes import S, series_of
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, energy_tables_for
 from solvers.exponential.steady_response import steady_response, without_resonance
 from solvers.exponential.tables import TONE_TABLES, Tables, build, doublings, fill_tones, law_tables_of
-from solvers.problem import Array, Contact, Forcing, Memo, System, on_one_grid
+from solvers.problem import Array, Contact, Forcing, Memo, System, dense, on_one_grid
 from solvers.problem.friction import ACCOUNTS
 
 TABLES, SCRATCH = packed_type(Tables), packed_type(Scratch)
@@ -174,7 +174,7 @@ class _SharedTables:
         contacts = system.contacts
         rubbing = [c.friction is not None for c in contacts]
         self.series = tuple((1.0, 0.0) if c.always else series_of(c.law) for c in contacts)
-        problem, loss = _widened(plain, forcing, contacts), _loss_rows(plain)
+        problem, loss = _widened(plain, forcing, contacts), _loss_rows(plain, system)
         read_by = plain.read, plain.power, loss, system.blocks.T
         self.rows, ends = np.concatenate(read_by), np.cumsum([len(rows) for rows in read_by]).tolist()
         self.places = [slice(end - len(rows), end) for rows, end in zip(read_by, ends, strict=True)]
@@ -268,17 +268,19 @@ def _layout(**known: int) -> Layout:
     return Layout([STATE, SCRATCH], [shapes_of(State, sizes), shapes_of(Scratch, sizes)])
 
 
-def _loss_rows(problem: Problem) -> Array:
-    """Rows whose squares sum to the damping power: √c v, or a root of the coupled loss."""
+def _loss_rows(problem: Problem, system: System) -> Array:
+    """Rows whose squares sum to the damping power: √c v, or of coupled blocks √C q̇ with q̇ of the blocks.
+
+    A root of the blocks' own quadratic form of the power would err by the square of what cancels in q̇. As many rows of
+    zeros tell that the blocks are coupled.
+    """
     n = len(problem.k)
     if not problem.loss.size:
         return np.hstack((np.zeros((n, n)), np.diag(np.sqrt(np.maximum(problem.c, 0.0)))))
-    size = np.sqrt(np.maximum(np.diag(problem.loss), 0.0))
-    unit = np.sqrt(np.abs(problem.k).max())  # of p over that of v
-    least = 1e-4 * np.repeat([unit, 1.0], n) * size[n:].max()  # what is less may be rounding
-    size = np.maximum(size, np.where(least > 0.0, least, 1.0))
-    values, vectors = np.linalg.eigh(0.5 * (problem.loss + problem.loss.T) / np.outer(size, size))
-    return np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T * size
+    C = dense(system.C)
+    values, vectors = np.linalg.eigh(0.5 * (C + C.T))
+    rows = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T @ system.blocks.T[n:]
+    return np.vstack((rows, np.zeros((n, 2 * n))))
 
 
 def _widened(problem: Problem, forcing: Forcing, contacts: Sequence[Contact]) -> Problem:
