@@ -99,7 +99,7 @@ def _words(hint: Any) -> list[str]:
     number = "" if count is None else f"{count} "
     if get_origin(entry) is Literal:
         return [f"a list of {', '.join(map(repr, get_args(entry)))}"]
-    if str in options(entry):
+    if str in options(entry) and float not in options(entry):
         return [f"a list of {number}names" + (" or vectors" if len(options(entry)) > 1 else "")]
     return [] if entry is None else [f"a list of {number}{'whole ' if entry is int else ''}numbers"]
 
