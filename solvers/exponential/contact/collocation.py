@@ -286,7 +286,8 @@ def _derivative_error(problem, tables, state, scratch, node_set, level):
     A motion at rest, or slow, lets steps grow, but neighbouring motions oscillate. Collocation at eight nodes of Gauss
     solves ẍ = -ω² x over a step with an error of 1.5e-19 (ωh)^17, and up to a point inside, where the run may end, of
     2.7e-11 (ωh)^9; ẍ = -c ẋ with less than that for ω = c. A strong dashpot that would take too many steps is ignored
-    once its motion has decayed since the last event; then only the slow decay rate k/c counts.
+    once its motion has decayed since the last event; then only the slow decay rate k/c counts. Blocks that the nodes do
+    not resolve oscillate beside a motion that hardly has them; what the slopes do to them counts too.
     """
     h, square, unresolved = tables.contact_step[level], 0.0, 0.0
     out, since = scratch.local_motion[FORCES], state.now[T] - max(state.now[LAST_EVENT], 0.0)
