@@ -12,6 +12,7 @@ import tempfile
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from itertools import combinations, groupby, pairwise
 from pathlib import Path
 from typing import Any
@@ -28,10 +29,8 @@ Vector = NDArray[np.float64]
 Names = list[set[str]]
 
 LINES = ("line", "line3", "line4")  # of higher ones the ends are used
-ABAQUS = {
-    **dict.fromkeys(("B23", "B23H", "B33", "B33H", "B31R"), "line"),
-    "B32R": "line3",
-}  # meshio has none, or B33 wrong
+TWO_NODES = ("B23", "B23H", "B33", "B33H", "B31R")
+ABAQUS = dict.fromkeys(TWO_NODES, "line") | {"B32R": "line3"}  # beams that meshio does not know, or B33 wrongly
 WRITERS: dict[str, dict[str, Any]] = {  # suffixes, and what meshio needs to know
     ".msh": {"file_format": "gmsh22", "binary": False},
     ".inp": {},
@@ -70,20 +69,34 @@ def beam_of(
 def read_mesh(path: str | os.PathLike[str]) -> Any:
     """The file, or a ValueError that says why not."""
     import meshio
-    from meshio.abaqus import _abaqus
-    from meshio.gmsh import _gmsh41
 
     if not Path(path).is_file():
         raise FileNotFoundError(f"{path} does not exist")
-    _abaqus.abaqus_to_meshio_type.update(ABAQUS)
-    _gmsh41.Mesh = _even_mesh
     try:
-        mesh = meshio.read(path)
+        with _mended_readers():
+            mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio raises many kinds, and exits for unknown suffixes
         raise ValueError(f"{path} cannot be read as a mesh: {error or 'unknown format'}") from error
     if Path(path).suffix == ".inp":
         _mend_sets(mesh, Path(path))
     return mesh
+
+
+@contextmanager
+def _mended_readers() -> Iterator[None]:
+    """Lend meshio's readers what they lack, and leave them as they were: other code may read with them."""
+    from meshio.abaqus import _abaqus
+    from meshio.gmsh import _gmsh41
+
+    known, mesh = dict(_abaqus.abaqus_to_meshio_type), _gmsh41.Mesh
+    _abaqus.abaqus_to_meshio_type.update(ABAQUS)
+    _gmsh41.Mesh = _even_mesh
+    try:
+        yield
+    finally:
+        _abaqus.abaqus_to_meshio_type.clear()
+        _abaqus.abaqus_to_meshio_type.update(known)
+        _gmsh41.Mesh = mesh
 
 
 def _even_mesh(points: Any, cells: Any, cell_data: Any = None, **rest: Any) -> Any:

@@ -124,8 +124,8 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
     latched, maps = derivatives.renewed[first + 2 + 2 * most : first + 2 + 3 * most], derivatives.renewed
     _slopes_of_margin(problem, past, s, j, delta, rate, derivatives, by)
     margin_rate, own = by[0] * rate + by[1] * acceleration, 0
-    begun = past.now[LAST_EVENT] == t and t > 0.0  # what a start is beyond, it passes by itself
-    at_once = begun and _is_left_behind(problem, past, s, j, delta, rate, derivatives, by)
+    together = past.now[LAST_EVENT] == t and t > 0.0  # what a start is beyond it passes by itself, at once
+    at_once = together and _is_left_behind(problem, past, s, j, delta, rate, derivatives, by)
     past.now[LAST_EVENT] = t
     for i in range(most):
         own += 1 if problem.latched[s, i] >= 0 else 0
@@ -145,9 +145,7 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
             change += by[2 + i] * known[i]
         by_law = variation.law_step > 0.0 and is_parameter(variation, derivatives, c)
         change += by_law_change if by_law else 0.0
-        shift = (
-            -change / margin_rate if margin_rate < 0.0 and t > 0.0 else 0.0
-        )  # a start beyond a border passes it at once
+        shift = -change / margin_rate if margin_rate < 0.0 and t > 0.0 else 0.0
         shift = derivatives.shift[c, stops] if at_once else shift
         derivatives.shift[c, stops] = shift
         for i in range(own):

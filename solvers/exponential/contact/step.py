@@ -218,6 +218,14 @@ def _continue_after(problem, tables, state, scratch, stop, level, alone):
 
 
 @merged
+def _try_nearest(problem, tables, state, scratch, stop, direction, time_to_border):
+    """Land on the border reached first if that is worth a trial; returns whether it was done."""
+    scratch.landed[LAST_RESORT] = 1 if time_to_border < tables.contact_step[tables.contact_step.size - 1] else 0
+    worth = stop >= 0 and may_land(problem, tables, state, scratch, stop, direction, time_to_border)
+    return worth and _try_landing(problem, tables, state, scratch, stop, direction, time_to_border)
+
+
+@merged
 def _try_landing(problem, tables, state, scratch, stop, direction, time_to_border):
     """Land on the border reached first, and switch its stop; returns whether it was done."""
     stop, direction = land_first(problem, tables, state, scratch, stop, direction, time_to_border)
@@ -271,12 +279,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
     if control[NEW] == ENTRY and problem.parts[PRESSED] and _switch_pressed(problem, state):
         begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
-    scratch.landed[LAST_RESORT] = 1 if time_to_border < tables.contact_step[shortest] else 0
-    if (
-        stop >= 0
-        and may_land(problem, tables, state, scratch, stop, direction, time_to_border)
-        and _try_landing(problem, tables, state, scratch, stop, direction, time_to_border)
-    ):
+    if _try_nearest(problem, tables, state, scratch, stop, direction, time_to_border):
         return RUNNING
     if scratch.ahead[0] > 0.0 and _try_border_ahead(problem, tables, state, scratch):
         return RUNNING
