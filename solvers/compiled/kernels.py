@@ -75,7 +75,7 @@ class Problem(NamedTuple):
     tone_omega: Annotated[Any, "K"]  # rad/s
     tone_amplitude: Annotated[Any, "complex K"]  # complex, a of Re a e^{iωt}
     tone_load: Annotated[Any, "int K"]  # the load each drives
-    table: Annotated[Any, "rows, 3"]  # [s, s', s''] at the nodes of all sampled signals
+    table: Annotated[Any, "rows, sides"]  # [s, s', s''] at the nodes of all sampled signals, see `problem.signals`
     table_dt: Annotated[Any, "tables"]  # s
     table_start: Annotated[Any, "int tables+1"]  # first row of each, and the end
     table_load: Annotated[Any, "int tables"]  # the load each drives
@@ -264,13 +264,20 @@ def abs_dot(a, b, n):
     return total
 
 
+@inlined
+def cell_ends(problem, row):
+    """[s, s', s''] at the start and at the end of the cell that begins with a row of the node tables."""
+    table = problem.table
+    return table[row], table[row + 1, table.shape[1] - 3 :]
+
+
 @inner
 def table_value(problem, j, t):
     """Quintic Hermite value of node table j at time t."""
     dt, start = problem.table_dt[j], problem.table_start[j]
     cell = min(max(int(t / dt), 0), problem.table_start[j + 1] - start - 2)
     x = t / dt - cell
-    a, b = problem.table[start + cell], problem.table[start + cell + 1]
+    a, b = cell_ends(problem, start + cell)
     s0, s1 = a[1] * dt, a[2] * dt * dt * 0.5
     e0 = b[0] - a[0] - s0 - s1
     e1 = b[1] * dt - s0 - 2.0 * s1

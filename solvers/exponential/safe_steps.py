@@ -62,11 +62,12 @@ _GROUP = 8  # cells that one bound covers: with more the bound grows, with fewer
 def _bound_signals(problem, cell, count, bounds):
     """Bounds of |s| on ``count`` cells by Bézier coefficients, each at most |s| + 2h/5 |s'| + h²/20 |s''|."""
     for j in range(problem.table_dt.size):
-        first, bounds[j] = problem.table_start[j] + cell, 0.0
+        first, bounds[j], sides = problem.table_start[j] + cell, 0.0, problem.table.shape[1]
         slope, curving = 0.4 * problem.table_dt[j], 0.05 * problem.table_dt[j] ** 2
         for row in range(first, first + count + 1):
-            s, rate, curvature = problem.table[row, 0], problem.table[row, 1], problem.table[row, 2]
-            bounds[j] = max(bounds[j], abs(s) + slope * abs(rate) + curving * abs(curvature))
+            for side in range(0, sides, 3):
+                s, rate, curvature = problem.table[row, side : side + 3]
+                bounds[j] = max(bounds[j], abs(s) + slope * abs(rate) + curving * abs(curvature))
 
 
 @inlined

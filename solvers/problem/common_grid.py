@@ -1,24 +1,28 @@
 """Node tables of several signals on one grid, which the exponential method crosses cell by cell.
 
-The quintics of a table join with continuous curvature; their third to fifth derivatives jump at the nodes. They hardly
-do where the signal is smooth on its grid, and much where kinks of a record are rounded or a user's table is coarse. A
+The third to fifth derivatives of a table jump at its nodes, of a record joined by straight lines slope and curvature
+too. They hardly do where the signal is smooth on its grid, and much where it has kinks or a user's table is coarse. A
 quintic of another grid that goes across a node cannot jump there. So the grid divides that of the roughest table, and
-the others are carried over such that their moments ∫ s tᵏ dt, k = 0 ... 5, stay around each of their nodes. Of the
-response to a jump of the third derivative, at the frequency ω, a part of (ω dt)^10/10⁸ is then wrong, and within a cell
-of the node more. Two coarse tables of unequal steps are therefore cut finely.
+those of the others if it can: then nothing changes. Others are carried over such that their moments ∫ s tᵏ dt, k = 0
+... 5, stay around each of their nodes. Of the response to a jump of the third derivative, at the frequency ω, a part of
+(ω dt)^10/10⁸ is then wrong, and within a cell of the node more. Two coarse tables of unequal steps are therefore cut
+finely.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from solvers.problem.matrices import Array
-from solvers.problem.signals import Forcing
+from solvers.problem.signals import Forcing, joined
 
-_ROUGH = 1e-2  # jump of the third derivative in units of max|s|/dt³; of a smooth signal at most 1e-3 (rtol <= 1e-6)
+_ROUGH = 1e-2  # jump of derivative p = 1, 2, 3 in units of max|s|/dtᵖ; of a smooth signal at most 1e-3 (rtol <= 1e-6)
+_KINKS_FIRST = 1e6  # weight of jumps of slope and curvature: the grid divides the table that has them
+_CELLS_A_STEP = 128  # of a rough table whose nodes are not on the grid
 _FEWEST_CELLS = 4096  # where two tables are rough: what is left falls with the fourth power of the step
 
 
@@ -30,12 +34,12 @@ def on_one_grid(forcing: Forcing, duration: float) -> Forcing:
     dt = _common_step(given, steps, duration)
     cells = math.ceil(duration / dt * (1.0 - 1e-12))
     tables = [
-        rows[: cells + 1] if own == dt else _carried_over(rows, own, dt, cells)
+        rows[: cells + 1] if own == dt else (_cut if _divides(dt, own) else _carried_over)(rows, own, dt, cells)
         for rows, own in zip(given, steps, strict=True)
     ]
     return replace(
         forcing,
-        table=np.ascontiguousarray(np.concatenate(tables)),
+        table=joined(tables),
         table_dt=np.full(len(tables), dt),
         table_start=(cells + 1) * np.arange(len(tables) + 1, dtype=np.int64),
     )
@@ -43,14 +47,42 @@ def on_one_grid(forcing: Forcing, duration: float) -> Forcing:
 
 def _common_step(tables: list[Array], steps: list[float], duration: float) -> float:
     """The finest step, or not above it a part of the step of the roughest table; shorter where others are rough too."""
-    jumps = [np.abs(_jumps(rows, own)[:, 0]).max(initial=0.0) * own**3 for rows, own in zip(tables, steps, strict=True)]
-    rough = [jump / max(np.abs(rows[:, 0]).max(), 1e-300) for jump, rows in zip(jumps, tables, strict=True)]
+    rough = [_roughness(rows, own) for rows, own in zip(tables, steps, strict=True)]
     worst, most = int(np.argmax(rough)), min(steps)
     if rough[worst] <= _ROUGH:
         return most
-    if np.count_nonzero(np.array(rough) > _ROUGH) > 1:
-        most = min(most, duration / _FEWEST_CELLS)
-    return steps[worst] / math.ceil(steps[worst] / most * (1.0 - 1e-12))
+    dt = _part_of(steps[worst], most)
+    others = [i for i in np.flatnonzero(np.array(rough) > _ROUGH) if not _divides(dt, steps[i])]
+    if not others:
+        return dt
+    return _part_of(steps[worst], min([most, duration / _FEWEST_CELLS, *(steps[i] / _CELLS_A_STEP for i in others)]))
+
+
+def _roughness(rows: Array, dt: float) -> float:
+    """Largest jump of the first three derivatives of a node table, in units of max|s|/dtᵖ; kinks come first."""
+    jumps = np.abs(_jumps(rows, dt)[:, :3]).max(axis=0, initial=0.0) * dt ** np.arange(1.0, 4.0)
+    return float((jumps * (_KINKS_FIRST, _KINKS_FIRST, 1.0)).max()) / max(float(np.abs(rows[:, 0]).max()), 1e-300)
+
+
+def _part_of(step: float, most: float) -> float:
+    """The longest whole part of a step that is not above ``most``."""
+    return step / math.ceil(step / most * (1.0 - 1e-12))
+
+
+def _divides(dt: float, step: float) -> bool:
+    """Whether a step is a whole multiple of dt."""
+    return abs(step / dt - round(step / dt)) <= 1e-9
+
+
+def _cut(rows: Array, own: float, dt: float, cells: int) -> Array:
+    """A node table whose cells are cut into equal parts."""
+    pieces, parts = _derivatives(rows, own), round(own / dt)
+    node, sides = np.arange(cells + 1), []
+    for earlier in range(2):
+        piece = np.clip((node - earlier) // parts, 0, len(pieces) - 1)
+        after: Any = (node - piece * parts) * dt
+        sides.append(_moved(pieces[piece], after)[:, :3])
+    return np.hstack(sides) if rows.shape[1] > 3 else sides[0]
 
 
 def _carried_over(rows: Array, own: float, dt: float, cells: int) -> Array:
@@ -61,7 +93,7 @@ def _carried_over(rows: Array, own: float, dt: float, cells: int) -> Array:
     place = np.arange(1.0, len(pieces)) * own / dt
     within = place < cells
     place, cell = place[within], place[within].astype(np.int64)
-    changes = _moments_kept(place - cell, _jumps(rows, own)[within] * dt ** np.arange(3.0, 6.0))
+    changes = _moments_kept(place - cell, _jumps(rows, own)[within] * dt ** np.arange(1.0, 6.0))
     for end in range(2):
         np.add.at(out, cell + end, changes[:, end] / dt ** np.arange(3.0))
     return out
@@ -69,7 +101,7 @@ def _carried_over(rows: Array, own: float, dt: float, cells: int) -> Array:
 
 def _derivatives(rows: Array, dt: float) -> Array:
     """(cells, 6) s, s', ..., s⁽⁵⁾ at the start of every cell of a node table."""
-    a, b = (part * (1.0, dt, 0.5 * dt**2) for part in (rows[:-1], rows[1:]))
+    a, b = (part * (1.0, dt, 0.5 * dt**2) for part in (rows[:-1, :3], rows[1:, -3:]))
     e0, e1, e2 = b[:, 0] - a.sum(axis=1), b[:, 1] - a[:, 1] - 2.0 * a[:, 2], b[:, 2] - a[:, 2]
     rest = 10.0 * e0 - 4.0 * e1 + e2, -15.0 * e0 + 7.0 * e1 - 2.0 * e2, 6.0 * e0 - 3.0 * e1 + e2
     derivatives: Array = np.column_stack((a, *rest)) * [math.factorial(k) / dt**k for k in range(6)]
@@ -86,13 +118,13 @@ def _moved(derivatives: Array, span: Array) -> Array:
 
 
 def _jumps(rows: Array, dt: float) -> Array:
-    """(nodes within, 3) jumps of the third to fifth derivative of a node table."""
+    """(nodes within, 5) jumps of the first to fifth derivative of a node table."""
     pieces = _derivatives(rows, dt)
-    return (pieces[1:] - _moved(pieces[:-1], np.full(len(pieces) - 1, dt)))[:, 3:]
+    return (pieces[1:] - _moved(pieces[:-1], np.full(len(pieces) - 1, dt)))[:, 1:]
 
 
 def _moments_kept(x: Array, jumps: Array) -> Array:
-    """(n, 2, 3) changes of [s, s', s''] at 0 and 1 where s = Σ jump_p (u - x)ᵖ/p! from u = x on, p = 3, 4, 5.
+    """(n, 2, 3) changes of [s, s', s''] at 0 and 1 where s = Σ jump_p (u - x)ᵖ/p! from u = x on, p = 1 ... 5.
 
     The quintic through the rows at 0 and 1 takes the place of s in between. By the changes, which act from -1 to 2, it
     has the first six moments of s about the middle.
@@ -104,11 +136,16 @@ def _moments_kept(x: Array, jumps: Array) -> Array:
     basis = np.concatenate((rising @ before + falling @ within, rising @ within + falling @ behind))
     rest = 1.0 - x[:, None]
     later, about = rest * u, ((x[:, None] + rest * u - 0.5)[..., None]) ** powers  # than x; the middle
-    values = sum(jump[:, None] * later**p / math.factorial(p) for p, jump in zip((3, 4, 5), jumps.T, strict=True))
+    values = sum(jump[:, None] * _power(later, p) for p, jump in enumerate(jumps.T, 1))
     wanted = np.einsum("nu,nuk->nk", values * rest * weights, about)
-    ends = [sum(jumps[:, [p - 3]] * rest ** (p - k) / math.factorial(p - k) for p in (3, 4, 5)) for k in range(3)]
+    ends = [sum(jumps[:, [p - 1]] * _power(rest, p - k) for p in range(max(k, 1), 6)) for k in range(3)]
     changes: Array = np.linalg.solve(basis.T, (wanted - np.hstack(ends) @ rising @ within).T).T
     return changes.reshape(-1, 2, 3)
+
+
+def _power(x: Array, p: int) -> Array:
+    """xᵖ/p!."""
+    return x**p / math.factorial(p)
 
 
 def _quintics(u: Array) -> Array:

@@ -5,7 +5,8 @@ A signal is any callable t -> value that broadcasts. It becomes exactly one of
 * *tones*: ``signal.tones() -> (omega (k,), amplitude (k,) complex)``, value Re Σ a e^{iωt}, exact;
 * *nodes*: ``signal.nodes(duration, rtol) -> (dt, (N, 3))``, rows [s, s', s''] at t = 0, dt, ...; between them the
   quintic through both ends' values, slopes and curvatures, within ``rtol`` times the signal's size, in the mean
-  square at least;
+  square at least. Where slope or curvature jump at nodes, (N, 6): of the cell that begins there, then of that which
+  ends;
 * nothing of either: sampled here by a quintic spline, refined until it agrees between its nodes at 4096 places or more.
   What is shorter than duration/4096, such as a pulse, may hide between these and needs ``nodes``. Where the signal or
   its slope jumps, no spline agrees to a small tolerance, and the signal is refused.
@@ -69,7 +70,7 @@ def forcing_of(signals: list[Signal], duration: float, rtol: float) -> Forcing:
         np.array([t[0] for t in tones], dtype=float),
         np.array([t[1] for t in tones], dtype=complex),
         np.array([t[2] for t in tones], dtype=np.int64),
-        _joined([rows for _, rows, _ in tables]),
+        joined([rows for _, rows, _ in tables]),
         np.array([dt for dt, _, _ in tables], dtype=float),
         starts.astype(np.int64),
         np.array([load for _, _, load in tables], dtype=np.int64),
@@ -91,18 +92,20 @@ def _quintics(dt: float, rows: Array, t: Array) -> Array:
     """Values (k,) of a node table at times (k,)."""
     cell = np.clip((t / dt).astype(np.int64), 0, len(rows) - 2)
     x, scale = t / dt - cell, np.array([1.0, dt, dt * dt])
-    a, b = rows[cell] * scale, rows[cell + 1] * scale
+    a, b = rows[cell, :3] * scale, rows[cell + 1, -3:] * scale
     rest = b - np.stack((a @ [1.0, 1.0, 0.5], a @ [0.0, 1.0, 1.0], a[:, 2]), axis=1)
     cubic, fourth, fifth = rest @ [10.0, -4.0, 0.5], rest @ [-15.0, 7.0, -1.0], rest @ [6.0, -3.0, 0.5]
     found: Array = a[:, 0] + x * (a[:, 1] + x * (0.5 * a[:, 2] + x * (cubic + x * (fourth + x * fifth))))
     return found
 
 
-def _joined(tables: list[Array]) -> Array:
-    """All node tables in one array; a single one, which is long, is not copied."""
+def joined(tables: list[Array]) -> Array:
+    """All node tables in one array, with both sides of each node if one has them; a single one is not copied."""
     if len(tables) == 1:
         return np.ascontiguousarray(tables[0], dtype=float)
-    return np.ascontiguousarray(np.concatenate(tables or [np.empty((0, 3))]))
+    sides = max([table.shape[1] for table in tables], default=3) // 3
+    both = [np.tile(table, sides) if table.shape[1] == 3 else table for table in tables]
+    return np.ascontiguousarray(np.concatenate(both or [np.empty((0, 3))]))
 
 
 def tones_as_nodes(forcing: Forcing, chosen: list[int], duration: float, rtol: float) -> Forcing:
@@ -121,7 +124,7 @@ def tones_as_nodes(forcing: Forcing, chosen: list[int], duration: float, rtol: f
         forcing.tone_omega[kept],
         forcing.tone_amplitude[kept],
         forcing.tone_load[kept],
-        np.ascontiguousarray(np.concatenate(tables)),
+        joined(tables),
         np.concatenate((forcing.table_dt, [duration / (size - 1) for size in sizes])),
         np.concatenate((forcing.table_start, forcing.table_start[-1] + np.cumsum(sizes, dtype=np.int64))),
         np.concatenate((forcing.table_load, np.array(loads, dtype=np.int64))),
@@ -133,6 +136,9 @@ def _check_nodes(rows: Array, dt: float, duration: float, load: int) -> None:
     if not np.all(np.isfinite(rows)):
         bad = int(np.argwhere(~np.isfinite(rows))[0, 0])
         raise ValueError(f"the signal of load {load} is not finite at t = {bad * dt:g} s")
+    if rows.shape[1] == 6 and not np.allclose(rows[:, 0], rows[:, 3], 0.0, 1e-9 * np.abs(rows[:, 0]).max()):
+        bad = int(np.argmax(np.abs(rows[:, 0] - rows[:, 3])))
+        raise ValueError(f"the signal of load {load} jumps at t = {bad * dt:g} s; only slope and curvature may")
     if (len(rows) - 1) * dt < duration * (1.0 - 1e-12):
         raise ValueError(f"the signal of load {load} ends at {(len(rows) - 1) * dt:g} s, the run at {duration:g} s")
 

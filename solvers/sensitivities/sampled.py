@@ -37,7 +37,8 @@ class SampledLoads:
 
 def _changing(rows: Array) -> Array:
     """Whether a load changes within each cell of its table."""
-    return np.any(np.diff(rows, axis=0) != 0.0, axis=1) | np.any(rows[:-1, 1:] != 0.0, axis=1)
+    begin, end = rows[:-1, :3], rows[1:, -3:]
+    return np.any(begin != end, axis=1) | np.any(begin[:, 1:] != 0.0, axis=1)
 
 
 def _divided(dt: float, rows: Array, moves: Array, start: float, end: float) -> Array:
@@ -74,7 +75,7 @@ def _quintics(dt: float, rows: Array, begins: Any, places: Array) -> tuple[Array
     u = begins[:, None] + places
     cell = np.minimum(u.astype(int), len(rows) - 2)
     x = np.minimum(u - cell, 1.0)
-    a, b = (rows[cell + i] * np.array([1.0, dt, dt * dt]) for i in (0, 1))
+    a, b = (side * np.array([1.0, dt, dt * dt]) for side in (rows[cell, :3], rows[cell + 1, -3:]))
     rest = b - np.stack((a @ [1.0, 1.0, 0.5], a @ [0.0, 1.0, 1.0], a[..., 2]), axis=-1)
     c3, c4, c5 = rest @ [10.0, -4.0, 0.5], rest @ [-15.0, 7.0, -1.0], rest @ [6.0, -3.0, 0.5]
     value = a[..., 0] + x * (a[..., 1] + x * (0.5 * a[..., 2] + x * (c3 + x * (c4 + x * c5))))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from itertools import pairwise
 from typing import Any, ClassVar
 
 import numpy as np
@@ -117,7 +118,8 @@ def check_stability(method: ConstantStep, system: System, duration: float) -> No
 def check_sampling(method: ConstantStep, forcing: Forcing) -> None:
     """ValueError for a step that samples a load less than twice in its period, and so takes it for a slower one."""
     seen = forcing.tone_omega[forcing.tone_amplitude != 0.0]
-    fastest = max([0.0, *seen, *(_mean_frequency(rows) for rows in np.split(forcing.table, forcing.table_start[1:-1]))])
+    tables = [forcing.table[a:b] for a, b in pairwise(forcing.table_start.tolist())]
+    fastest = max([0.0, *seen, *map(_mean_frequency, forcing.table_dt.tolist(), tables)])
     if max(method.steps) * fastest > math.pi:
         raise ValueError(
             f"{method!r} samples a load of {fastest:.4g} rad/s less than twice in its period; take a step below "
@@ -125,10 +127,11 @@ def check_sampling(method: ConstantStep, forcing: Forcing) -> None:
         )
 
 
-def _mean_frequency(rows: Array) -> float:
-    """Root mean square frequency of a node table [s, s', s''], rad/s."""
+def _mean_frequency(dt: float, rows: Array) -> float:
+    """Root mean square frequency of a node table, rad/s; a kink counts as its curvature within a cell."""
     size = float(np.linalg.norm(rows[:, 1])) if len(rows) else 0.0
-    return float(np.linalg.norm(rows[:, 2])) / size if size > 0.0 else 0.0
+    curvature = rows[:, 2] + (rows[:, 1] - rows[:, -2]) / dt
+    return float(np.linalg.norm(curvature)) / size if size > 0.0 else 0.0
 
 
 def _name(system: System, mode: int) -> str:

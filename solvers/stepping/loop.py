@@ -49,7 +49,7 @@ from solvers.stepping.located import NEAR_END, SWITCHED, accept, before_step, fi
 from solvers.stepping.shared import shared
 
 _LEAST_STEP = 1e-290  # s: at t = 0 any step changes the time
-_MOST_NODES = 16.0  # of a signal on a step; a period of its fastest part has ten or more
+_MOST_NODES = 16  # of a signal on a step; a period of its fastest part has ten or more
 
 
 class Space(NamedTuple):
@@ -101,7 +101,7 @@ def _first_event(problem, state, space, h, adaptive):
 def _longest_resolved(problem, t, longest):
     """The longest step up to ``longest`` that leaves out no part of a sampled signal.
 
-    It ends where a signal ceases to be constant, or after a few of its nodes.
+    It ends where a signal ceases to be constant or has a kink, or after a few of its nodes.
     """
     for j in range(problem.table_dt.size):
         dt, start, last = problem.table_dt[j], problem.table_start[j], problem.table_start[j + 1] - 1
@@ -109,17 +109,31 @@ def _longest_resolved(problem, t, longest):
         node = first
         while node < last and (node - start) * dt < t + longest and _constant(problem.table, node):
             node += 1
-        longest = min(longest, (node - start) * dt - t if node > first else _MOST_NODES * dt)
+        if node > first:
+            longest = min(longest, (node - start) * dt - t)
+            continue
+        longest = min(longest, _MOST_NODES * dt)
+        for kink in range(first + 1, min(first + _MOST_NODES, last)):
+            if _bends(problem.table, kink):
+                longest = min(longest, (kink - start) * dt - t)
+                break
     return longest
 
 
 @inlined
 def _constant(table, node):
     """Whether a signal is constant from a node to the next one."""
-    constant = table[node, 0] == table[node + 1, 0]
+    constant, before = table[node, 0] == table[node + 1, 0], table.shape[1] - 3
     for order in range(1, 3):
-        constant &= table[node, order] == 0.0 and table[node + 1, order] == 0.0
+        constant &= table[node, order] == 0.0 and table[node + 1, before + order] == 0.0
     return constant
+
+
+@inlined
+def _bends(table, node):
+    """Whether slope or curvature of a signal jump at a node."""
+    before = table.shape[1] - 3
+    return table[node, 1] != table[node, before + 1] or table[node, 2] != table[node, before + 2]
 
 
 @merged

@@ -7,6 +7,7 @@ from typing import Annotated, Any, NamedTuple
 
 from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.kernels import (
+    cell_ends,
     inlined,
     inner,
     is_circle,
@@ -207,15 +208,15 @@ def _between_nodes(problem, coefficients, time_exponent, j, first, beyond, t, h)
 
 @inner
 def _has_kinks(problem, j, first, beyond, largest):
-    """Whether the third derivative of a signal jumps at a node of its table by more than `_KINK_JUMP` × largest/dt³."""
-    dt, table, most = problem.table_dt[j], problem.table, 0.0
+    """Whether derivative p = 1, 2 or 3 of a signal jumps at a node by more than `_KINK_JUMP` × largest/dtᵖ."""
+    dt, most = problem.table_dt[j], 0.0
     last = problem.table_start[j + 1] - 1
     for node in range(max(first, problem.table_start[j] + 1), min(beyond, last)):
-        a, b, c = table[node - 1], table[node], table[node + 1]
-        jump = (
-            60.0 * (a[0] - 2.0 * b[0] + c[0]) + 24.0 * dt * (a[1] - c[1]) + 3.0 * dt * dt * (a[2] - 6.0 * b[2] + c[2])
-        )
-        most = max(most, abs(jump))
+        (a, before), (b, c) = cell_ends(problem, node - 1), cell_ends(problem, node)
+        slope, curvature = dt * (b[1] - before[1]), dt * dt * (b[2] - before[2])
+        jump = 60.0 * (a[0] - 2.0 * b[0] + c[0]) + 24.0 * dt * (a[1] - c[1]) - 36.0 * slope
+        jump += 3.0 * dt * dt * (a[2] - 6.0 * b[2] + c[2]) + 9.0 * curvature
+        most = max(most, abs(slope), abs(curvature), abs(jump))
     return most > _KINK_JUMP * largest
 
 

@@ -15,7 +15,7 @@ import math
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import REAL, VECTOR, copy, inlined, inner, merged
+from solvers.compiled.kernels import REAL, VECTOR, cell_ends, copy, inlined, inner, merged
 from solvers.compiled.parts import ACCOUNT_FLIGHT, ACCOUNT_SERIES, ACCOUNT_STEP, part
 from solvers.compiled.simd import WIDTH, load8, splat8, store8, sum8
 from solvers.compiled.state import T
@@ -151,9 +151,9 @@ def account_step(problem, tables, energy_tables, scratch, level, t, place):
 def _nodes_of_cell(problem, scratch, t):
     """Write s, s', s'' of every signal at the start, then at the end of the cell of t into ``scratch.signal_terms``."""
     for j in range(problem.table_dt.size):
-        node = problem.table_start[j] + cell_of(problem, t)[0]
-        copy(problem.table[node], scratch.signal_terms[j], 3)
-        copy(problem.table[node + 1], scratch.signal_terms[j, 3:], 3)
+        begin, end = cell_ends(problem, problem.table_start[j] + cell_of(problem, t)[0])
+        copy(begin, scratch.signal_terms[j], 3)
+        copy(end, scratch.signal_terms[j, 3:], 3)
 
 
 @merged
