@@ -1,6 +1,7 @@
 """Records: joined by straight lines, padded, in a scene and in a scene file."""
 
 import json
+import math
 import os
 import re
 import warnings
@@ -13,6 +14,7 @@ from scipy.interpolate import BPoly
 
 import fembeam as fb
 import solvers
+from contacts import KelvinVoigt
 from fembeam.cli import main
 from fembeam.excitation.polyline import Polyline
 from fembeam.scene_file import SceneFileError, read
@@ -50,6 +52,20 @@ def test_a_polyline_loads_an_oscillator_as_the_exact_recursion_does(omega):
     error = np.abs(motion("linear") - exact) / np.abs(exact).max()
     assert error.max() < 1e-10
     assert np.abs(motion("spectral") - exact).max() > 5e-4 * np.abs(exact).max()  # another convention
+
+
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-11])
+def test_steps_in_contact_end_on_the_kinks_of_a_polyline(rtol):
+    """A stop with a dashpot that stays pressed is one spring more: q'' + 2ζω q' + ω² q = 5 k - a."""
+    omega, stiffness, damping = 30.0, 2e3, 4.0
+    record = fb.Record(TIMES, QUAKE, quantity="acceleration", interpolation="linear")
+    stop = solvers.Contact([1.0], KelvinVoigt(stiffness, damping), -5.0)
+    system = solvers.System.modal([omega], [0.0], [stop], [([-1.0], record.derivative(2))])
+    together = math.sqrt(omega**2 + stiffness)
+    pressed, method = 5.0 * stiffness / together**2, solvers.Exponential(rtol)
+    run = solvers.integrate(system, [pressed], [0.0], 3.9, dt=H / 2, method=method)
+    exact = stepped(QUAKE, H, together, damping / (2.0 * together), 2, 2 * 390)
+    assert np.abs(run.q[:, 0] - pressed - exact).max() < 2.0 * rtol * np.abs(exact).max()
 
 
 @pytest.mark.parametrize("integrals", [0, 1, 2])

@@ -271,6 +271,13 @@ def cell_ends(problem, row):
     return table[row], table[row + 1, table.shape[1] - 3 :]
 
 
+@inlined
+def bends_at(problem, row):
+    """Whether slope or curvature of a sampled signal jump at a row of the node tables."""
+    table, before = problem.table, problem.table.shape[1] - 3
+    return table[row, 1] != table[row, before + 1] or table[row, 2] != table[row, before + 2]
+
+
 @inner
 def table_value(problem, j, t):
     """Quintic Hermite value of node table j at time t."""

@@ -27,16 +27,17 @@ from solvers.compiled.packed import PackedType
 (SIDE, FIRST_END, LAND_IN_TIME, GO_BEYOND, PASSED) = range(14, 19)
 (PRESSED,) = range(19, 20)
 (PAIR, FREE_BLOCKS, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, BOUNDS) = range(20, 26)
-(CIRCLE_SPAN, CIRCLE_SPAN_AT, CIRCLE_NEAR, CIRCLE_ROOT, CIRCLE_MOTION, CIRCLE_FORCES, CIRCLE_GUESS) = range(26, 33)
-(CIRCLE_AWAY, CIRCLE_NEWTON, CIRCLE_WORK, CIRCLE_WITHIN, CIRCLE_LANDED) = range(33, 38)
-(RADIAL_MOTION, RADIAL_ACCELERATION, RADIAL_PUSH) = range(38, 41)
-(RUB_FORCES, RUB_GUESS, RUB_NEWTON, RUB_WORK, RUB_WITHIN, RUB_MARGINS, RUB_IN, RUB_AROUND, RUB_PEAK) = range(41, 50)
+(TO_KINK,) = range(26, 27)
+(CIRCLE_SPAN, CIRCLE_SPAN_AT, CIRCLE_NEAR, CIRCLE_ROOT, CIRCLE_MOTION, CIRCLE_FORCES, CIRCLE_GUESS) = range(27, 34)
+(CIRCLE_AWAY, CIRCLE_NEWTON, CIRCLE_WORK, CIRCLE_WITHIN, CIRCLE_LANDED) = range(34, 39)
+(RADIAL_MOTION, RADIAL_ACCELERATION, RADIAL_PUSH) = range(39, 42)
+(RUB_FORCES, RUB_GUESS, RUB_NEWTON, RUB_WORK, RUB_WITHIN, RUB_MARGINS, RUB_IN, RUB_AROUND, RUB_PEAK) = range(42, 51)
 EVERY_RUN, ENERGY = range(10), range(10, 14)
-BORDERS, TWO_STOPS, MANY_STOPS, CIRCLES = range(14, 19), range(19, 20), range(20, 26), range(26, 41)
-FRICTION = range(41, 50)
+BORDERS, TWO_STOPS, MANY_STOPS, KINKS = range(14, 19), range(19, 20), range(20, 26), range(26, 27)
+CIRCLES, FRICTION = range(27, 42), range(42, 51)
 """What needs them: every run, those with an energy balance, with bends or memory in a law, with two or many stops, with
-circular clearances, with friction."""
-PLACES = 50
+kinks of sampled loads, with circular clearances, with friction."""
+PLACES = 51
 
 _DECLARED: dict[int, tuple[Any, Any, tuple[Any, ...]]] = {}
 _LOADED: dict[tuple[type, int], Any] = {}

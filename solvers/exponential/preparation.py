@@ -12,7 +12,7 @@ from numba import types
 from solvers.compiled.fields import packed_type, shapes_of
 from solvers.compiled.kernels import Problem, type_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned
-from solvers.compiled.parts import BORDERS, CIRCLES, ENERGY, EVERY_RUN, FRICTION, MANY_STOPS, TWO_STOPS, load
+from solvers.compiled.parts import BORDERS, CIRCLES, ENERGY, EVERY_RUN, FRICTION, KINKS, MANY_STOPS, TWO_STOPS, load
 from solvers.compiled.state import (
     NO_ROWS,
     STATE,
@@ -130,7 +130,10 @@ class Prepared(NamedTuple):
 def prepare_run(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
     """The forcing without resonant tones and on one grid, and the tables."""
     taken = on_one_grid(without_resonance(system, forcing, duration, rtol), duration)
-    return taken, prepare_system(system, taken)
+    prepared = prepare_system(system, taken)
+    if taken.table.shape[1] > 3:
+        load_parts(type_of(prepared.problem.value), KINKS)
+    return taken, prepared
 
 
 def prepare_system(system: System, forcing: Forcing) -> Prepared:

@@ -77,12 +77,13 @@ def _divides(dt: float, step: float) -> bool:
 def _cut(rows: Array, own: float, dt: float, cells: int) -> Array:
     """A node table whose cells are cut into equal parts."""
     pieces, parts = _derivatives(rows, own), round(own / dt)
-    node, sides = np.arange(cells + 1), []
-    for earlier in range(2):
-        piece = np.clip((node - earlier) // parts, 0, len(pieces) - 1)
-        after: Any = (node - piece * parts) * dt
-        sides.append(_moved(pieces[piece], after)[:, :3])
-    return np.hstack(sides) if rows.shape[1] > 3 else sides[0]
+    node = np.arange(cells + 1)
+    piece = np.minimum(node // parts, len(pieces) - 1)
+    after: Any = (node - piece * parts) * dt
+    out = np.tile(_moved(pieces[piece], after)[:, :3], rows.shape[1] // 3)
+    kept = node[::parts][: len(rows)]
+    out[kept] = rows[: kept.size]
+    return out
 
 
 def _carried_over(rows: Array, own: float, dt: float, cells: int) -> Array:

@@ -19,6 +19,7 @@ from solvers.compiled.kernels import (
     PROBLEM,
     REAL,
     VECTOR,
+    bends_at,
     entry,
     inlined,
     inner,
@@ -114,7 +115,7 @@ def _longest_resolved(problem, t, longest):
             continue
         longest = min(longest, _MOST_NODES * dt)
         for kink in range(first + 1, min(first + _MOST_NODES, last)):
-            if _bends(problem.table, kink):
+            if bends_at(problem, kink):
                 longest = min(longest, (kink - start) * dt - t)
                 break
     return longest
@@ -127,13 +128,6 @@ def _constant(table, node):
     for order in range(1, 3):
         constant &= table[node, order] == 0.0 and table[node + 1, before + order] == 0.0
     return constant
-
-
-@inlined
-def _bends(table, node):
-    """Whether slope or curvature of a signal jump at a node."""
-    before = table.shape[1] - 3
-    return table[node, 1] != table[node, before + 1] or table[node, 2] != table[node, before + 2]
 
 
 @merged

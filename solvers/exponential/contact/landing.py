@@ -99,8 +99,8 @@ _ERROR_SHARE = 0.1  # part of the embedded difference that counts as the error
 _ERROR_SHARE_FOURTH_ROOT = 3e-2  # the same with u = δ^{1/4}: terms t² = u⁸, exact in the step, make up the difference
 _DERIVATIVE_SHARE, _MOST_FACTOR = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
 _ROUNDING = 1e-11  # rounding of a margin, in units of its largest
-_SHARE_OF_CONTACT = 0.2  # longest landing in time on a border of friction, in units of the contact's duration × reach
-_SHARE_SINCE_ENTRY = 0.04  # the same of one from the entry on
+SHARE_OF_CONTACT = 0.2  # longest landing in time on a border of friction, in units of the contact's duration × reach
+SHARE_SINCE_ENTRY = 0.04  # the same of one from the entry on
 _NEAR_SURFACE = 1e-6  # δ, in units of its peak, below which its rounding may hide a border
 _LEAST_MARGIN = 0.1  # part of a margin's error that counts, in units of the tolerance of δ̇
 _ANY_ERROR = 1e300  # but NaN
@@ -172,7 +172,7 @@ def _memory_force_error(problem, state, scratch, s, span):
 
 
 @inner
-def _error_in_time(problem, state, scratch, span):
+def error_in_time(problem, state, scratch, span):
     """Largest error of a landing in the variable TIME or SINCE, in units of the tolerance.
 
     It is that of δ and δ̇ of all rows by both embedded differences, and that of the forces of elements with memory.
@@ -209,7 +209,7 @@ def _time_increases(scratch, size):
 
 
 @inner
-def _step(problem, tables, state, scratch, variable, stop, span):
+def take_step(problem, tables, state, scratch, variable, stop, span):
     """Take a DOP853 step of length ``span`` from ``scratch.stages[START]`` to ``scratch.stages[LANDED]``."""
     state.count[CALLS] += landing_step(
         *(problem, tables, scratch.control[BALANCED] > 0, np.int64(STAGES), variable, stop, span),
@@ -241,7 +241,7 @@ def _length_to(problem, tables, state, scratch, variable, stop, span, landed, ti
     if variable == SINCE:
         length = span * (1.0 - remaining) ** (1.0 / kappa)
     while True:
-        _step(problem, tables, state, scratch, variable, stop, length)
+        take_step(problem, tables, state, scratch, variable, stop, length)
         delay, tries = x[size] - time, tries + 1
         pace = 1.0 if variable >= TIME else indentation_rate(problem, stop, x)  # d(variable)/dt
         if variable in (ROOT, SINCE):
@@ -268,7 +268,7 @@ def _begin_peaks(problem, state, scratch):
 def _friction_after(problem, tables, state, scratch, variable, stop, length, s):
     """|F_t|, N, of stop s after a step of some length from the start of the landing."""
     x = scratch.stages[LANDED]
-    _step(problem, tables, state, scratch, variable, stop, length)
+    take_step(problem, tables, state, scratch, variable, stop, length)
     return abs(slider_force(problem, s, state.segment[s], state.entry_rate[s], x[state.x.size], x))
 
 
@@ -306,7 +306,7 @@ def _friction_peaks_inside(problem, scratch, width, s):
 
 
 @inner
-def _accept(problem, tables, state, scratch, variable, stop, level, span):
+def accept_landing(problem, tables, state, scratch, variable, stop, level, span):
     """Move the state to the landing in ``scratch.stages[LANDED]``, or to the end of the run if that is earlier.
 
     Samples that are due in between are written. ``level`` is the indentation at which the landing ends, inf for a bend
@@ -351,7 +351,7 @@ def _accept(problem, tables, state, scratch, variable, stop, level, span):
 
 
 @inlined
-def _longest_time(problem, tables, state, scratch):
+def longest_time(problem, tables, state, scratch):
     """Longest landing, s: `landing_reach` over the fastest rate, and at most a cell of the sampled signals.
 
     For the derivative of a run it is also `landing_reach` over the frequency to which contacts stiffen the structure.
@@ -393,7 +393,7 @@ def may_land(problem, tables, state, scratch, stop, direction, time_to_border):
     One just entered, which the landing of another sees leave, lies on the border: it would leave at once, for ever.
     """
     delta, rate = scratch.start_motion[stop, 0], scratch.start_motion[stop, 1]
-    if time_to_border > _longest_time(problem, tables, state, scratch) or direction * rate <= rate_tolerance(
+    if time_to_border > longest_time(problem, tables, state, scratch) or direction * rate <= rate_tolerance(
         problem, stop, state.x
     ):
         return False
@@ -465,13 +465,13 @@ def land(problem, tables, state, scratch, stop, direction, time_to_border):
     scratch.landed[0], scratch.landed[OPENED] = -1, 0
     if not may_land(problem, tables, state, scratch, stop, direction, time_to_border):
         return -1
-    longest, kappa = _longest_time(problem, tables, state, scratch), tables.time_exponent[1 + stop]
+    longest, kappa = longest_time(problem, tables, state, scratch), tables.time_exponent[1 + stop]
     leaving = direction < 0 and state.segment[stop] == 1
     start_landing(problem, tables, state, scratch, stop, np.int64(ROOT))
     w, x = scratch.stages[START], scratch.stages[LANDED]
     variable = ROOT if leaving and kappa > 1.0 else INDENTATION
     span = -w[size + 1] if variable == ROOT else _knot(problem, state, stop, direction) - scratch.start_motion[stop, 0]
-    _step(problem, tables, state, scratch, variable, stop, span)
+    take_step(problem, tables, state, scratch, variable, stop, span)
     landed = x[size]
     time_rounding = surface_tolerance(problem, stop, state.x) / abs(rate)  # the distance may be rounding
     if not t <= landed <= t + min(4.0 * time_to_border, longest) + time_rounding:
@@ -490,7 +490,7 @@ def land(problem, tables, state, scratch, stop, direction, time_to_border):
     if other != CLEAR:
         return max(other, -1)
     level = _knot(problem, state, stop, direction)
-    accepted = _accept(problem, tables, state, scratch, variable, stop, level, span)
+    accepted = accept_landing(problem, tables, state, scratch, variable, stop, level, span)
     return stop if accepted else -1
 
 
@@ -579,7 +579,7 @@ def _guess_before_opening(problem, tables, state, scratch, stop, border, guess, 
     w, kappa, sticks = scratch.stages[START], tables.time_exponent[1 + stop], 1.0 if slider[CODE] == 0.0 else 0.0
     margins, x, radius = scratch.margin_end[stop], scratch.stages[LANDED], radius_of(problem, stop)
     if not opened:
-        _step(problem, tables, state, scratch, np.int64(ROOT), stop, -u)
+        take_step(problem, tables, state, scratch, np.int64(ROOT), stop, -u)
     end, sign = _event_function(problem, tables, state, scratch, stop, border, x, sticks, margins)
     largest = abs(margins[border])
     begin, _ = _event_function(problem, tables, state, scratch, stop, border, w, 0.0, margins)
@@ -601,7 +601,7 @@ def _promising(problem, scratch, variable, stop):
     """Length, s, of a landing in time above which it would hardly be within the tolerance, by a contact's duration."""
     if not rubs(problem, stop) or scratch.duration[stop] == 0.0:
         return np.inf
-    share = _SHARE_SINCE_ENTRY if variable == SINCE else _SHARE_OF_CONTACT
+    share = SHARE_SINCE_ENTRY if variable == SINCE else SHARE_OF_CONTACT
     return share * scratch.accuracy[REACH] * scratch.duration[stop]
 
 
@@ -624,7 +624,7 @@ def _within_tolerance(problem, tables, state, scratch, variable, stop, time):
     """Whether the error of the landing just taken, of length ``time`` s, is within the tolerance."""
     if variable == ROOT:
         return _is_resolved(problem, tables, state, scratch, variable, stop)
-    return _error_in_time(problem, state, scratch, time) * _error_of_stick(problem, tables, scratch, stop) <= 1.0
+    return error_in_time(problem, state, scratch, time) * _error_of_stick(problem, tables, scratch, stop) <= 1.0
 
 
 @inlined
@@ -658,7 +658,7 @@ def _locate(problem, tables, state, scratch, stop, border, search):
     shortest = 0.0 if border >= 0 and not begins_on_border else 0.1 * span
     if begins_on_border and slope == 0.0:  # the secant needs another point
         span_before = 0.9 * span
-        _step(problem, tables, state, scratch, variable, stop, forward * span_before)
+        take_step(problem, tables, state, scratch, variable, stop, forward * span_before)
         value_before, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
     low, high, rounding = span_before if value_before > 0.0 else 0.0, longest, 0.0
     for _ in range(_MOST_TRIALS if border < 0 else _MOST_BORDER_TRIALS):
@@ -667,7 +667,7 @@ def _locate(problem, tables, state, scratch, stop, border, search):
             count = 2 if abs(change) <= _MIDPOINT_UP_TO * span else 4
             _short_step(problem, tables, state, scratch, variable, stop, forward * change, count)
         else:
-            _step(problem, tables, state, scratch, variable, stop, forward * span)
+            take_step(problem, tables, state, scratch, variable, stop, forward * span)
         value, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
         if slope == 0.0:
             slope = (value - value_before) / (span - span_before)
@@ -698,7 +698,7 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
     If another border is crossed before, ``scratch.landed`` holds its element and number; its first entry is -1 if there
     is none, `UNRESOLVED` if a shorter step must tell.
     """
-    limit, largest = _longest_time(problem, tables, state, scratch), scratch.bend_values[scratch.bend_values.size - 1]
+    limit, largest = longest_time(problem, tables, state, scratch), scratch.bend_values[scratch.bend_values.size - 1]
     tolerance, sign, slope = 1e-10 * largest, 0.0, 0.0
     opened = scratch.landed[OPENED] == stop + 1
     if border >= 0:  # if it were missed by more, the next step might cross it in the wrong direction
@@ -731,4 +731,4 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
     lower, upper = problem.knots[stop, state.segment[stop] - 1], problem.knots[stop, state.segment[stop]]
     if not lower < indentation(problem, stop, x) < upper:
         return False
-    return _accept(problem, tables, state, scratch, variable, stop, np.inf, forward * span)
+    return accept_landing(problem, tables, state, scratch, variable, stop, np.inf, forward * span)
