@@ -362,6 +362,21 @@ def test_a_pulse_on_a_stop_at_rest_takes_few_steps():
     assert np.abs(ours.q_dot - theirs.q_dot).max() < 1e-5 * np.abs(theirs.q_dot).max()
 
 
+def test_a_stop_that_damps_on_approach_turns_for_less_than_a_step():
+    """Pressed by a falling load with a tone it recedes, and in some periods approaches for a short while."""
+    made, omega, size = Viscoelastic(1e9, 3e4, approach_only=True), 1500.0, 0.5
+    t = np.linspace(0.0, 0.05, 11)
+    for level in np.linspace(1.33, 1.6, 25):
+        falling = fb.Record(t, 200.0 - level * size * omega * t, quantity="force", interpolation="linear")
+        loads = [([1.0], falling), ([1.0], fb.Harmonic(size, omega, phase=-math.pi / 2))]
+        system = System.modal([10.0], 0.5, [Contact([-1.0], made, 0.0)], loads)
+        start = [2e-7 ** (2 / 3)], [0.0], 0.05, 0.005
+        exact = integrate(system, *start, DormandPrince(1e-12, 1e-18)).q_dot
+        for rtol in (1e-6, 1e-8):
+            ours = integrate(system, *start, Exponential(rtol)).q_dot
+            assert np.abs(ours - exact).max() < 100.0 * rtol * np.abs(exact).max(), level  # it was 1e-3 and 2e-4
+
+
 @pytest.mark.parametrize("coupled", [0.0, 1e-6])
 @pytest.mark.parametrize("rtol", [1e-4, 1e-8])
 def test_a_load_that_moves_no_stop_is_resolved_in_contact(rtol, coupled):

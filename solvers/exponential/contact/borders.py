@@ -35,7 +35,7 @@ from solvers.compiled.state import AT_ONCE, LAST_EVENT, T, rate_tolerance
 from solvers.exponential.contact.crossings import extremum
 from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, motion_of, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL, S, lagrange
-from solvers.exponential.contact.peaks import local_maximum, motion_around
+from solvers.exponential.contact.peaks import maximum_and_place, motion_around
 from solvers.exponential.contact.slider_margins import (
     ENDS,
     slider_margins_around,
@@ -290,17 +290,15 @@ def _crossing_around(problem, tables, state, scratch, s, j, node_set, h, lowest)
     else:
         motion_around(problem, tables, state, scratch, node_set, h, s, lowest)
         margins(problem, state, s, S, scratch.local_motion[DELTAS], scratch.local_motion[RATES], scratch.margin)
-    below, deepest = scratch.trial, 0
+    below = scratch.trial
     for i in range(S):
         below[i] = -scratch.margin[S * j + i]
-        if below[deepest] <= 0.0 and below[i] > below[deepest]:
-            deepest = i
-    deep = local_maximum(below, 1.0, scratch.clipped)
+    deep, place = maximum_and_place(below, 1.0, scratch.clipped)
     _margins_at_nodes(problem, tables, state, scratch, s, node_set, h)
     if deep <= scratch.noise[s, j]:
         return np.inf
     begin, end = tables.local_interval[node_set, lowest, 0], tables.local_interval[node_set, lowest, 1]
-    sigma = begin + 0.5 * (LOCAL[max(deepest, 1)] + 1.0) * (end - begin)
+    sigma = begin + 0.5 * ((place if place > LOCAL[0] else LOCAL[1]) + 1.0) * (end - begin)
     return h * sigma ** tables.time_exponent[node_set]
 
 

@@ -41,9 +41,9 @@ from solvers.compiled.state import PEAK_FORCE, T_IN, T, acts, begins_and_ends, i
 from solvers.compiled.sums import above
 from solvers.exponential.circles.contact import radial_nodes, stays_in_circle
 from solvers.exponential.contact.many_stops import CONTINUING, ENTERING, add_block_motion, motion_at_nodes, uses_blocks
-from solvers.exponential.contact.node_response import RTOL, motion_of, respond, ripple_of_stop
-from solvers.exponential.contact.nodes import S
-from solvers.exponential.contact.peaks import largest_indentation
+from solvers.exponential.contact.node_response import DELTAS, RATES, RTOL, motion_of, respond, ripple_of_stop
+from solvers.exponential.contact.nodes import LOCAL, S
+from solvers.exponential.contact.peaks import largest_indentation, maximum_and_place, motion_around
 from solvers.exponential.flight import energy_norms
 
 RATE, FORCE = 1.0, 2.0  # kinds of bends in Tables.bend, named by their event function; 0 for a law without one
@@ -51,6 +51,7 @@ CLEAR, TOO_LONG = -1, -2  # results of `before_landing`: no other event, or one 
 _ON_BEND = 1e-9  # event function, in units of its largest on the step, up to which a stop counts as on its bend
 _TOGETHER = 1e-6  # the same, relative to its value at the start, by which a bend may be crossed as another stop lands
 _ROUNDING = 1e-11  # the same, in units of its largest on the step, up to which a node may be on the wrong side
+_WATCHED_BELOW = 0.2  # the same at a node, below which the motion around the node is evaluated
 _WITHIN = 8  # a stage of DOP853 inside its step, at 0.65
 _JUST_INSIDE = 1e-3  # δ, in units of that at the start of a landing on δ = 0, at which the sign of a force is told
 
@@ -253,17 +254,47 @@ def first_bend(problem, tables, state, scratch, node_set, level, is_new):
         begins_on = scratch.side[s] * begin < 0.0 or (is_new and abs(begin) <= _ON_BEND * largest)
         if begins_on and scratch.side[s] * values[0] < -_ROUNDING * largest:
             scratch.side[s] = -scratch.side[s]
-        before, t = begin, 0.0
-        for i in range(S + 1):
-            after = h * tables.times[node_set, i] if i < S else h
-            if scratch.side[s] * values[i] < -_ROUNDING * largest:
-                share = before / (before - values[i]) if scratch.side[s] * before > 0.0 else 0.0
-                if t + share * (after - t) < first:
-                    first, stop = t + share * (after - t), s
-                    scratch.bend_values[S + 1] = largest
-                break
-            before, t = values[i], after
+        time = _bend_at_nodes(tables, scratch, node_set, h, s, begin, largest)
+        if time == np.inf:
+            time = _bend_between_nodes(problem, tables, state, scratch, node_set, h, s, begin, largest)
+        if time < first:
+            first, stop = time, s
+            scratch.bend_values[S + 1] = largest
     return first, stop
+
+
+@inlined
+def _bend_at_nodes(tables, scratch, node_set, h, s, begin, largest):
+    """Time after the start at which the event function of stop s has changed sides at a node or the end, or inf."""
+    values, side, before, t = scratch.bend_values, scratch.side[s], begin, 0.0
+    for i in range(S + 1):
+        after = h * tables.times[node_set, i] if i < S else h
+        if side * values[i] < -_ROUNDING * largest:
+            share = before / (before - values[i]) if side * before > 0.0 else 0.0
+            return t + share * (after - t)
+        before, t = values[i], after
+    return np.inf
+
+
+@inner
+def _bend_between_nodes(problem, tables, state, scratch, node_set, h, s, begin, largest):
+    """The same where it is on the right side at all nodes, but on the other one near a minimum between them."""
+    values, side, there = scratch.bend_values, scratch.side[s], scratch.numbers
+    tolerance = max(_ROUNDING * largest, -2.0 * side * begin)
+    for i in range(S):
+        before, after = values[i - 1] if i > 0 else begin, values[i + 1]
+        if side * values[i] > min(side * before, side * after, _WATCHED_BELOW * largest):
+            continue
+        motion_around(problem, tables, state, scratch, node_set, h, s, i)
+        above(scratch.local_motion[DELTAS], problem.knots[s, 0], scratch.clipped)
+        _sides(problem, tables, state, s, S, scratch.clipped, scratch.local_motion[RATES], there)
+        for j in range(S):
+            there[j] *= -side
+        deep, place = maximum_and_place(there, 1.0, scratch.clipped)
+        if deep > tolerance and place > LOCAL[0]:
+            left, right = tables.local_interval[node_set, i, 0], tables.local_interval[node_set, i, 1]
+            return h * (left + 0.5 * (place + 1.0) * (right - left)) ** tables.time_exponent[node_set]
+    return np.inf
 
 
 @inner
@@ -301,6 +332,9 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
         if s != stop and tables.bend[s] > 0.0:
             before = scratch.side[s] * side_at(problem, tables, state, s, w, scratch.trial)
             if scratch.side[s] * side_at(problem, tables, state, s, x, scratch.trial) < -_TOGETHER * abs(before):
+                return TOO_LONG
+            turns = tables.bend[s] == RATE and not is_circle(problem, s)
+            if turns and _turns_inside(problem, scratch.stages, s, scratch.side[s], _TOGETHER * abs(before), width):
                 return TOO_LONG
         if not bends and tables.bend[s] == FORCE:
             if _pulls_inside(scratch.stages, size + 3 + 2 * s, width):
@@ -362,6 +396,15 @@ def _pulls_inside(work, column, width):
     for i in range(1, STAGES - 1):
         pulls |= work[i, column] / work[i, width] < 0.0
     return pulls
+
+
+@inlined
+def _turns_inside(problem, work, s, side, allowed, width):
+    """Whether δ̇ of a stop is on the wrong ``side`` by more than ``allowed`` at an inner stage of a landing."""
+    turns = False
+    for i in range(1, STAGES - 1):
+        turns |= side * dot(problem.read[row_of(problem, s)], work[i], 2 * problem.k.size) / work[i, width] < -allowed
+    return turns
 
 
 @inlined

@@ -85,7 +85,7 @@ from solvers.problem.friction import CODE, FREE, MU, PEAK, SLIDES, STIFFNESS
 
 OPENED = 2  # place in `Scratch.landed`: 1 + stop whose opening the step in ``scratch.stages`` ends at, or 0
 LAST_RESORT = 3  # the same: 1 where a step across the border would be the shortest one, else 0
-_MOST_TRIALS = 8  # iterations for the step that ends at an output time, or on a bend
+_MOST_TRIALS = 8  # iterations for the step that ends at an output time
 _MIDPOINT_UP_TO = 1e-4  # change of a landing's length, relative, that the midpoint rule makes: its error is the cube
 _CLASSICAL_UP_TO = 4e-3  # the same by the classical rule, of order 4
 _ON_BORDER = 1e-6  # margin, in units of its largest, below which a landing begins on the border that it ends on
@@ -94,7 +94,7 @@ _FOUND = 1e-6  # the same, up to which a landing has found its border
 _MOST_ROUNDING = 0.01  # the same, up to which rounding of δ may hide a margin's zero
 _HALVINGS, _LEAST_SHARE = 30, 1e-3  # of an interval that contains a root; least share of the way to it
 _MOST_VERTICES = 6  # parabolas to the maximum of |F_t| inside a landing
-_MOST_BORDER_TRIALS = 40  # the same on a border: its margin may change only near the start, which bisection must find
+_MOST_BORDER_TRIALS = 40  # the same on a bend or border: it may change only near the start, which bisection must find
 _ERROR_SHARE = 0.1  # part of the embedded difference that counts as the error
 _ERROR_SHARE_FOURTH_ROOT = 3e-2  # the same with u = δ^{1/4}: terms t² = u⁸, exact in the step, make up the difference
 _DERIVATIVE_SHARE, _MOST_FACTOR = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
@@ -498,12 +498,12 @@ def land(problem, tables, state, scratch, stop, direction, time_to_border):
 def _event_function(problem, tables, state, scratch, stop, border, x, sign, margins):
     """(value, sign) of the event function whose zero a landing locates, in the state x; all ``margins`` are written.
 
-    It is the margin of a border, or with ``border`` -1 the side of a bend. A slider that sticks, given a sign σ that is
-    not 0, has μN - σF_t, which is smooth where F_t changes sign, unlike its margin μN - |F_t|. A negative margin sets σ
-    to the sign of F_t.
+    It is the margin of a border, or with ``border`` -1 the event function of a bend, positive on the present side. A
+    slider that sticks, given a sign σ that is not 0, has μN - σF_t, which is smooth where F_t changes sign, unlike its
+    margin μN - |F_t|. A negative margin sets σ to the sign of F_t.
     """
     if border < 0:
-        return side_at(problem, tables, state, stop, x, scratch.trial), sign
+        return scratch.side[stop] * side_at(problem, tables, state, stop, x, scratch.trial), sign
     margins_of(problem, state, scratch, stop, x[state.x.size], x, margins)
     value = margins[border]
     if is_planar(problem) and sign != 0.0:
@@ -661,7 +661,7 @@ def _locate(problem, tables, state, scratch, stop, border, search):
         take_step(problem, tables, state, scratch, variable, stop, forward * span_before)
         value_before, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
     low, high, rounding = span_before if value_before > 0.0 else 0.0, longest, 0.0
-    for _ in range(_MOST_TRIALS if border < 0 else _MOST_BORDER_TRIALS):
+    for _ in range(_MOST_BORDER_TRIALS):
         change = span - span_before
         if abs(change) <= _CLASSICAL_UP_TO * span:
             count = 2 if abs(change) <= _MIDPOINT_UP_TO * span else 4
@@ -679,12 +679,11 @@ def _locate(problem, tables, state, scratch, stop, border, search):
         stagnates = abs(next_span - span) <= 1e-15 * span and border >= 0
         if stagnates or abs(value) <= tolerance or 0.5 * abs(value_before) <= abs(value) <= rounding:
             break
-        if border >= 0:
-            low, high = (span, high) if value > 0.0 else (low, span)
-            if (high < longest or forward < 0.0) and not low < next_span < high:
-                next_span = _bisect(low, high)
-                if rubs(problem, stop):  # the landing may begin on the same border
-                    next_span = max(next_span, 2.0 * shortest)
+        low, high = (span, high) if value > 0.0 else (low, span)
+        if (high < longest or forward < 0.0) and not low < next_span < high:
+            next_span = _bisect(low, high)
+            if rubs(problem, stop):  # the landing may begin on the same border
+                next_span = max(next_span, 2.0 * shortest)
         if not shortest < next_span <= longest or next_span == span:
             return span, np.nan, rounding
         span_before, value_before, span = span, value, next_span

@@ -59,9 +59,15 @@ def _parabola_vertex(values, place):
     return min(max(x, low), high), low, high
 
 
-@inner
+@inlined
 def local_maximum(values, limit, coefficients):
-    """Maximum on [-1, limit] of the polynomial through the values at `LOCAL`, near the highest of these.
+    """Maximum on [-1, limit] of the polynomial through the values at `LOCAL`, near the highest of these."""
+    return maximum_and_place(values, limit, coefficients)[0]
+
+
+@inner
+def maximum_and_place(values, limit, coefficients):
+    """The same and its place.
 
     Newton's method for a zero of the slope begins at the vertex of the parabola through that point and its neighbours;
     the error of the maximum is of the third order in the last step.
@@ -71,7 +77,7 @@ def local_maximum(values, limit, coefficients):
         if values[i] > values[place] and LOCAL[i] <= limit:
             place = i
     combine(MONOMIALS, values, S, None, coefficients)
-    best = values[place]
+    best, at = values[place], LOCAL[place]
     if limit < 1.0:
         best = max(best, _evaluate(coefficients, limit)[0])
     x, low, high = _parabola_vertex(values, place)
@@ -79,14 +85,15 @@ def local_maximum(values, limit, coefficients):
     x = min(x, high)
     for _ in range(_MOST_NEWTON_STEPS):
         value, slope, curvature = _evaluate(coefficients, x)
-        best = max(best, value)
+        if value > best:
+            best, at = value, x
         if not curvature < 0.0:
             break
         step = -0.5 * slope / curvature
         if abs(step) < 1e-5:
-            return max(best, value + 0.5 * slope * step)
+            return max(best, value + 0.5 * slope * step), at
         x = min(max(x + step, low), high)
-    return best
+    return best, at
 
 
 @inlined
