@@ -212,8 +212,7 @@ def stationary(
     plan = Segments.of(model, duration, dt, discard, start, solver, segment)
     watched = dict(watch) if watch else watched_by_default(model)
     sums = Sums(watched, dt, segment, dict(bins or {}), dict(levels or {}), len(model.scene.stops))
-    about = {} if checkpoint is None else _identity(model, watched, sums, plan, discard, start, solver)
-    kept = Checkpoint(checkpoint, about)
+    kept = Checkpoint(checkpoint, partial(_identity, model, watched, sums, plan, discard, start, solver))
     settled, enough = _resumed(kept, plan, sums), None if until is None else False
     if until is not None and plan.taken >= FEWEST_BATCHES:  # as it was asked before the end of an earlier call
         enough = _enough(sums.response(plan, settled, enough), of, until)

@@ -30,14 +30,15 @@ class Checkpoint:
     Parameters
     ----------
     path : the file; None keeps nothing. One that exists is read.
-    about : what the values belong to, name -> text; where it ends in "#" and a digest, this decides. A file about
-        something else is refused.
+    about : function that tells what the values belong to, name -> text; where this ends in "#" and a digest, that
+        decides. A file about something else is refused. Without a path it is not asked.
     """
 
-    def __init__(self, path: str | os.PathLike[str] | None, about: Mapping[str, str]) -> None:
+    def __init__(self, path: str | os.PathLike[str] | None, about: Callable[[], dict[str, str]] = dict) -> None:
         right = isinstance(path, (str, os.PathLike, type(None)))
         require(right, "checkpoint must be the path of a file", path, "study", 'e.g. "kept.npz"')
-        self.path, self.about = None if path is None else Path(path), dict(about)
+        self.path = None if path is None else Path(path)
+        self.about = {} if path is None else about()
         self.values: dict[str, Values] = {}
         if self.path is not None and self.path.exists():
             self.values = self._read(self.path)
