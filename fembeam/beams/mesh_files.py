@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 from fembeam.beams.beam import Beam
 from fembeam.beams.mesh import SHORTEST, divided
 from fembeam.beams.section import Section, Taper
-from fembeam.support import require
+from fembeam.support import require, written_beside
 
 Vector = NDArray[np.float64]
 Names = list[set[str]]
@@ -312,10 +311,8 @@ def to_mesh(beam: Beam, path: str | os.PathLike[str], elements: int = 100) -> di
     grouped = target.suffix in (".msh", ".inp")
     keys = [f"span_{i}" if grouped else f"{i}" for i in range(1, len(beam.spans) + 1)]
     mesh = (_gmsh if target.suffix == ".msh" else _plain)(beam, z, group, keys, target.suffix == ".inp")
-    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
-        draft = os.path.join(folder, target.name)
+    with written_beside(target) as draft:
         mesh.write(draft, **WRITERS[target.suffix])
-        os.replace(draft, target)
     return {key: section for key, (_, section) in zip(keys, beam.spans, strict=True)}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,7 +14,7 @@ from fembeam.plot.bodies import BodyStage
 from fembeam.plot.run_signals import samples_in
 from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled
 from fembeam.scene import ON
-from fembeam.support import require
+from fembeam.support import require, written_beside
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -72,10 +71,8 @@ def animate(
     stage = _stage(run, samples, fps)
     film = FuncAnimation(stage.figure, stage.show, frames=len(samples), init_func=lambda: [], blit=False)
     writer = (PillowWriter if target.suffix == ".gif" else FFMpegWriter)(fps=fps)  # type: ignore[arg-type]
-    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
-        draft = os.path.join(folder, target.name)
+    with written_beside(target) as draft:
         film.save(draft, writer=writer, dpi=100)
-        os.replace(draft, target)
     return target
 
 

@@ -21,7 +21,7 @@ from fembeam.support.checks import (
     require_positive,
     tuples,
 )
-from fembeam.support.files import write_rows, written_whole
+from fembeam.support.files import write_rows, written_beside, written_whole
 from fembeam.support.notes import note
 from fembeam.support.printed import Part, Printed, html_table
 from fembeam.support.progress import bar, counting
