@@ -132,14 +132,7 @@ def _lines(run: Run) -> tuple[Vector, list[tuple[str, Any]]]:
 
 def _of_places(run: Run) -> tuple[Vector, dict[str, tuple[Vector, Vector]]]:
     """The motion of these places; section forces of a frame by itself."""
-    rows = []
-    for shapes in (run.shapes, *run.others):
-        values = np.zeros((len(shapes.known), 3, shapes.whole.shape[2]))
-        for axis, name in enumerate("xyz"):
-            if name in shapes.components:
-                values[:, axis] = shapes.whole[:, shapes.components.index(name)]
-        rows.append(values[np.unique(shapes.lines)])
-    moved = np.concatenate(rows)
+    moved = np.concatenate([shapes.translations[np.unique(shapes.lines)] for shapes in (run.shapes, *run.others)])
     forces = run.readout.section_forces[0] if not run.others else None
     carried = {}
     if isinstance(forces, FrameForces):  # of joined bodies places of structures have none

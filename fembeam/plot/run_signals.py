@@ -15,6 +15,7 @@ from fembeam.support import is_finite, require
 if TYPE_CHECKING:
     from fembeam.model import Run
 
+FINER = 8  # times the samples, what is drawn between them
 MOST_BATCHES, FEWEST_BATCHES = 32, 4  # of a history, for standard errors
 MEMORIES = 10.0  # time constants of the structure that a batch lasts at least
 STEADY = 0.1  # of the largest mean square over a quarter of the time: below it the motion comes and goes
@@ -78,6 +79,14 @@ def samples_in(run: Run, window: tuple[float, float] | None, where: str, advice:
     inside = np.flatnonzero((run.t >= lo) & (run.t <= hi))
     require(len(inside) >= 2, "the window must hold at least 2 samples", (lo, hi), where, advice)
     return inside
+
+
+def between_samples(t: Vector, x: Vector, rates: Vector) -> tuple[Vector, Vector]:
+    """Times on a grid finer than the samples, and values there, by cubics through values and rates."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    fine = np.linspace(t[0], t[-1], FINER * (len(t) - 1) + 1)
+    return fine, CubicHermiteSpline(t, x, rates)(fine)
 
 
 def stationary(run: Run, discard: float = 0.0) -> bool:

@@ -55,6 +55,13 @@ class PlacedShapes:
         """(p, c, n + k): the values, then what supports carry."""
         return np.concatenate([self.values, self.carried], axis=2) if self.moving else self.values
 
+    @cached_property
+    def translations(self) -> Vector:
+        """(p, 3, n + k) along x, y and z; 0 along those that places do not have."""
+        own = [self.components.index(name) if name in self.components else None for name in COMPONENTS[:3]]
+        still = np.zeros_like(self.whole[:, 0])
+        return np.stack([still if i is None else self.whole[:, i] for i in own], axis=1)
+
     @property
     def words(self) -> dict[str, Any]:
         """All but the values, for JSON."""
