@@ -137,8 +137,6 @@ class SpeedAccuracy(Result):
                  for n in self.reduction]  # fmt: skip
         return [(head, [_cells(row) for row in self.table()]), *known, *filter(None, [self.claim()])]
 
-    rows = table
-
     figure = plot.speed_accuracy
 
 
