@@ -22,10 +22,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fembeam.excitation.line_spectrum import MOST_NODES
+
 Vector = NDArray[np.float64]
 HIGHEST = 4.0  # times the Nyquist frequency of the samples: up to there the load is right to the tolerance
 ERROR = 1 / 60480  # of a kink at ω h' = 1
-MOST_NODES = 20_000_000
 
 
 @dataclass(frozen=True, eq=False)
