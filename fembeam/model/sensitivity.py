@@ -25,7 +25,7 @@ from fembeam.model.extremes import of_top, time_of_top
 from fembeam.response import PlacedLog, directed
 from fembeam.scene import called, changes_structure, path_of, replaced, value_of
 from fembeam.scene.signals import is_of_signal
-from fembeam.support import Part, Printed, numbers, require
+from fembeam.support import Part, Printed, by_rows, numbers, require
 from solvers.orbits import codes, counts, delayed
 from solvers.problem import counted, dataframe
 from solvers.problem.friction import told_rates
@@ -173,8 +173,7 @@ class Sensitivity(Printed):
         log = self.contacts
         columns = {"stop": log.stop, "name": log.name, **log.where, "t_in": log.t_in, "t_out": log.t_out}
         columns |= {"entry": self.entries, "exit": self.exits, "peak force": self.peak_force, "impulse": self.impulse}
-        rows = zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
-        return [dict(zip(columns, row, strict=True)) for row in rows]
+        return by_rows(columns)
 
     def to_dataframe(self) -> Any:
         """The table as one of pandas; ImportError without pandas."""

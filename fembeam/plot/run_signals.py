@@ -9,6 +9,7 @@ import numpy as np
 from fembeam.model import places
 from fembeam.plot.style import Vector
 from fembeam.scene import persistent_drive
+from fembeam.scene.places import unsigned
 from fembeam.statistics import Signal, pdf
 from fembeam.support import is_finite, require
 
@@ -56,7 +57,7 @@ def place_of(run: Run, stop: int) -> Any:
         return z
     place, direction = run.acting[stop]
     direction = direction[0] if run.circles[stop, 0] else direction
-    return place, direction.removeprefix("-") if isinstance(direction, str) else direction
+    return place, unsigned(direction)
 
 
 def natural(run: Run) -> Vector:

@@ -62,15 +62,13 @@ class SectionForces:
 
     def moment(self, z: ArrayLike, behind: bool = False) -> Vector:
         """(k, n) at z (k,); at a point moment that of the element ahead, or ``behind``."""
-        element, x, h = self._places(z, behind)
-        (a, b), (da, db) = np.moveaxis(self.moments[element], 1, 0), np.moveaxis(self.shears[element], 1, 0)
+        a, b, da, db, x, h = self._around(z, behind)
         ends = (1 - x) ** 2 * (1 + 2 * x) * a + x**2 * (3 - 2 * x) * b
         return ends + h * x * (1 - x) * ((1 - x) * da - x * db)
 
     def shear(self, z: ArrayLike, behind: bool = False) -> Vector:
         """(k, n) at z (k,); at a point load that of the element ahead, or ``behind``."""
-        element, x, h = self._places(z, behind)
-        (a, b), (da, db) = np.moveaxis(self.moments[element], 1, 0), np.moveaxis(self.shears[element], 1, 0)
+        a, b, da, db, x, h = self._around(z, behind)
         return 6 * x * (1 - x) * (b - a) / h + (1 - x) * (1 - 3 * x) * da + x * (3 * x - 2) * db
 
     def stress(self, z: ArrayLike, behind: bool = False) -> Vector:
@@ -78,14 +76,15 @@ class SectionForces:
         profile = self.beam.profile(np.atleast_1d(z), behind)
         return self.moment(z, behind) * (profile.fibre / profile.I)[:, None]
 
-    def _places(self, z: ArrayLike, behind: bool) -> tuple[NDArray[np.int64], Vector, Vector]:
-        """Elements, local coordinates in [0, 1] and lengths, as columns."""
+    def _around(self, z: ArrayLike, behind: bool) -> tuple[Vector, ...]:
+        """Moments and shear forces at both ends of the elements; where in them in [0, 1], and lengths: as columns."""
         z = on_beam(np.atleast_1d(np.asarray(z, dtype=float)), self.beam, "fields")
         element = np.clip(
             np.searchsorted(self.nodes, z, side="left" if behind else "right") - 1, 0, len(self.nodes) - 2
         )
         h = self.nodes[element + 1] - self.nodes[element]
-        return element, ((z - self.nodes[element]) / h)[:, None], h[:, None]
+        ends = [kind[element, end] for kind in (self.moments, self.shears) for end in (0, 1)]
+        return *ends, ((z - self.nodes[element]) / h)[:, None], h[:, None]
 
 
 def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | FrameForces | JoinedForces | None:

@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from fembeam.structures.frame import Frame
 
 Vector = NDArray[np.float64]
-Counts = list[NDArray[np.int64]]
 
 DEFAULT_MODES = 10
 MOST_ELEMENTS = 10_000

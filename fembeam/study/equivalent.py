@@ -21,7 +21,7 @@ from contacts import Law, Sum
 from contacts.path import walk
 from fembeam import plot
 from fembeam.study.result import Result
-from fembeam.support import Part, number, numbers, require
+from fembeam.support import Part, by_rows, number, numbers, require
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,9 +75,8 @@ class Equivalent(Result):
 
     def table(self) -> list[dict[str, Any]]:
         """A row for each amplitude, in SI units."""
-        columns = {"amplitude": self.amplitude, "energy": self.energy, "stiffness": self.stiffness,
-                   "loss_stiffness": self.loss_stiffness, "loss_factor": self.loss_factor}  # fmt: skip
-        return [dict(zip(columns, map(float, row), strict=True)) for row in zip(*columns.values(), strict=True)]
+        names = "amplitude", "energy", "stiffness", "loss_stiffness", "loss_factor"
+        return by_rows({name: getattr(self, name) for name in names})
 
     def figure(self) -> Figure:
         """Energy per cycle, stiffness and loss factor over the amplitude; see `plot.equivalent`."""
