@@ -12,7 +12,7 @@ import numpy as np
 from fembeam.model.watched_places import places as usual_places
 from fembeam.response import BodyReaction, PlacedShapes
 from fembeam.scene import is_directed, place_words, said, unit_of
-from fembeam.support import is_finite, require
+from fembeam.support import is_finite, require, tuples
 from solvers.problem import dataframe, optional
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def histories(
             "ask for moment and shear")  # fmt: skip
     columns, there = {"t [s]": run.t}, [what for what in asked if what not in ELSEWHERE]
     if named:
-        columns |= _at_places(run, there, None if places is None else [_pair(at) for at in places])
+        columns |= _at_places(run, there, None if places is None else [tuples(at) for at in places])
     else:
         for name, z in where.items():
             columns |= {f"{what} {name} [{_unit(what, z)}]": _at(run, what, z) for what in there}
@@ -160,11 +160,6 @@ def _vector(direction: Any) -> str:
     return f"({' '.join(f'{number:.4g}' for number in direction)})"
 
 
-def _pair(at: Any) -> Any:
-    """A place and its direction, as a scene file lists them too."""
-    return tuple(tuple(one) if isinstance(one, list) else one for one in at) if isinstance(at, list) else at
-
-
 def _unit(quantity: str, at: Any) -> str:
     """Unit of a quantity at a place: rad for m where the direction is a rotation."""
     return UNITS[quantity].replace("m", "rad", 1) if _turns(at) else UNITS[quantity]
@@ -200,17 +195,7 @@ def to_dataframe(run: Run, stride: int = 1, **chosen: Any) -> Any:
 
 def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
     """See `Run.to_xarray`."""
-    named = isinstance(run.shapes, PlacedShapes)
-    given = list(usual_places(run.shapes).values()) if z is None and named else run.shapes.place(z)
-    place: Any = (
-        [given]
-        if isinstance(given, tuple)
-        else list(given)  # type: ignore[arg-type]
-        if named
-        else run.shapes.nodes
-        if z is None
-        else np.atleast_1d(np.asarray(z, dtype=float))
-    )
+    named, place = isinstance(run.shapes, PlacedShapes), run._places(z)
     variables = {
         "displacement": (("t", "z"), run.displacement(place), {"units": "m"}),
         "velocity": (("t", "z"), run.velocity(place), {"units": "m/s"}),

@@ -261,9 +261,9 @@ class _Varied:
 
     def _felt(self) -> float:
         """A step of a number that is zero and changes modes, which they feel about as much as `STRUCTURE`."""
-        step, here = FIRST, self.model
+        step = FIRST
         while LEAST < step < 1.0 / FIRST:
-            change = self._change(here, step)
+            change = self._change(step)
             if change > STRUCTURE:
                 step *= 0.1
             elif step < FIRST or change > FELT:
@@ -272,9 +272,9 @@ class _Varied:
                 step *= 10.0
         return step
 
-    def _change(self, here: Model, step: float) -> float:
+    def _change(self, step: float) -> float:
         """Largest relative change of frequencies, shapes or damping by a step from zero."""
-        there = here.again(self._scene(step))
+        here, there = self.model, self.model.again(self._scene(step))
         require(len(there.system.loads) == len(here.system.loads), "it must not bring a load that is not there yet",
                 step, self.called, "begin from a small value, such as gravity=1e-6")  # fmt: skip
         pairs = (here.omega**2, there.omega**2), (here.directions, there.directions), (here.zeta, there.zeta)

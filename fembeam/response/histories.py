@@ -211,15 +211,9 @@ class Histories:
         z : places (j,) in m; None: all nodes of the mesh. Of other bodies a list of (place, direction) for
             displacement, of (member, distance) for section forces.
         """
-        shapes = self._beam(body)
-        z = shapes.place(z)
-        if isinstance(shapes, PlacedShapes):
-            given: Any = z
-            if given is None:
-                given = list(shapes.usual.values()) if quantity == "displacement" else self._sections(body)
-            at: Any = [given] if isinstance(given, tuple) else list(given)
-        else:
-            at = shapes.nodes if z is None else np.atleast_1d(numbers("z", z, "Run", "give m along the beam"))
+        if z is None and quantity != "displacement" and isinstance(self._beam(body), PlacedShapes):
+            z = self._sections(body)
+        at = self._places(z, body)
         require(len(at) > 0, "z must not be empty", z, "Run.extremes", "leave it out for all of the body")
         q = self._q_of(body)
         found = extremes(self.t, q, *rows_of(self, quantity, at, body))
@@ -230,6 +224,15 @@ class Histories:
     def _q_of(self, body: int) -> Vector:
         """Coordinates at the samples, with the support dofs that move."""
         return self.with_supports(self.q, self._beam(body).moving)
+
+    def _places(self, z: Any, body: int = 0) -> Any:
+        """Places (j,) of a beam in m, None all its nodes; of another body a list, None the usual ones."""
+        shapes = self._beam(body)
+        at = shapes.place(z)
+        if isinstance(shapes, PlacedShapes):
+            at = list(shapes.usual.values()) if at is None else at
+            return [at] if isinstance(at, tuple) else list(at)
+        return shapes.nodes if at is None else np.atleast_1d(numbers("z", at, "Run", "give m along the beam"))
 
     def _sections(self, body: int) -> list[Any]:
         """All nodes of the mesh of a frame, as (member, distance)."""

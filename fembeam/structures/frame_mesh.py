@@ -241,12 +241,10 @@ def _stops(frame: Frame, places: Sequence[Any]) -> list[Vector]:
     """For every member the distances that must be nodes, ends included, ascending."""
     wanted: list[list[float]] = [[0.0, float(length)] for length in frame.lengths]
     shortest = SHORTEST_PRESSED if any(one.axial_force < 0 for one in frame.members) else SHORTEST
-    for place in places:
+    for place in spaced(frame, places, shortest):
         site = frame.site(place, "places of Frame.assembled")
         if not isinstance(site, str):
-            known, s = wanted[site[0]], site[1]
-            if min(abs(s - other) for other in known) > shortest * frame.lengths[site[0]]:
-                known.append(s)
+            wanted[site[0]].append(site[1])
     return [np.array(sorted(one)) for one in wanted]
 
 

@@ -90,9 +90,13 @@ def identity(model: Model, quantity: Callable[..., Any]) -> dict[str, str]:
     ------
     ValueError : something the quantity or the scene reads cannot be told from another of its kind.
     """
-    about = scene_identity(renewed(model, lambda j, _: j).scene)
-    about |= {"modes": repr(model.modes), "frequencies": fingerprint(model.omega)}
-    return about | {"quantity": f"{_name(quantity)} #{fingerprint(quantity, 'the quantity')}"}
+    asked = f"{_name(quantity)} #{fingerprint(quantity, 'the quantity')}"
+    return model_identity(renewed(model, lambda j, _: j)) | {"quantity": asked}
+
+
+def model_identity(model: Model) -> dict[str, str]:
+    """The same of a model: its scene, seeds among it, and its modes."""
+    return scene_identity(model.scene) | {"modes": repr(model.modes), "frequencies": fingerprint(model.omega)}
 
 
 def scene_identity(scene: Scene | Callable[..., Scene]) -> dict[str, str]:
