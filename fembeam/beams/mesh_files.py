@@ -52,7 +52,7 @@ def beam_of(
     lines, names = lines_of(mesh, data, sections, where)
     z = _along(np.asarray(mesh.points, dtype=float), lines, where)
     chain, order = _chained(z, lines, mesh.points, where)
-    chosen = _chosen(sections, [names[i] for i in order], chain, where)
+    chosen = chosen_names(sections, [names[i] for i in order], [f"z = {z:.6g} m" for z in chain], where)
     _warn_of_size(chain, where)
     spans, index = [], 0
     table = {"": sections} if isinstance(sections, (Section, Taper)) else {str(k): s for k, s in sections.items()}
@@ -228,11 +228,6 @@ def _chained(z: Vector, lines: NDArray[np.int64], points: Vector, where: str) ->
 def shown(points: Any) -> tuple[float, ...] | None:
     """One point for a message."""
     return tuple(float(f"{x:.6g}") for x in points[0]) if len(points) else None
-
-
-def _chosen(sections: Any, names: Names, chain: Vector, where: str) -> list[str]:
-    """The one name of every element that has a section."""
-    return chosen_names(sections, names, [f"z = {z:.6g} m" for z in chain], where)
 
 
 def chosen_names(sections: Any, names: Names, places: Sequence[str], where: str) -> list[str]:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.scene import signals_of, split, unit_of
 from fembeam.structures import COMPONENTS, turns
-from fembeam.support import is_finite, numbers, require
+from fembeam.support import is_finite, require, vector
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -169,9 +169,8 @@ def _driving(model: Model, driven: Any) -> tuple[Vector, int, str, str]:
 
 def _checked(omega: ArrayLike, model: Model, slipping: bool) -> Vector:
     """Frequencies (k,) at which the system is not singular."""
-    values = np.atleast_1d(numbers("omega", omega, WHERE, "give frequencies in rad/s"))
-    valid = values.ndim == 1 and values.size > 0 and bool(np.all(np.isfinite(values) & (values >= 0)))
-    require(valid, "omega must be at least 0 and finite, (k,)", omega, WHERE, "give frequencies in rad/s")
+    values = vector("omega", omega, WHERE, "give frequencies in rad/s", "must be at least 0 and finite, (k,)",
+                    lambda x: np.isfinite(x) & (x >= 0))  # fmt: skip
     C, K = _linear(model, slipping)
     natural = np.sqrt(np.maximum(np.linalg.eigvalsh(K), 0.0)) if model.scene.elements else model.omega
     singular = np.isin(values, natural[natural == 0.0] if np.any(C) else natural)

@@ -21,7 +21,7 @@ from contacts import Law, Sum
 from contacts.path import walk
 from fembeam import plot
 from fembeam.study.result import Result
-from fembeam.support import Part, by_rows, number, numbers, require
+from fembeam.support import Part, by_rows, number, require, vector
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -131,9 +131,8 @@ def equivalent(
     ([0.0, 0.02], [20000.0, 10000.0])
     """
     require(isinstance(law, Law), "law must be a contact law", law, WHERE, "give one of `contacts`, such as Jenkins")
-    X = np.atleast_1d(numbers("amplitudes", amplitudes, WHERE, "give them in m"))
-    valid = X.ndim == 1 and X.size > 0 and bool(np.all(np.isfinite(X) & (X > 0.0)))
-    require(valid, "amplitudes must be above 0 and finite, (k,)", amplitudes, WHERE, "give them in m")
+    X = vector("amplitudes", amplitudes, WHERE, "give them in m", "must be above 0 and finite, (k,)",
+               lambda x: np.isfinite(x) & (x > 0.0))  # fmt: skip
     if omega is not None:
         number("omega (rad/s)", omega, above=0.0)
     middle = number("mean (m)", mean)

@@ -20,6 +20,7 @@ from fembeam.support.checks import (
     require_place,
     require_positive,
     tuples,
+    vector,
 )
 from fembeam.support.files import write_rows, written_beside, written_whole
 from fembeam.support.notes import note
