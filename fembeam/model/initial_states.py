@@ -96,7 +96,7 @@ def missed(model: Model, field: Field | Sequence[Field]) -> float:
 
 
 def _missed(model: Model, full: Vector) -> float:
-    """The same of nodal values."""
+    """`missed` of nodal values (N,)."""
     M = model.matrices.M
     size = float(full @ (M @ full))
     left = full - model.basis.expand(model.basis.project(M @ full))

@@ -139,7 +139,7 @@ class Sensitivity(Printed):
         return self.found.solution
 
     def _of_stop(self, stop: int | str) -> tuple[Vector, Vector]:
-        """Of δ and δ̇ at fixed times."""
+        """Of δ and of δ̇ of a stop, at fixed times."""
         number = self.run.number(stop)
         contact = self.run.readout.model.system.contacts[number]
         own = self._at_samples(self._own.q), self._at_samples(self._own.q_dot)
@@ -160,7 +160,7 @@ class Sensitivity(Printed):
         return tuple(of_top(self.t, sign * u, sign * v, du, dv) for sign in (-1.0, 1.0))  # type: ignore[return-value]
 
     def _of_motion(self, changed: Vector, motion: Vector, z: Any, direction: Any, body: int) -> Vector:
-        """φ·dq + dφ·q."""
+        """Of φ·q at a place, φ·dq + dφ·q: ``changed`` is dq."""
         model = self.run.readout.model
         at = z if direction is None else directed(z, direction)
         found = changed @ np.asarray(model.phi(at, 0, body)).T

@@ -194,7 +194,7 @@ def _linear_curve(one: Branch, span: tuple[float, float], z: Any, slipping: bool
 
 
 def _contact_rows(several: list[Branch]) -> list[Any]:
-    """Those of all their models."""
+    """Contacts and elements of all their models."""
     return [row for one in several for row in one.family.model.contact_rows]
 
 

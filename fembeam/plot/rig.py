@@ -357,7 +357,7 @@ class _View:
 
 
 def _colour(item: Item) -> str:
-    """Of the line from a stop or an element."""
+    """Colour of the line from a stop or an element."""
     return COLOURS["stop" if item.kind[:1] == ("Stop",) else "element"]
 
 

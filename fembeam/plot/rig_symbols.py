@@ -50,7 +50,7 @@ class Pen:
         ])  # fmt: skip
 
     def moved(self, xi: float, eta: float) -> Pen:
-        """The same further along and outwards."""
+        """A pen about a point further along and outwards."""
         ((x,), (y,)) = self.at([(xi, eta)])
         return replace(self, x=float(x), y=float(y))
 

@@ -305,7 +305,7 @@ class Histories:
         return self._at_samples(self._deformation(self._stop(stop)))
 
     def _deformation(self, stop: int) -> Vector:
-        """δ (k,), of the last state without samples."""
+        """δ (k,) of a stop, one value without samples: of the last state."""
         if radius := self.circles[stop, 0]:
             return np.asarray(np.sign(radius) * np.linalg.norm(self._in_circle(stop), axis=1) - radius)
         return -self.q @ self.directions[self._rows[stop].start] - self.stops[stop, 2]
@@ -315,7 +315,7 @@ class Histories:
         return self._at_samples(self._deformation_rate(self._stop(stop)))
 
     def _deformation_rate(self, stop: int) -> Vector:
-        """δ̇ (k,), likewise."""
+        """δ̇ (k,) of a stop, likewise."""
         if self.circles[stop, 0]:
             rates = self.q_dot @ self.directions[self._rows[stop]][:2].T
             return np.asarray(np.sum(self._outward(stop) * rates, axis=1))

@@ -140,7 +140,7 @@ class PlacedShapes:
         return np.array([self._row(one) for one in at]).reshape(len(at), self.whole.shape[2])
 
     def _row(self, at: Any) -> Vector:
-        """(n + k,) of one."""
+        """(n + k,) of one (place, direction)."""
         place, along = split(at, self.components)
         require_components(along, self.components, f"the place {told(place)}", "phi")
         part = np.array([along[COMPONENTS.index(component)] for component in self.components])

@@ -259,7 +259,7 @@ def _beam_as_words(beam: Beam) -> dict[str, Any]:
 
 
 def _beam_of_words(words: Mapping[str, Any]) -> Beam:
-    """The same as a beam."""
+    """The beam that `_beam_as_words` wrote."""
     spans = [(length, _section(section)) for length, section in words["spans"]]
     return Beam.of_spans(spans, words["foundation"], words["axial_force"])
 

@@ -207,7 +207,7 @@ class Extremes:
         return float(self.highest[high]), _place(self.z[high]), float(self.t_highest[high])
 
     def with_others(self, other: Extremes) -> Extremes:
-        """Those of two sets of values at the same places: the lesser and the greater ones."""
+        """The lesser and the greater ones of two sets of values at the same places."""
         less, more = other.lowest < self.lowest, other.highest > self.highest
         return Extremes(
             self.z,
@@ -262,7 +262,7 @@ def rows_of(run: Histories, quantity: str, z: Any, body: int, behind: bool = Fal
 def _rows_of_frame(
     run: Histories, quantity: str, places: list[Any], body: int, behind: bool
 ) -> tuple[Vector, Any, Vector]:
-    """The same of section forces and stress along the members of a frame."""
+    """`rows_of` of section forces and stress along the members of a frame."""
     forces = frame_forces_of(run, body, quantity)
     known = (*forces.names, "stress")
     quantity = {"moment": "M", "shear": "Q"}.get(quantity, quantity)

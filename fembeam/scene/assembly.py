@@ -158,7 +158,7 @@ class Matrices:
         return self.among_all(self.beams[body].own_row(place, along), body)
 
     def own_row(self, place: Any, along: Six) -> sparse.csr_matrix:
-        """The same on the body's own dofs: of a beam u along y and -u_z about x."""
+        """`row` on the body's own dofs: of a beam u along y and -u_z about x."""
         require_components(along, ("y", "rx"), "a Beam bends in one plane: its places", f"{told(place)} of a Beam")
         return along[1] * self.interpolation(place) - along[3] * self.interpolation(place, 1)
 
@@ -364,7 +364,7 @@ def buckling_load(scene: Scene, elements: int | None = None) -> float:
 
 
 def _on_nodes(scene: Scene, nodes: Vector, modes: int | None) -> Matrices:
-    """The assembly itself."""
+    """Matrices of the own beam with elements between these nodes."""
     fixed = np.zeros((len(nodes), 2), dtype=bool)
     for support in scene.supports:
         fixed[np.argmin(np.abs(nodes - support.z))] |= support.fixed

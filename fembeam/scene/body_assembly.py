@@ -212,7 +212,7 @@ def _holding(scene: Scene) -> dict[Any, list[str]]:
 
 
 def _of(scene: Scene, assembled: Assembled, modes: int | None, held: Any, condense: bool) -> BodyMatrices:
-    """The assembly itself."""
+    """Matrices of the body once assembled, with the parts that stand on it, supports held."""
     M, K, C, root = _with_parts(scene, assembled)
     free = np.setdiff1d(np.arange(M.shape[0]), held)
     labels = [assembled.labels[i] for i in free]

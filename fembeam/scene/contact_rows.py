@@ -125,7 +125,7 @@ def contact_rows(scene: Scene, matrices: Matrices) -> list[ContactRow]:
 
 
 def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
-    """The same, one by one."""
+    """All contacts, not yet told apart by name."""
     count = 0
     for body, part in enumerate((scene, *scene.bodies)):
         for one in part.acting:

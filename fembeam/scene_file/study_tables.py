@@ -307,7 +307,7 @@ def _check_places(scene: Scene, places: list[Any], name: str) -> None:
 
 
 def _check_place(scene: Scene, z: Place | None) -> None:
-    """The same of one place, where it is given."""
+    """Raise ValueError for a place, if one is given, that does not exist."""
     if z is not None:
         _check_places(scene, [z], "z")
 

@@ -223,7 +223,7 @@ class TableReader:
         }
 
     def _placed(self, keys: Mapping[str, inspect.Parameter], table: Table, where: str) -> dict[str, Any]:
-        """The same of what has a place by name: `at` for z; `on` and `to` hold such places too."""
+        """`arguments` of what has a place by name: `at` for z; `on` and `to` hold such places too."""
         found = {key: table[key] for key in PLACES if key in table}
         for key, at in found.items():
             if not is_place(at):

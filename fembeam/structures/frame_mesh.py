@@ -331,7 +331,7 @@ def _highest(frame: Frame, places: Sequence[Any], modes: int) -> float:
 
 
 def _on(frame: Frame, borders: list[Vector], promise: str) -> FrameMatrices:
-    """The assembly itself."""
+    """Matrices with elements between these borders on every member."""
     labels, join = _numbered(frame, borders)
     mesh = FrameMesh(frame, tuple(borders), tuple(labels), join)
     elements = mesh.elements

@@ -227,7 +227,7 @@ def collected(
 
 
 def _key(point: Vector) -> str:
-    """A point, exactly."""
+    """A point as text that tells all of its digits."""
     return " ".join(map(repr, point.tolist()))
 
 
