@@ -243,7 +243,7 @@ def _write(target: Path, columns: Mapping[str, Any]) -> Path:
         writer = csv.writer(wrapped, lineterminator="\n")
         writer.writerow(columns)
         if any(texts):
-            kinds = [str if text else _digits for text in texts]
+            kinds = [str if text else DIGITS.__mod__ for text in texts]
             writer.writerows(
                 [kind(x) for kind, x in zip(kinds, row, strict=True)] for row in zip(*columns.values(), strict=True)
             )
@@ -252,11 +252,6 @@ def _write(target: Path, columns: Mapping[str, Any]) -> Path:
             np.savetxt(wrapped, rows, fmt=DIGITS, delimiter=",")
         wrapped.detach()
     return target
-
-
-def _digits(x: float) -> str:
-    """A number of a table."""
-    return DIGITS % x
 
 
 def parts(run: Run) -> list[Part]:

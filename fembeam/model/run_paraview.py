@@ -137,9 +137,7 @@ def _of_places(run: Run) -> tuple[Vector, dict[str, tuple[Vector, Vector]]]:
     carried = {}
     if isinstance(forces, FrameForces):  # of joined bodies places of structures have none
         places = [run.shapes.known[i] for i in np.unique(run.shapes.lines)]
-        preload = {name: np.array([forces.preload(place, name) for place in places]) for name in forces.names}
-        per_unit = np.array([forces.rows(place) for place in places])
-        carried = {name: (per_unit[:, i], preload[name]) for i, name in enumerate(forces.names)}
+        carried = {name: rows_of(run, name, places, 0) for name in forces.names}
     return moved, carried
 
 
@@ -170,9 +168,8 @@ def _rows(run: Run, quantity: str) -> tuple[Vector, Vector]:
     n = run.q.shape[1]
     impactors = np.eye(n, n + run.shapes.moving)[n - count :] / np.sqrt(run.impactor_masses)[:, None]
     last = impactors if quantity == "displacement" else np.zeros_like(impactors)
-    return np.vstack([*(shapes for shapes, _, _ in parts), last]), np.concatenate(
-        [*(constant for _, _, constant in parts), np.zeros(count)]
-    )
+    shapes, constants = zip(*parts, strict=True)
+    return np.vstack([*shapes, last]), np.concatenate([*constants, np.zeros(count)])
 
 
 def _target(target: Path, suffix: str) -> Path:

@@ -216,10 +216,10 @@ class Histories:
         at = self._places(z, body)
         require(len(at) > 0, "z must not be empty", z, "Run.extremes", "leave it out for all of the body")
         q = self._q_of(body)
-        found = extremes(self.t, q, *rows_of(self, quantity, at, body))
+        found = extremes(self.t, q, at, *rows_of(self, quantity, at, body))
         if quantity in ("displacement", "slope"):
             return found
-        return found.with_others(extremes(self.t, q, *rows_of(self, quantity, at, body, behind=True)))
+        return found.with_others(extremes(self.t, q, at, *rows_of(self, quantity, at, body, behind=True)))
 
     def _q_of(self, body: int) -> Vector:
         """Coordinates at the samples, with the support dofs that move."""
@@ -249,11 +249,11 @@ class Histories:
         """A field over time: (k,) at one z, (k, j) at z (j,)."""
         z = self._beam(body).place(z)
         if isinstance(self._beam(body), PlacedShapes):
-            shapes, _, offset = rows_of(self, quantity, z if isinstance(z, list) else [z], body)
+            shapes, offset = rows_of(self, quantity, z if isinstance(z, list) else [z], body)
             along = self._q_of(body) @ shapes.T + offset
             return along if isinstance(z, list) else along[:, 0]
         places = numbers("z", z, "Run", "give m along the beam")
-        shapes, _, offset = rows_of(self, quantity, np.atleast_1d(places), body)
+        shapes, offset = rows_of(self, quantity, np.atleast_1d(places), body)
         values = self._q_of(body) @ shapes.T + offset
         return values if places.ndim else values[:, 0]
 

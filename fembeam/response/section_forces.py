@@ -223,8 +223,8 @@ def _place(z: Any) -> Any:
     return z if isinstance(z, tuple) else float(z)
 
 
-def extremes(t: Vector, q: Vector, shapes: Vector, z: Any, offset: Vector) -> Extremes:
-    """Extremes of q (k, n) @ shapes (j, n).T + offset (j,), some places at a time."""
+def extremes(t: Vector, q: Vector, z: Any, shapes: Vector, offset: Vector) -> Extremes:
+    """Extremes at places z (j,) of q (k, n) @ shapes (j, n).T + offset (j,), some places at a time."""
     found = np.empty((4, len(z)))
     step = max(1, 2_000_000 // max(len(t), 1))
     for first in range(0, len(z), step):
@@ -236,32 +236,30 @@ def extremes(t: Vector, q: Vector, shapes: Vector, z: Any, offset: Vector) -> Ex
     return Extremes(z, *found)
 
 
-def rows_of(run: Histories, quantity: str, z: Any, body: int, behind: bool = False) -> tuple[Vector, Any, Vector]:
-    """What turns q into a field: shapes (j, n), the places themselves, a constant part (j,).
+def rows_of(run: Histories, quantity: str, z: Any, body: int, behind: bool = False) -> tuple[Vector, Vector]:
+    """What turns q into a field: shapes (j, n) and a constant part (j,).
 
     ``behind``: of section forces those behind places where they jump, else those ahead.
     """
     if isinstance(z, list):  # of a body with places by name
         if quantity != "displacement":
             return _rows_of_frame(run, quantity, z, body, behind)
-        return (run.shapes, *run.others)[body].rows_with_supports(z), z, np.zeros(len(z))
+        return (run.shapes, *run.others)[body].rows_with_supports(z), np.zeros(len(z))
     known = ("displacement", "slope", "moment", "shear", "stress")
     require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
     if quantity in known[:2]:
-        return (run.shapes, *run.others)[body].rows_with_supports(z, known.index(quantity)), z, np.zeros(len(z))
+        return (run.shapes, *run.others)[body].rows_with_supports(z, known.index(quantity)), np.zeros(len(z))
     forces = run.readout.section_forces[body]
     rows = getattr(forces, quantity)(z, behind)
     if quantity != "stress":
-        return rows, z, np.zeros(len(z))
+        return rows, np.zeros(len(z))
     bare = ~np.isfinite(rows).all(axis=1)
     require(not bare.any(), "every section must know its outer fibre", z[bare][:1].tolist(), "Run.stress",
             "give Section(..., fibre=)")  # fmt: skip
-    return rows, z, forces.beam.axial_force / forces.beam.profile(z, behind).A
+    return rows, forces.beam.axial_force / forces.beam.profile(z, behind).A
 
 
-def _rows_of_frame(
-    run: Histories, quantity: str, places: list[Any], body: int, behind: bool
-) -> tuple[Vector, Any, Vector]:
+def _rows_of_frame(run: Histories, quantity: str, places: list[Any], body: int, behind: bool) -> tuple[Vector, Vector]:
     """`rows_of` of section forces and stress along the members of a frame."""
     forces = frame_forces_of(run, body, quantity)
     known = (*forces.names, "stress")
@@ -272,7 +270,7 @@ def _rows_of_frame(
         forces.stress(z, behind=behind) if quantity == "stress" else forces.rows(z, (quantity,), behind)[0]
         for z in places
     ]
-    return np.array(rows), places, np.array([forces.preload(z, quantity) for z in places])
+    return np.array(rows), np.array([forces.preload(z, quantity) for z in places])
 
 
 def frame_forces_of(run: Histories, body: int, quantity: str = "a section force") -> FrameForces | JoinedForces:
