@@ -183,9 +183,7 @@ def _shapes_of_each(scene: Scene, matrices: Matrices, basis: reduction.Basis) ->
         if isinstance(beam, BodyMatrices):
             shapes.append(placed_shapes(beam, mine, loaded(scene, number), carried, parts))
         else:
-            values = np.zeros((beam.dofs.size, basis.count))
-            values[beam.dofs.ravel() >= 0] = mine
-            shapes.append(Shapes(beam.nodes, values, carried, parts))
+            shapes.append(Shapes(beam.nodes, beam.spread @ mine, carried, parts))
         done += size
     return shapes
 

@@ -99,9 +99,8 @@ def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | Fram
     if beam.coupling is not None:
         rows = sparse.vstack([rows, beam.coupling[::3]])
     inertia, load = _inertia(beam, vectors, model.omega, rows.toarray().T)
-    inertia = _everywhere(beam, inertia)
-    carried = carried_on(model.scene, beam, body)
-    moved = np.hstack([_everywhere(beam, vectors), carried])
+    inertia, carried = beam.spread @ inertia, carried_on(model.scene, beam, body)
+    moved = np.hstack([beam.spread @ vectors, carried])
     # less the inertia of the shapes which follow supports: they have none
     inertia = np.hstack([inertia, -inertia @ model.following.T])
     if isinstance(beam, BodyMatrices):
@@ -169,15 +168,6 @@ def _of_vectors(beam: Matrices, vectors: Vector, inertia: Vector) -> SectionForc
         moments=side * stretch * turn,
         shears=-side * push + beam.beam.axial_force * slope / stretch,
     )
-
-
-def _everywhere(beam: Matrices, values: Vector) -> Vector:
-    """Values (N, n) on free dofs as (N_all, n) on all, zero at supports."""
-    if isinstance(beam, BodyMatrices):
-        return np.asarray(beam.spread @ values)
-    full = np.zeros((beam.dofs.size, values.shape[1]))
-    full[beam.dofs.ravel() >= 0] = values
-    return full
 
 
 @dataclass(frozen=True, eq=False)

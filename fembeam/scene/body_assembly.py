@@ -73,12 +73,9 @@ class BodyMatrices(Matrices):
         """Row (1, N_all) of a place along a direction, supported dofs included."""
         return rows_along(self.beam, self.assembled, place, along)
 
-    def loosened(self, scene: Scene) -> Matrices:
-        """The matrices without supports, on all dofs, those without mass too."""
-        found = _of(scene, self.assembled, self.modes, held=np.zeros(0, dtype=int), condense=False)
-        if self.carried is None:
-            return found
-        return replace(found, **moving(found.M, found.K, found.dashpots, found.spread, self.carried))
+    def _on_all(self, scene: Scene) -> Matrices:
+        """Matrices of a scene without supports, on dofs without mass too."""
+        return _of(scene, self.assembled, self.modes, held=np.zeros(0, dtype=int), condense=False)
 
     def frequency_error(self, omega: ArrayLike) -> Vector:
         """Zeros: the matrices are what the structure is."""
