@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from fembeam.model.watched_places import places as usual_places
-from fembeam.response import BodyReaction, PlacedShapes
+from fembeam.response import BodyReaction
 from fembeam.scene import is_directed, place_words, said, unit_of
 from fembeam.support import is_finite, require, tuples
 from solvers.problem import dataframe, optional
@@ -78,7 +78,7 @@ def histories(
     """Columns of every `stride`-th sample, by name and unit: quantities at places, of stops, of supports."""
     require(stride >= 1, "stride must be at least 1", stride, "Run", "1 keeps every sample")
     require(not isinstance(quantities, str), "quantities must be a list", quantities, "Run", "put it in brackets")
-    named = isinstance(run.shapes, PlacedShapes)
+    named = run.shapes.named
     listed = isinstance(places, (list, tuple)) if named else np.ndim(places) == 1  # type: ignore[arg-type]
     require(places is None or listed, "places must be a list", places, "Run", "put it in brackets")
     asked = USUAL if quantities is None else quantities
@@ -195,7 +195,7 @@ def to_dataframe(run: Run, stride: int = 1, **chosen: Any) -> Any:
 
 def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
     """See `Run.to_xarray`."""
-    named, place = isinstance(run.shapes, PlacedShapes), run._places(z)
+    named, place = run.shapes.named, run._places(z)
     variables = {
         "displacement": (("t", "z"), run.displacement(place), {"units": "m"}),
         "velocity": (("t", "z"), run.velocity(place), {"units": "m/s"}),

@@ -16,7 +16,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.response import PlacedShapes, rows_of
+from fembeam.response import rows_of
 from fembeam.structures import FrameForces
 from fembeam.support import is_whole, require, written_beside
 from solvers.problem import optional
@@ -99,7 +99,7 @@ def _samples(run: Run, stride: int) -> range:
 
 def _geometry(run: Run) -> tuple[Vector, list[tuple[str, Any]]]:
     """Points (p, 3) of all beams, then impactors; lines, of zero length for impactors, as XDMF has one kind of cell."""
-    placed = [isinstance(shapes, PlacedShapes) for shapes in (run.shapes, *run.others)]
+    placed = [shapes.named for shapes in (run.shapes, *run.others)]
     if all(placed):
         return _lines(run)
     require(not any(placed), "files for ParaView must be of beams alone, or of bodies with lines alone", run.others,
@@ -151,7 +151,7 @@ def _of_beams(run: Run) -> tuple[Vector, dict[str, tuple[Vector, Vector]]]:
 
 def _fields(run: Run) -> Callable[[int], dict[str, Vector]]:
     """The fields at the points as a function of the sample, of shapes (p, 3, n) and (p, n)."""
-    moved, numbers = (_of_places if isinstance(run.shapes, PlacedShapes) else _of_beams)(run)
+    moved, numbers = (_of_places if run.shapes.named else _of_beams)(run)
     q, q_dot = (run.with_supports(rates, run.shapes.moving, order) for order, rates in enumerate((run.q, run.q_dot)))
 
     def at(sample: int) -> dict[str, Vector]:

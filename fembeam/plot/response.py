@@ -28,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fembeam.model import PlacedShapes, places
+from fembeam.model import places
 from fembeam.plot.bodies import deflected_figure
 from fembeam.plot.body_shapes import body_mode_shapes
 from fembeam.plot.figure import heading, sheet
@@ -155,8 +155,8 @@ def deflected(run: Run, t: float | None = None, scale: float | None = None, axes
     >>> len(figure.axes[0].lines)
     2
     """
-    named = isinstance(run.shapes, PlacedShapes)
-    require(named, "the body must be a frame or a structure", "a Beam", "deflected", "use time_history or animate")
+    require(run.shapes.named, "the body must be a frame or a structure", "a Beam", "deflected",
+            "use time_history or animate")  # fmt: skip
     return deflected_figure(run, t, scale, axes)
 
 

@@ -41,6 +41,7 @@ class PlacedShapes:
     more: Callable[[Any], Vector] | None = field(default=None, repr=False)
     carried: Vector = field(default_factory=lambda: np.zeros((0, 0, 0)), repr=False)
     parts: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    named = True
 
     def __repr__(self) -> str:
         return f"<{self.values.shape[2]} shapes at {len(self.known)} places>"

@@ -165,7 +165,7 @@ def reactions(run: Histories) -> Reactions:
     found: list[Reaction] = []
     for (part, body), row in pairs:
         values = row @ histories
-        if hasattr(beams[body], "components"):
+        if beams[body].named:
             found.append(BodyReaction(part, body, run.t, values[:3].T, values[3:].T))
         else:
             found.append(Reaction(part, body, run.t, *(values if len(values) == 2 else (values[1], -values[3]))))

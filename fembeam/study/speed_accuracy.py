@@ -147,7 +147,7 @@ def end_displacement(run: Run) -> Vector:
     """
     if len(run.stops) and (run.circles[0, 0] or run.kinds[0, 0] or np.isnan(run.stops[0, 0])):
         return np.asarray(run._deformation(0)[-1])
-    if not hasattr(run.shapes, "nodes"):
+    if run.shapes.named:
         return np.asarray(run.shapes(next(iter(places(run.shapes).values()))) @ run.q[-1])
     return np.asarray(run.shapes(run.stops[0, 0] if len(run.stops) else run.shapes.nodes[-1]) @ run.q[-1])
 
