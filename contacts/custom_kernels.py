@@ -189,7 +189,7 @@ def _renamed(value: Any) -> Any:
 
 @lru_cache(maxsize=1024)
 def _digest(function: Function) -> str | None:
-    """Of what a function is made of, and of the versions that make machine code of it; None where it is not known."""
+    """Digest of what a function is made of and of the versions that compile it; None where it is not known."""
     import llvmlite
     import numba
 

@@ -164,7 +164,7 @@ def borders(law: Law, delta: Vector, rate: float, row: Vector) -> Vector:
 
 
 def borders_of(law: Law, rate: float, row: Vector) -> Callable[[Vector], Vector]:
-    """The same as a lean function of points (n,), also after ``row`` was renewed in place."""
+    """`borders` as a lean function of points (n,), also after ``row`` was renewed in place."""
     count = law.borders
     kernel = BATCH(law.memory_kernel("borders").address) if count else None
 

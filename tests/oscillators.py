@@ -43,6 +43,16 @@ class Later:
         return omega, amplitude * np.exp(1j * omega * self.by)
 
 
+def over(problem, name="omega", periods=1):
+    """A family over one of the oscillator's numbers."""
+
+    def make(value):
+        changed = replace(problem, **{name: value})
+        return changed.system(), periods * changed.period
+
+    return make
+
+
 def from_phase(found):
     """The system of an orbit, at time 0 of which the orbit has its state: ``phase`` s later."""
     return found.system.like(loads=[(vector, Later(signal, found.phase)) for vector, signal in found.system.loads])

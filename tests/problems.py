@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 from scipy.integrate import solve_ivp
 from scipy.interpolate import PchipInterpolator
 from scipy.special import beta
@@ -31,6 +32,12 @@ z = 0
 STEEL = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
 PAPER_BEAM = fb.Beam(0.2599, STEEL)
 ROD = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+
+
+def as_sparse(system):
+    """The same on sparse matrices."""
+    matrices = (sparse.csc_array(A) for A in (system.M, system.C, system.K))
+    return solvers.System(*matrices, system.contacts, system.loads)
 
 
 def free_mass(law, mass=1.0, gap=0.0, loads=()):

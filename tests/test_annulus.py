@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from bench.circle_flights import missed
+from oscillators import Tone
 from scipy.integrate import solve_ivp
-from test_annulus_tangent import Tone, tube
+from test_annulus_tangent import tube
 
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, WaltonBraun
 from solvers import (

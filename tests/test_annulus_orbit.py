@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from oscillators import Tone
 from scipy.optimize import brentq
-from test_annulus_tangent import Tone
 
 from contacts import KelvinVoigt
 from solvers import Contact, DormandPrince, System, branch, integrate, orbit

@@ -1,9 +1,8 @@
 """Derivatives of runs through circular clearances: against differences of another method, and of periodic orbits."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
+from oscillators import Tone
 
 from contacts import Hertz, Hysteretic, KelvinVoigt
 from solvers import Contact, DormandPrince, Exponential, Parameter, System, integrate
@@ -12,18 +11,6 @@ SHARP = DormandPrince(1e-13, 1e-20)
 SCALE = np.repeat([1e-3, 0.3], 4)  # m and m/s in modal units
 V = np.array([0.3, -0.2, 0.1, 0.4])
 DURATION = 0.06
-
-
-@dataclass(frozen=True)
-class Tone:
-    amplitude: float
-    omega: float
-
-    def __call__(self, t):
-        return self.amplitude * np.cos(self.omega * t)
-
-    def tones(self):
-        return np.array([self.omega]), np.array([self.amplitude + 0j])
 
 
 def tube(law, *more, outer=False, gap=1e-3, centre=(1e-4, -2e-4)):

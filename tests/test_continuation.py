@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from oscillators import Bilinear, Duffing, Tone, state_at_zero, status_names
+from oscillators import Bilinear, Duffing, Tone, over, state_at_zero, status_names
 
 import solvers.branches.count_changes
 import solvers.branches.walk
@@ -23,16 +23,6 @@ GAPPED = Bilinear(0.8, zeta=0.05, gap=2.0)
 @law
 def cubic(delta, delta_dot, entry_rate, stiffness):
     return stiffness * delta**3
-
-
-def over(problem, name="omega", periods=1):
-    """A family over one of the oscillator's numbers."""
-
-    def make(value):
-        changed = replace(problem, **{name: value})
-        return changed.system(), periods * changed.period
-
-    return make
 
 
 @cache

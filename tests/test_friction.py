@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from oscillators import Tone
 from scipy.integrate import solve_ivp
 
 import fembeam as fb
@@ -196,19 +197,6 @@ def test_a_driven_disc_follows_scipy(method, name, outer):
     assert run.losses.spin[0] == pytest.approx(run.energy.spin[-1], rel=1e-12)
 
 
-class Tone:
-    """a cos(ωt + phase)"""
-
-    def __init__(self, a, omega, phase=0.0):
-        self.a, self.omega = a * np.exp(1j * phase), omega
-
-    def __call__(self, t):
-        return np.real(self.a * np.exp(1j * self.omega * np.asarray(t)))
-
-    def tones(self):
-        return np.array([self.omega]), np.array([self.a])
-
-
 def shapes(beta, x):
     """(2,) clamped-free shapes of unit modal mass at x of a length of 1."""
     ratio = (np.cosh(beta) + np.cos(beta)) / (np.sinh(beta) + np.sin(beta))
@@ -222,7 +210,7 @@ def test_a_tube_in_a_hole(method):
     tip, mid = shapes(beta, 1.0), shapes(beta, 0.5)
     rows = np.array([np.append(tip, none), np.append(none, tip)])
     hole = Contact(rows, KelvinVoigt(300.0, 0.0), 0.012, map="annulus", friction=Friction(0.2, 240.0))
-    loads = [(np.append(mid, none), Tone(1.5, 3.2, -0.5 * np.pi)), (np.append(none, mid), Tone(1.05, 3.9))]
+    loads = [(np.append(mid, none), Tone(-1.5j, 3.2)), (np.append(none, mid), Tone(1.05, 3.9))]
     run = integrate(System.modal(np.tile(beta**2, 2), 0.01, [hole], loads), [0.0] * 4, [0.0] * 4, 0.6, method=method)
     np.testing.assert_allclose(rows @ run.q[-1], [9.106191672804725e-3, -5.789123389204e-3], atol=1e-11)
     np.testing.assert_allclose(rows @ run.q_dot[-1], [0.11648029303735, -0.15887146589979], atol=1e-10)
@@ -692,7 +680,7 @@ def test_a_stick_before_an_opening_lasts_as_long_as_that_of_a_second_method(rtol
     law = Hysteretic(1e11, damping_factor=0.86, exponent=1.5, entry_rate_floor=1.2e-5)
     row, across = np.array([-1.19, -0.31]), np.array([0.31, -1.19])
     contact = Contact(row, law, map="oblique", tangent=across, friction=Friction(1.95, 1.6e7))
-    tones = Tone(1.0, 41.4), Tone(1.0, 41.4, np.pi / 2), Tone(1.0, 0.0)
+    tones = Tone(1.0, 41.4), Tone(1j, 41.4), Tone(1.0, 0.0)
     loads = zip([[0.25, -0.24], [-0.23, -0.73], [0.028, 0.052]], tones, strict=True)
     system = System(np.eye(2), np.diag([19.3, 11.0]), np.diag([7750.0, 4110.0]), [contact], list(loads))
     found, other = (

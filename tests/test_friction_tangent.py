@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from oscillators import Tone
 from scipy.optimize import fsolve
-from test_friction import EYE, SHARP, Tone, disc, pulled, wall
+from test_friction import EYE, SHARP, disc, pulled, wall
 
 from contacts import Hertz, Hysteretic, Jenkins, KelvinVoigt, PiecewiseLinear
 from solvers import Contact, Exponential, Friction, Nearby, Parameter, System, branch, integrate, orbit, sensitivity
@@ -210,7 +211,7 @@ def rotor(spin):
     friction = Friction(0.15, 1e6)
     hole = Contact(EYE[:2, :2], KelvinVoigt(3e5, 0.0), 2e-4, map="annulus", friction=friction, radius=0.02, spin=spin)
     size = 2.0 * 1e-4 * spin**2
-    loads = [(EYE[0, :2], Tone(size, spin)), (EYE[1, :2], Tone(size, spin, -0.5 * np.pi))]
+    loads = [(EYE[0, :2], Tone(size, spin)), (EYE[1, :2], Tone(-1j * size, spin))]
     return System(2.0 * EYE[:2, :2], 60.0 * EYE[:2, :2], 8e4 * EYE[:2, :2], [hole], loads)
 
 
@@ -250,7 +251,7 @@ def test_a_synchronous_rub(spin):
 def shaker(amplitude, mu=0.3):
     """A mass on springs that is shaken against an oblique stop."""
     stop = Contact([-1.0, 0.0], Hertz(1e9), 1e-4, map="oblique", tangent=[0.0, 1.0], friction=Friction(mu, 1e6))
-    loads = [([amplitude, 0.0], Tone(1.0, 130.0)), ([0.0, 0.5 * amplitude], Tone(1.0, 130.0, 0.7))]
+    loads = [([amplitude, 0.0], Tone(1.0, 130.0)), ([0.0, 0.5 * amplitude], Tone(np.exp(0.7j), 130.0))]
     return System(2.0 * EYE[:2, :2], 30.0 * EYE[:2, :2], np.diag([4e4, 5.2e4]), [stop], loads)
 
 
@@ -271,7 +272,7 @@ def rolled(spin=0.3, omega=3.1, radius=0.5, turn=1.0):
         *(EYE[:2, :3], KelvinVoigt(400.0, 2.0), 1.0),
         **{"map": "annulus", "friction": friction, "radius": radius, "spin": spin, "rotation": rotation},
     )
-    loads = [(-EYE[1, :3], Tone(20.0, 0.0)), (EYE[0, :3], Tone(4.5, omega, 0.5))]
+    loads = [(-EYE[1, :3], Tone(20.0, 0.0)), (EYE[0, :3], Tone(4.5 * np.exp(0.5j), omega))]
     return System(EYE[:3, :3], 0.3 * EYE[:3, :3], np.diag([4.0, 5.0, 9.0]), [hole], loads)
 
 

@@ -5,8 +5,16 @@ from functools import cache
 
 import numpy as np
 import pytest
-from problems import HertzBounce, bilinear, coupled_dashpot, linear_stop, paper_scene, reference, two_sided_scene
-from scipy import sparse
+from problems import (
+    HertzBounce,
+    as_sparse,
+    bilinear,
+    coupled_dashpot,
+    linear_stop,
+    paper_scene,
+    reference,
+    two_sided_scene,
+)
 
 import fembeam as fb
 import solvers
@@ -40,10 +48,6 @@ HERTZIAN = Hertz(1e6), HYSTERETIC
 one_of_each_kind = pytest.mark.parametrize("method", [RK4, Newmark])  # explicit, and with forces solved for
 methods = pytest.mark.parametrize("method", METHODS, ids=lambda method: method.__name__)
 stepping = pytest.mark.parametrize("method", [*METHODS, two_steps], ids=lambda method: method.__name__)
-
-
-def as_sparse(system):
-    return System(*(sparse.csc_array(A) for A in (system.M, system.C, system.K)), system.contacts, system.loads)
 
 
 def slope(steps, errors):

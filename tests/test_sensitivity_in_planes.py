@@ -5,7 +5,8 @@ from itertools import islice
 
 import numpy as np
 import pytest
-from test_friction import EYE, SHARP, Tone, wall
+from oscillators import Tone
+from test_friction import EYE, SHARP, wall
 from test_friction_tangent import CHANGES, RUNS
 from test_sensitivity import FINE, OF_CONTACTS, five_points
 from test_stops_with_friction import TUBE
@@ -50,7 +51,7 @@ def test_from_rest_on_the_surface_all_grows_with_the_load(side, omega, phase):
     """With a linear law and no gap the motion is proportional to the load: its own derivative, in stick and slip."""
 
     def pressed(load):
-        return replace(wall(), loads=[([3.0, side], Tone(load, omega, phase))])
+        return replace(wall(), loads=[([3.0, side], Tone(load * np.exp(1j * phase), omega))])
 
     found = sensitivity(pressed(1.0), [0.0, 0.0], [0.0, 0.0], 0.01, [0.01], Nearby.of(pressed, 1.0, 1e-3), method=FINE)
     run = found.solution

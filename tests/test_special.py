@@ -6,7 +6,7 @@ from itertools import islice, pairwise
 
 import numpy as np
 import pytest
-from oscillators import Bilinear, Tone, from_phase, random_family, random_stops_family, state_after, status_names
+from oscillators import Bilinear, Tone, from_phase, over, random_family, random_stops_family, state_after, status_names
 
 import solvers
 from contacts import Hertz, KelvinVoigt, PiecewiseLinear, law
@@ -17,16 +17,6 @@ from solvers.branches.bifurcations import Arc
 @law(jump=True)
 def hardening(delta, delta_dot, entry_rate, stiffness, damping):
     return stiffness * (delta + delta**3) + damping * delta_dot
-
-
-def over(problem, name="omega", periods=1):
-    """A family over one of the oscillator's numbers."""
-
-    def make(value):
-        changed = replace(problem, **{name: value})
-        return changed.system(), periods * changed.period
-
-    return make
 
 
 def marked(found, mark):

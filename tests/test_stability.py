@@ -5,8 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from problems import coupled_dashpot, paper_scene
-from scipy import sparse
+from problems import as_sparse, coupled_dashpot, paper_scene
 from scipy.integrate import quad
 
 import fembeam as fb
@@ -36,10 +35,6 @@ def linear_acceleration(dt, **options):
 
 def damped_newmark(dt, **options):
     return Newmark(dt, beta=0.1, gamma=0.6, **options)
-
-
-def as_sparse(system):
-    return System(*(sparse.csc_array(A) for A in (system.M, system.C, system.K)), system.contacts)
 
 
 def grows(method, system, q0, q_dot0, dt, rest=None, steps=4000):

@@ -303,12 +303,12 @@ class _Fit:
 
 
 def _nominal(a: float) -> float:
-    """Eq. (6)."""
+    """Nominal coefficient of restitution, eq. (6)."""
     return math.sqrt(1.0 - 4.0 * max(a, 0.0) / 3.0) if a <= 0.75 else math.nan
 
 
 def _achieved(a: float) -> float:
-    """Of a free mass; a factor below zero, by chance, counts as elastic."""
+    """Coefficient of restitution of a free mass; a factor below zero, by chance, counts as elastic."""
     return achieved_restitution(max(a, 0.0))
 
 

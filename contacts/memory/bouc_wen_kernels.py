@@ -34,7 +34,7 @@ def _linear(w, y, A, k):
 
 @compiled(njit)
 def _quadratic(w, y, A, c):
-    """The same for w' = A - c w², as (w + A T)/(1 + c w T) with T' = 1 - A c T²; NaN beyond a pole."""
+    """`_linear` for w' = A - c w², as (w + A T)/(1 + c w T) with T' = 1 - A c T²; NaN beyond a pole."""
     root = math.sqrt(A * abs(c))
     if c > 0.0:
         T = math.tanh(root * y) / root

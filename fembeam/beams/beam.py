@@ -297,7 +297,7 @@ def hermite_rows(nodes: Vector, z: ArrayLike, derivative: int = 0) -> sparse.csr
 
 
 def _rows(nodes: Vector, element: NDArray[np.int64], x: Vector, derivative: int) -> sparse.csr_matrix:
-    """The same at x in [0, 1] of given elements."""
+    """`hermite_rows` at x (k,) in [0, 1] of given elements."""
     h = nodes[element + 1] - nodes[element]
     shapes = hermite_shapes(x, derivative) / h**derivative
     shapes[1::2] *= h

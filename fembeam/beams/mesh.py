@@ -29,7 +29,7 @@ INSIDE = np.array([1e-9, 0.5, 1 - 1e-9])  # where a tapered interval is sampled
 
 
 def on_beam(z: Vector, beam: Beam, where: str) -> Vector:
-    """The same z, checked."""
+    """z, all of which must lie on the beam."""
     outside = ~((z >= 0) & (z <= beam.length))
     require(not outside.any(), f"z must lie on the beam, 0 to {beam.length} m", z[outside].tolist(), where,
             "keep to the beam")  # fmt: skip

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import re
-import tempfile
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 from fembeam.beams.beam import Beam
 from fembeam.beams.mesh import SHORTEST, divided
 from fembeam.beams.section import Section, Taper
-from fembeam.support import require
+from fembeam.support import require, written_beside
 
 Vector = NDArray[np.float64]
 Names = list[set[str]]
@@ -53,7 +52,7 @@ def beam_of(
     lines, names = lines_of(mesh, data, sections, where)
     z = _along(np.asarray(mesh.points, dtype=float), lines, where)
     chain, order = _chained(z, lines, mesh.points, where)
-    chosen = _chosen(sections, [names[i] for i in order], chain, where)
+    chosen = chosen_names(sections, [names[i] for i in order], [f"z = {z:.6g} m" for z in chain], where)
     _warn_of_size(chain, where)
     spans, index = [], 0
     table = {"": sections} if isinstance(sections, (Section, Taper)) else {str(k): s for k, s in sections.items()}
@@ -231,11 +230,6 @@ def shown(points: Any) -> tuple[float, ...] | None:
     return tuple(float(f"{x:.6g}") for x in points[0]) if len(points) else None
 
 
-def _chosen(sections: Any, names: Names, chain: Vector, where: str) -> list[str]:
-    """The one name of every element that has a section."""
-    return chosen_names(sections, names, [f"z = {z:.6g} m" for z in chain], where)
-
-
 def chosen_names(sections: Any, names: Names, places: Sequence[str], where: str) -> list[str]:
     """The one name of every element that has a section; `places` tell where it begins."""
     if isinstance(sections, (Section, Taper)):
@@ -312,10 +306,8 @@ def to_mesh(beam: Beam, path: str | os.PathLike[str], elements: int = 100) -> di
     grouped = target.suffix in (".msh", ".inp")
     keys = [f"span_{i}" if grouped else f"{i}" for i in range(1, len(beam.spans) + 1)]
     mesh = (_gmsh if target.suffix == ".msh" else _plain)(beam, z, group, keys, target.suffix == ".inp")
-    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
-        draft = os.path.join(folder, target.name)
+    with written_beside(target) as draft:
         mesh.write(draft, **WRITERS[target.suffix])
-        os.replace(draft, target)
     return {key: section for key, (_, section) in zip(keys, beam.spans, strict=True)}
 
 

@@ -272,7 +272,7 @@ def _counted(modes: int | None) -> dict[str, Any]:
 
 
 def _print(found: Any, as_json: bool) -> None:
-    """On stdout."""
+    """Print an answer, as JSON or as its text."""
     from fembeam.results.files import print_json
 
     if as_json:

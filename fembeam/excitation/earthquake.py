@@ -130,7 +130,7 @@ def without_baseline(t: ArrayLike, acceleration: ArrayLike) -> Vector:
 
 
 def _check_unit(unit: str | None, path: Path) -> None:
-    """Columns do not tell their unit."""
+    """Raise ValueError without a known unit: columns do not tell theirs."""
     if unit not in list(FACTORS):  # a list: what is given need not be hashable
         _fail(path, f"unit must be {' or '.join(map(repr, FACTORS))} for a file of columns, got {unit!r}")
 
@@ -151,7 +151,7 @@ def _peer(text: str, path: Path) -> tuple[Vector, Vector, Unit] | None:
 
 
 def _cosmos(text: str, path: Path) -> tuple[Vector, Vector, Unit] | None:
-    """The same of a COSMOS file."""
+    """Times, values and the unit of a COSMOS file; None if it is none."""
     head, data = REAL_HEADER.search(text), COSMOS.search(text)
     if head is None:
         return None

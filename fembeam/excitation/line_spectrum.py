@@ -23,6 +23,7 @@ HERMITE_RMS = math.sqrt(math.factorial(13))  # rms of the error <= h^6/√13! rm
 HERMITE_MEAN = 100800.0  # mean of (x(1-x))³/720 over a cell is 1/100800: what the interpolant takes off a line
 EDGE = 0.25  # a band fades out over this part of lo below it and of hi above it
 MANY = 1 << 18  # terms of a sum, above which transforms are quicker
+MOST_NODES = 20_000_000
 FINEST_RTOL = 1e-13  # finer is below the rounding of the FFT
 
 
@@ -36,6 +37,20 @@ def checked_band(name: str, band: Any) -> tuple[float, float]:
     if not lo < hi:
         raise ValueError(f"{name} must run from lo to hi > lo in rad/s, got ({lo:g}, {hi:g}); swap or widen it")
     return lo, hi
+
+
+def keep_number(signal: Any, name: str, unit: str = "", **bounds: float) -> None:
+    """Check one number of a frozen signal against its bounds and keep it as a float."""
+    told = f"{type(signal).__name__} {name}" + (f" ({unit})" if unit else "")
+    object.__setattr__(signal, name, number(told, getattr(signal, name), **bounds))
+
+
+def tabulated(signal: Any, duration: float, cells: int, told: str, advice: str) -> tuple[float, NDArray[np.float64]]:
+    """The step in s and rows [s, s', s''] of a signal in so many cells; ValueError if these are too many."""
+    if cells > MOST_NODES:
+        raise ValueError(f"{told} needs {cells:.3g} nodes over {duration:g} s; {advice}")
+    t = np.linspace(0.0, duration, cells + 1)
+    return duration / cells, np.stack([signal.derivative(order)(t) for order in range(3)], axis=1)
 
 
 def checked_order(order: Any) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.support import number
+from fembeam.excitation.line_spectrum import keep_number
 
 Table = tuple[Sequence[float], Sequence[float]]
 Psd = Callable[[NDArray[np.float64]], ArrayLike]
@@ -34,8 +34,8 @@ class RollOff:
     corner: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "level", number("RollOff level", self.level, least=0.0))
-        object.__setattr__(self, "corner", number("RollOff corner (rad/s)", self.corner, above=0.0))
+        keep_number(self, "level", least=0.0)
+        keep_number(self, "corner", "rad/s", above=0.0)
 
     def __call__(self, omega: NDArray[np.float64]) -> NDArray[np.float64]:
         """S at omega (rad/s)."""

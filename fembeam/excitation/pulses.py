@@ -16,11 +16,9 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.excitation.line_spectrum import HERMITE_CONSTANT, checked_order
+from fembeam.excitation.line_spectrum import HERMITE_CONSTANT, checked_order, keep_number, tabulated
 from fembeam.excitation.unlimited import Unlimited
-from fembeam.support import number
 
-MOST_NODES = 20_000_000
 BELL = Polynomial([1.0, 0.0, -1.0])  # 1 - s²
 
 
@@ -54,11 +52,8 @@ class _Wave(Unlimited):
         sixth = np.abs(p.deriv(6)(fine)).max() * (2 / self.length) ** 6
         widest = (HERMITE_CONSTANT * rtol * np.abs(p(fine)).max() / sixth) ** (1 / 6)
         cells = math.ceil(duration / widest)
-        if cells > MOST_NODES:
-            raise ValueError(f"a signal of {self.length:g} s needs {cells:.3g} nodes over {duration:g} s; "
-                             "simulate a shorter time or use a longer signal")  # fmt: skip
-        t = np.linspace(0.0, duration, cells + 1)
-        return duration / cells, np.stack([self.derivative(order)(t) for order in range(3)], axis=1)
+        advice = "simulate a shorter time or use a longer signal"
+        return tabulated(self, duration, cells, f"a signal of {self.length:g} s", advice)
 
 
 @dataclass(frozen=True)
@@ -109,9 +104,9 @@ class Pulse(_Once):
     at: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "peak", number("Pulse peak", self.peak))
-        object.__setattr__(self, "length", number("Pulse length (s)", self.length, above=0.0))
-        object.__setattr__(self, "at", number("Pulse at (s)", self.at, least=0.0))
+        keep_number(self, "peak")
+        keep_number(self, "length", "s", above=0.0)
+        keep_number(self, "at", "s", least=0.0)
 
     @property
     def wave(self) -> _Wave:
@@ -151,9 +146,9 @@ class Step(_Once):
     at: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "size", number("Step size", self.size))
-        object.__setattr__(self, "rise", number("Step rise (s)", self.rise, above=0.0))
-        object.__setattr__(self, "at", number("Step at (s)", self.at, least=0.0))
+        keep_number(self, "size")
+        keep_number(self, "rise", "s", above=0.0)
+        keep_number(self, "at", "s", least=0.0)
 
     @property
     def wave(self) -> _Wave:

@@ -20,9 +20,9 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.excitation.line_spectrum import checked_order
+from fembeam.excitation.line_spectrum import checked_order, keep_number
 from fembeam.excitation.unlimited import Unlimited
-from fembeam.support import frozen, number, numbers
+from fembeam.support import frozen, numbers
 
 Tones = tuple[NDArray[np.float64], NDArray[np.complex128]]
 MOST_SHOWN = 8  # numbers of a kind in a repr
@@ -58,9 +58,9 @@ class Harmonic(Unlimited):
     phase: float = 0.0
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "amplitude", number("Harmonic amplitude", self.amplitude))
-        object.__setattr__(self, "omega", number("Harmonic omega (rad/s)", self.omega, least=0.0))
-        object.__setattr__(self, "phase", number("Harmonic phase (rad)", self.phase))
+        keep_number(self, "amplitude")
+        keep_number(self, "omega", "rad/s", least=0.0)
+        keep_number(self, "phase", "rad")
 
     def __call__(self, t: ArrayLike) -> Any:
         """Value at the instants t (s), of any shape."""

@@ -29,7 +29,7 @@ def doubts(model: Model) -> list[str]:
 
 
 def _of_body(scene: Scene) -> list[str]:
-    """Those about one beam or frame and what stands on it; of a structure, about its damping."""
+    """Doubts about one beam or frame and what stands on it; of a structure, about its damping."""
     if not scene.named:
         return [*of_beam(scene.beam), *of_features(scene)]
     frames = [one for one in getattr(scene.beam, "bodies", (scene.beam,)) if hasattr(one, "members")]

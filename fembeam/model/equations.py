@@ -125,7 +125,7 @@ class ModalEquations:
         return self.participation if self.participation.ndim == 1 else self.participation[:, self._column(direction)]
 
     def _column(self, direction: str) -> int:
-        """Of a direction among those in which the frame may move."""
+        """Number of a direction among those in which the frame may move."""
         known = self.moved_along
         require(direction in known, f"the frame must move along {', '.join(known) or 'nothing'}", direction, "Model",
                 "gravity pulls along -y")  # fmt: skip
@@ -259,7 +259,7 @@ class ModalEquations:
         return moved + [(-self.participation_along(one), g) for one, g in weight(scene).items()]
 
     def system_like(self, scene: Scene) -> solvers.System:
-        """The same as `system_of`, quicker where only signals, gaps and laws of its own parts differ."""
+        """What `system_of` returns, quicker where only signals, gaps and laws of its own parts differ."""
         if _places(scene) != _places(self.scene):
             return self.system_of(scene)
         own, parts, known = self.system, scene.acting, self.scene.acting
@@ -278,7 +278,7 @@ class ModalEquations:
 
     @cached_property
     def slipping_elements(self) -> tuple[Vector, Vector]:
-        """The same, with what is left of those that slip or yield once all of their sliders move."""
+        """`linear_elements` with what is left of those that slip or yield once all of their sliders move."""
         always = [one for one in self.contact_rows if one.always]
         return self._elements_with([after_slip(one.law) or tangent(one.law, -one.gap) for one in always])
 

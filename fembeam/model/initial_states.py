@@ -96,7 +96,7 @@ def missed(model: Model, field: Field | Sequence[Field]) -> float:
 
 
 def _missed(model: Model, full: Vector) -> float:
-    """The same of nodal values."""
+    """`missed` of nodal values (N,)."""
     M = model.matrices.M
     size = float(full @ (M @ full))
     left = full - model.basis.expand(model.basis.project(M @ full))
@@ -105,22 +105,23 @@ def _missed(model: Model, full: Vector) -> float:
 
 def _nodal(model: Model, field: Field | Sequence[Field]) -> Vector:
     """Values (N,) on all free dofs; impactors 0."""
-    beams = model.matrices.beams
-    fields = list(field) if isinstance(field, Sequence) else [field, *[None] * (len(beams) - 1)]
-    require(len(fields) == len(beams), f"fields must be {len(beams)}, one for each beam", len(fields), "Model.state",
-            "give None for a beam at rest")  # fmt: skip
-    parts = [_on_nodes(beam, one) for beam, one in zip(beams, fields, strict=True)]
+    parts = [_on_nodes(beam, one) for beam, one in _of_each(model, field)]
     return np.concatenate([*parts, np.zeros(len(model.matrices.impactors))])
 
 
 def _given(model: Model, field: Field | Sequence[Field]) -> NDArray[np.bool_]:
     """Coordinates (n,) of the beams whose field is given: it is all of u, with what follows supports that move."""
-    beams, fields = model.matrices.beams, list(field) if isinstance(field, Sequence) else [field]
-    found, done = np.zeros(len(model.omega), dtype=bool), 0
-    for beam, one, count in zip(beams, [*fields, *[None] * len(beams)], model.counts, strict=False):
-        found[done : done + sum(count)] = one is not None and not beam.named
-        done += sum(count)
-    return found
+    given = [one is not None and not beam.named for beam, one in _of_each(model, field)]
+    return np.repeat([*given, False], [*map(sum, model.counts), len(model.matrices.impactors)])
+
+
+def _of_each(model: Model, field: Field | Sequence[Field]) -> list[tuple[Matrices, Field]]:
+    """Every beam with its field; a single one is that of the first."""
+    beams = model.matrices.beams
+    fields = list(field) if isinstance(field, Sequence) else [field, *[None] * (len(beams) - 1)]
+    require(len(fields) == len(beams), f"fields must be {len(beams)}, one for each beam", len(fields), "Model.state",
+            "give None for a beam at rest")  # fmt: skip
+    return list(zip(beams, fields, strict=True))
 
 
 def _on_nodes(beam: Matrices, field: Field) -> Vector:

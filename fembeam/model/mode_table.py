@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from fembeam.support import aligned
 
 if TYPE_CHECKING:
@@ -13,49 +15,29 @@ if TYPE_CHECKING:
     from fembeam.model import Model
 
 
+FORMATS = {"mode": "", "omega": ".6f", "hz": ".6f", "zeta": ".4g", "participation": ".6g", "effective_mass": ".6g"}
+
+
 def mode_rows(model: Model) -> list[dict[str, Any]]:
-    """Frequency, damping, participation Γ, effective mass Γ² and its share of the moving mass."""
-    if model.participation.ndim == 2:
-        return [row for row, _ in _rows_of_directions(model)]
-    mass = model.moving_mass
-    return [
-        {"mode": name, "omega": w, "hz": w / (2 * math.pi), "zeta": z, "participation": g, "effective_mass": g * g,
-         "share": g * g / mass if mass > 0 else 0.0}
-        for name, w, z, g in zip(
-            model.names, *(x.tolist() for x in (model.omega, model.zeta, model.participation)), strict=True
-        )
-    ]  # fmt: skip
+    """Frequency, damping, participation Γ, effective mass Γ² and its share of the moving mass.
 
-
-def _rows_of_directions(model: Model) -> list[tuple[dict[str, Any], list[float]]]:
-    """The same of a body whose frame may move along several directions, and the shares themselves."""
-    found = []
-    for i, (name, w, z) in enumerate(zip(model.names, model.omega.tolist(), model.zeta.tolist(), strict=True)):
+    Where the frame may move along several directions, the last three for each of them: "share x".
+    """
+    masses = np.atleast_1d(model.moving_mass).tolist()
+    each = model.participation.reshape(len(model.omega), len(masses)).tolist()
+    rows = []
+    for name, w, z, own in zip(model.names, model.omega.tolist(), model.zeta.tolist(), each, strict=True):
         row = {"mode": name, "omega": w, "hz": w / (2 * math.pi), "zeta": z}
-        shares = []
-        for direction, g, mass in zip(
-            model.moved_along, model.participation[i].tolist(), model.moving_mass, strict=True
-        ):
-            shares.append(g * g / float(mass) if mass > 0 else 0.0)
-            row |= {
-                f"participation {direction}": g,
-                f"effective_mass {direction}": g * g,
-                f"share {direction}": shares[-1],
-            }
-        found.append((row, shares))
-    return found
+        for along, g, mass in zip(_directions(model), own, masses, strict=True):
+            row |= {f"participation{along}": g, f"effective_mass{along}": g * g}
+            row[f"share{along}"] = g * g / mass if mass > 0 else 0.0
+        rows.append(row)
+    return rows
 
 
-def _part_of_directions(model: Model) -> tuple[Sequence[str], list[Sequence[str]]]:
-    """Head and rows of the table of such a body: shares of the moving mass."""
-    found = _rows_of_directions(model)
-    head = "mode", "rad/s", "Hz", "zeta", *(f"% of mass along {direction}" for direction in model.moved_along)
-    rows: list[Sequence[str]] = [("", "", "", "", *(f"{float(mass):.6g} kg" for mass in model.moving_mass))]
-    for row, shares in found:
-        numbers = f"{row['omega']:.6f}", f"{row['hz']:.6f}", f"{row['zeta']:.4g}"
-        rows.append((row["mode"], *numbers, *(f"{100 * share:.3f}" for share in shares)))
-    sums = [f"{100 * sum(share):.3f}" for share in zip(*(shares for _, shares in found), strict=True)]
-    return head, [*rows, ("all", "", "", "", *sums)]
+def _directions(model: Model) -> list[str]:
+    """What names of `mode_rows` end with: directions in which the frame may move, nothing of a beam."""
+    return [f" {direction}" for direction in model.moved_along] if model.participation.ndim == 2 else [""]
 
 
 def mode_table(model: Model) -> str:
@@ -64,14 +46,16 @@ def mode_table(model: Model) -> str:
 
 
 def mode_part(model: Model) -> tuple[Sequence[str], list[Sequence[str]]]:
-    """Head and rows of the table: units first, the sum last."""
-    if model.participation.ndim == 2:
-        return _part_of_directions(model)
-    mass = model.moving_mass
-    head = "mode", "rad/s", "Hz", "zeta", "participation", "effective mass", "% of moving mass"
-    formats = "", ".6f", ".6f", ".4g", ".6g", ".6g", ".3f"
-    found = mode_rows(model)
-    rows: list[Sequence[str]] = [("", "", "", "", "√kg", "kg", f"{mass:.6g} kg")]
-    rows += [tuple(map(format, [*list(row.values())[:-1], 100 * row["share"]], formats)) for row in found]
-    share = 100 * sum(row["share"] for row in found)
-    return head, [*rows, ("all", "", "", "", "", f"{model.effective_mass.sum():.6g}", f"{share:.3f}")]
+    """Head and rows of the table: units first, the sum last; of several directions shares alone."""
+    found, along = mode_rows(model), _directions(model)
+    head, units, total = [f"% of mass along{one}" for one in along], [], []
+    if model.participation.ndim == 1:
+        head, units = ["participation", "effective mass", "% of moving mass"], ["√kg", "kg"]
+        total = ["", f"{model.effective_mass.sum():.6g}"]
+    masses = (f"{mass:.6g} kg" for mass in np.atleast_1d(model.moving_mass))
+    rows: list[Sequence[str]] = [("", "", "", "", *units, *masses)]
+    for row in found:
+        numbers = (format(row[key], code) for key, code in FORMATS.items() if key in row)
+        rows.append((*numbers, *(f"{100 * row[f'share{one}']:.3f}" for one in along)))
+    sums = (f"{100 * sum(row[f'share{one}'] for row in found):.3f}" for one in along)
+    return ["mode", "rad/s", "Hz", "zeta", *head], [*rows, ("all", "", "", "", *total, *sums)]

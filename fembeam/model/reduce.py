@@ -14,6 +14,7 @@ import reduction
 from fembeam.model.model import Model
 from fembeam.response import PlacedShapes, Shapes, placed_shapes
 from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, carried_on, check_counts, loaded, watched
+from fembeam.scene.rigid_motions import carried_away
 from fembeam.structures import COMPONENTS
 from fembeam.support import is_finite, is_whole, require
 from solvers.problem import counted
@@ -182,9 +183,7 @@ def _shapes_of_each(scene: Scene, matrices: Matrices, basis: reduction.Basis) ->
         if isinstance(beam, BodyMatrices):
             shapes.append(placed_shapes(beam, mine, loaded(scene, number), carried, parts))
         else:
-            values = np.zeros((beam.dofs.size, basis.count))
-            values[beam.dofs.ravel() >= 0] = mine
-            shapes.append(Shapes(beam.nodes, values, carried, parts))
+            shapes.append(Shapes(beam.nodes, beam.spread @ mine, carried, parts))
         done += size
     return shapes
 
@@ -196,10 +195,7 @@ def _warn_of_drift(scene: Scene, matrices: Matrices, bases: list[reduction.Basis
         loads = bool(part.forces) or bool(scene.motions) or bool(scene.pulls)
         acting = [*part.stops, *(one for one in scene.acting if number and (one.coordinate.to or (0,))[0] == number)]
         if beam.named and count and loads and not part.elements and sum(len(one.coordinates) for one in acting) < 2:
-            where = f"bodies[{number - 1}] of Scene" if number else "Scene"
-            what = "1 rigid-body mode appears" if count == 1 else f"{count} rigid-body modes appear"
-            said = f"{what} in {where}: supports and springs do not hold the structure, its loads may carry it away"
-            warnings.warn(said, UserWarning, stacklevel=4)
+            warnings.warn(carried_away(count, number, "structure"), UserWarning, stacklevel=4)
 
 
 def _warn_of_cut_pairs(beam: Matrices, omega: Vector, chosen: tuple[int, ...]) -> None:

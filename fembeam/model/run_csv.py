@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 
 from fembeam.model.watched_places import places as usual_places
-from fembeam.response import BodyReaction, PlacedShapes
+from fembeam.response import BodyReaction
 from fembeam.scene import is_directed, place_words, said, unit_of
-from fembeam.support import is_finite, require
+from fembeam.support import is_finite, require, tuples
 from solvers.problem import dataframe, optional
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def histories(
     """Columns of every `stride`-th sample, by name and unit: quantities at places, of stops, of supports."""
     require(stride >= 1, "stride must be at least 1", stride, "Run", "1 keeps every sample")
     require(not isinstance(quantities, str), "quantities must be a list", quantities, "Run", "put it in brackets")
-    named = isinstance(run.shapes, PlacedShapes)
+    named = run.shapes.named
     listed = isinstance(places, (list, tuple)) if named else np.ndim(places) == 1  # type: ignore[arg-type]
     require(places is None or listed, "places must be a list", places, "Run", "put it in brackets")
     asked = USUAL if quantities is None else quantities
@@ -93,7 +93,7 @@ def histories(
             "ask for moment and shear")  # fmt: skip
     columns, there = {"t [s]": run.t}, [what for what in asked if what not in ELSEWHERE]
     if named:
-        columns |= _at_places(run, there, None if places is None else [_pair(at) for at in places])
+        columns |= _at_places(run, there, None if places is None else [tuples(at) for at in places])
     else:
         for name, z in where.items():
             columns |= {f"{what} {name} [{_unit(what, z)}]": _at(run, what, z) for what in there}
@@ -160,11 +160,6 @@ def _vector(direction: Any) -> str:
     return f"({' '.join(f'{number:.4g}' for number in direction)})"
 
 
-def _pair(at: Any) -> Any:
-    """A place and its direction, as a scene file lists them too."""
-    return tuple(tuple(one) if isinstance(one, list) else one for one in at) if isinstance(at, list) else at
-
-
 def _unit(quantity: str, at: Any) -> str:
     """Unit of a quantity at a place: rad for m where the direction is a rotation."""
     return UNITS[quantity].replace("m", "rad", 1) if _turns(at) else UNITS[quantity]
@@ -200,17 +195,7 @@ def to_dataframe(run: Run, stride: int = 1, **chosen: Any) -> Any:
 
 def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
     """See `Run.to_xarray`."""
-    named = isinstance(run.shapes, PlacedShapes)
-    given = list(usual_places(run.shapes).values()) if z is None and named else run.shapes.place(z)
-    place: Any = (
-        [given]
-        if isinstance(given, tuple)
-        else list(given)  # type: ignore[arg-type]
-        if named
-        else run.shapes.nodes
-        if z is None
-        else np.atleast_1d(np.asarray(z, dtype=float))
-    )
+    named, place = run.shapes.named, run._places(z)
     variables = {
         "displacement": (("t", "z"), run.displacement(place), {"units": "m"}),
         "velocity": (("t", "z"), run.velocity(place), {"units": "m/s"}),
@@ -258,7 +243,7 @@ def _write(target: Path, columns: Mapping[str, Any]) -> Path:
         writer = csv.writer(wrapped, lineterminator="\n")
         writer.writerow(columns)
         if any(texts):
-            kinds = [str if text else _digits for text in texts]
+            kinds = [str if text else DIGITS.__mod__ for text in texts]
             writer.writerows(
                 [kind(x) for kind, x in zip(kinds, row, strict=True)] for row in zip(*columns.values(), strict=True)
             )
@@ -267,11 +252,6 @@ def _write(target: Path, columns: Mapping[str, Any]) -> Path:
             np.savetxt(wrapped, rows, fmt=DIGITS, delimiter=",")
         wrapped.detach()
     return target
-
-
-def _digits(x: float) -> str:
-    """A number of a table."""
-    return DIGITS % x
 
 
 def parts(run: Run) -> list[Part]:

@@ -111,7 +111,7 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
 
 def _arrays_of(shapes: Any) -> tuple[Any, Any]:
     """Nodes and values of a beam's shapes; of a body numbers of its places, and the values one place after another."""
-    if isinstance(shapes, PlacedShapes):
+    if shapes.named:
         return np.arange(len(shapes.known), dtype=float), shapes.values.reshape(-1, shapes.values.shape[2])
     return shapes.nodes, shapes.values
 

@@ -8,7 +8,6 @@ Frames and structures lie where they are, on the lines that figures show; a fram
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,9 +16,9 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.response import PlacedShapes, rows_of
+from fembeam.response import rows_of
 from fembeam.structures import FrameForces
-from fembeam.support import is_whole, require
+from fembeam.support import is_whole, require, written_beside
 from solvers.problem import optional
 
 if TYPE_CHECKING:
@@ -49,18 +48,17 @@ def to_xdmf(run: Run, path: str | os.PathLike[str], stride: int = 1, hdf5: bool 
 
     h5py = optional("h5py", "XDMF with HDF5 data") if hdf5 else None
     samples, points, cells, values = _samples(run, stride), *_geometry(run), _fields(run)
-
-    def write(target: str) -> None:
-        writer = TimeSeriesWriter(target, data_format="HDF" if hdf5 else "XML")
+    target = _target(Path(path), ".xdmf")
+    with written_beside(target) as draft:
+        writer = TimeSeriesWriter(draft, data_format="HDF" if hdf5 else "XML")
         if h5py is not None:  # as a context it would take the working directory
-            writer.h5_filename = os.path.splitext(target)[0] + ".h5"
+            writer.h5_filename = os.path.splitext(draft)[0] + ".h5"
             writer.h5_file = h5py.File(writer.h5_filename, "w")
         writer.write_points_cells(points, cells)
         for sample in samples:
             writer.write_data(float(run.t[sample]), point_data=values(sample))
         writer.__exit__()
-
-    return _whole(Path(path), ".xdmf", write)
+    return target
 
 
 def to_vtu(run: Run, path: str | os.PathLike[str], sample: int = -1, stride: int | None = None) -> Path:
@@ -71,24 +69,25 @@ def to_vtu(run: Run, path: str | os.PathLike[str], sample: int = -1, stride: int
             "to_vtu", "count from 0, or from the end with -1")  # fmt: skip
     points, cells, values = *_geometry(run), _fields(run)
 
-    def write_one(target: str, number: int) -> None:
+    def write(target: str, number: int) -> None:
         meshio.write(target, meshio.Mesh(points, cells, point_data=values(number)), file_format="vtu")
 
-    if stride is None:
-        return _whole(Path(path), ".vtu", lambda target: write_one(target, sample))
-    samples = _samples(run, stride)
-
-    def write(target: str) -> None:
-        stem = os.path.splitext(target)[0]
-        names = [f"{stem}_{number:0{len(str(len(samples)))}d}.vtu" for number in range(len(samples))]
-        for name, number in zip(names, samples, strict=True):
-            write_one(name, number)
-        rows = [f'<DataSet timestep="{float(run.t[number])!r}" file="{quoteattr(os.path.basename(name))[1:-1]}"/>'
-                for name, number in zip(names, samples, strict=True)]  # fmt: skip
-        Path(target).write_text(PVD.format("\n".join(rows)), encoding="utf-8")
-
     path = Path(path)
-    return _whole(path.with_suffix("") if path.suffix == ".vtu" else path, ".pvd", write)
+    if stride is None:
+        target = _target(path, ".vtu")
+        with written_beside(target) as draft:
+            write(draft, sample)
+        return target
+    samples, rows = _samples(run, stride), []
+    target = _target(path.with_suffix("") if path.suffix == ".vtu" else path, ".pvd")
+    with written_beside(target) as draft:
+        for count, number in enumerate(samples):
+            name = f"{os.path.splitext(draft)[0]}_{count:0{len(str(len(samples)))}d}.vtu"
+            write(name, number)
+            file = quoteattr(os.path.basename(name))[1:-1]
+            rows.append(f'<DataSet timestep="{float(run.t[number])!r}" file="{file}"/>')
+        Path(draft).write_text(PVD.format("\n".join(rows)), encoding="utf-8")
+    return target
 
 
 def _samples(run: Run, stride: int) -> range:
@@ -100,7 +99,7 @@ def _samples(run: Run, stride: int) -> range:
 
 def _geometry(run: Run) -> tuple[Vector, list[tuple[str, Any]]]:
     """Points (p, 3) of all beams, then impactors; lines, of zero length for impactors, as XDMF has one kind of cell."""
-    placed = [isinstance(shapes, PlacedShapes) for shapes in (run.shapes, *run.others)]
+    placed = [shapes.named for shapes in (run.shapes, *run.others)]
     if all(placed):
         return _lines(run)
     require(not any(placed), "files for ParaView must be of beams alone, or of bodies with lines alone", run.others,
@@ -131,47 +130,33 @@ def _lines(run: Run) -> tuple[Vector, list[tuple[str, Any]]]:
     return np.concatenate(points), [("line", np.concatenate(lines))]
 
 
-def _moved(run: Run) -> Callable[[int], dict[str, Vector]]:
-    """Displacement and velocity of these places; section forces of a frame by itself."""
-    rows = []
-    for shapes in (run.shapes, *run.others):
-        values = np.zeros((len(shapes.known), 3, shapes.whole.shape[2]))
-        for axis, name in enumerate("xyz"):
-            if name in shapes.components:
-                values[:, axis] = shapes.whole[:, shapes.components.index(name)]
-        rows.append(values[np.unique(shapes.lines)])
-    moved = np.concatenate(rows)
+def _of_places(run: Run) -> tuple[Vector, dict[str, tuple[Vector, Vector]]]:
+    """The motion of these places; section forces of a frame by itself."""
+    moved = np.concatenate([shapes.translations[np.unique(shapes.lines)] for shapes in (run.shapes, *run.others)])
     forces = run.readout.section_forces[0] if not run.others else None
     carried = {}
     if isinstance(forces, FrameForces):  # of joined bodies places of structures have none
         places = [run.shapes.known[i] for i in np.unique(run.shapes.lines)]
-        preload = {name: np.array([forces.preload(place, name) for place in places]) for name in forces.names}
-        per_unit = np.array([forces.rows(place) for place in places])
-        carried = {name: (per_unit[:, i], preload[name]) for i, name in enumerate(forces.names)}
+        carried = {name: rows_of(run, name, places, 0) for name in forces.names}
+    return moved, carried
 
-    q, q_dot = (run.with_supports(rates, run.shapes.moving, order) for order, rates in enumerate((run.q, run.q_dot)))
 
-    def at(sample: int) -> dict[str, Vector]:
-        vectors = {"displacement": moved @ q[sample], "velocity": moved @ q_dot[sample]}
-        return vectors | {name: shapes @ q[sample] + constant for name, (shapes, constant) in carried.items()}
-
-    return at
+def _of_beams(run: Run) -> tuple[Vector, dict[str, tuple[Vector, Vector]]]:
+    """The motion of the points of beams and impactors; numbers, stress only where every section knows its fibre."""
+    known = all(np.isfinite(f.beam.profile(f.nodes).fibre).all() for f in run.readout.section_forces)
+    rows = {name: _rows(run, name) for name in ("displacement", *SECTION_FIELDS[: None if known else -1])}
+    up, _ = rows.pop("displacement")
+    return np.stack([np.zeros_like(up), up, np.zeros_like(up)], axis=1), rows
 
 
 def _fields(run: Run) -> Callable[[int], dict[str, Vector]]:
-    """The fields at the points as a function of the sample; stress only where every section knows its fibre."""
-    if isinstance(run.shapes, PlacedShapes):
-        return _moved(run)
-    known = all(np.isfinite(f.beam.profile(f.nodes).fibre).all() for f in run.readout.section_forces)
-    rows = {name: _rows(run, name) for name in ("displacement", *SECTION_FIELDS[: None if known else -1])}
-    moved, _ = rows.pop("displacement")
+    """The fields at the points as a function of the sample, of shapes (p, 3, n) and (p, n)."""
+    moved, numbers = (_of_places if run.shapes.named else _of_beams)(run)
     q, q_dot = (run.with_supports(rates, run.shapes.moving, order) for order, rates in enumerate((run.q, run.q_dot)))
 
     def at(sample: int) -> dict[str, Vector]:
         vectors = {"displacement": moved @ q[sample], "velocity": moved @ q_dot[sample]}
-        still = np.zeros(len(moved))
-        numbers = {name: shapes @ q[sample] + constant for name, (shapes, constant) in rows.items()}
-        return {name: np.column_stack([still, up, still]) for name, up in vectors.items()} | numbers
+        return vectors | {name: shapes @ q[sample] + constant for name, (shapes, constant) in numbers.items()}
 
     return at
 
@@ -183,17 +168,12 @@ def _rows(run: Run, quantity: str) -> tuple[Vector, Vector]:
     n = run.q.shape[1]
     impactors = np.eye(n, n + run.shapes.moving)[n - count :] / np.sqrt(run.impactor_masses)[:, None]
     last = impactors if quantity == "displacement" else np.zeros_like(impactors)
-    return np.vstack([*(shapes for shapes, _, _ in parts), last]), np.concatenate(
-        [*(constant for _, _, constant in parts), np.zeros(count)]
-    )
+    shapes, constants = zip(*parts, strict=True)
+    return np.vstack([*shapes, last]), np.concatenate([*constants, np.zeros(count)])
 
 
-def _whole(target: Path, suffix: str, write: Callable[[str], None]) -> Path:
-    """Let meshio write beside the target, then give the files their names, the one to be opened last."""
+def _target(target: Path, suffix: str) -> Path:
+    """The path of the file to be opened, with its suffix."""
     target = target if target.suffix == suffix else target.with_name(target.name + suffix)
     require(target.parent.is_dir(), "the folder must exist", str(target.parent), f"export to {suffix}", "make it first")
-    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
-        write(os.path.join(folder, target.name))
-        for name in sorted(os.listdir(folder), key=target.name.__eq__):
-            os.replace(os.path.join(folder, name), target.with_name(name))
     return target

@@ -25,7 +25,7 @@ from fembeam.model.extremes import of_top, time_of_top
 from fembeam.response import PlacedLog, directed
 from fembeam.scene import called, changes_structure, path_of, replaced, value_of
 from fembeam.scene.signals import is_of_signal
-from fembeam.support import Part, Printed, numbers, require
+from fembeam.support import Part, Printed, by_rows, numbers, require
 from solvers.orbits import codes, counts, delayed
 from solvers.problem import counted, dataframe
 from solvers.problem.friction import told_rates
@@ -139,7 +139,7 @@ class Sensitivity(Printed):
         return self.found.solution
 
     def _of_stop(self, stop: int | str) -> tuple[Vector, Vector]:
-        """Of δ and δ̇ at fixed times."""
+        """Of δ and of δ̇ of a stop, at fixed times."""
         number = self.run.number(stop)
         contact = self.run.readout.model.system.contacts[number]
         own = self._at_samples(self._own.q), self._at_samples(self._own.q_dot)
@@ -160,7 +160,7 @@ class Sensitivity(Printed):
         return tuple(of_top(self.t, sign * u, sign * v, du, dv) for sign in (-1.0, 1.0))  # type: ignore[return-value]
 
     def _of_motion(self, changed: Vector, motion: Vector, z: Any, direction: Any, body: int) -> Vector:
-        """φ·dq + dφ·q."""
+        """Of φ·q at a place, φ·dq + dφ·q: ``changed`` is dq."""
         model = self.run.readout.model
         at = z if direction is None else directed(z, direction)
         found = changed @ np.asarray(model.phi(at, 0, body)).T
@@ -173,8 +173,7 @@ class Sensitivity(Printed):
         log = self.contacts
         columns = {"stop": log.stop, "name": log.name, **log.where, "t_in": log.t_in, "t_out": log.t_out}
         columns |= {"entry": self.entries, "exit": self.exits, "peak force": self.peak_force, "impulse": self.impulse}
-        rows = zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
-        return [dict(zip(columns, row, strict=True)) for row in rows]
+        return by_rows(columns)
 
     def to_dataframe(self) -> Any:
         """The table as one of pandas; ImportError without pandas."""
@@ -262,9 +261,9 @@ class _Varied:
 
     def _felt(self) -> float:
         """A step of a number that is zero and changes modes, which they feel about as much as `STRUCTURE`."""
-        step, here = FIRST, self.model
+        step = FIRST
         while LEAST < step < 1.0 / FIRST:
-            change = self._change(here, step)
+            change = self._change(step)
             if change > STRUCTURE:
                 step *= 0.1
             elif step < FIRST or change > FELT:
@@ -273,9 +272,9 @@ class _Varied:
                 step *= 10.0
         return step
 
-    def _change(self, here: Model, step: float) -> float:
+    def _change(self, step: float) -> float:
         """Largest relative change of frequencies, shapes or damping by a step from zero."""
-        there = here.again(self._scene(step))
+        here, there = self.model, self.model.again(self._scene(step))
         require(len(there.system.loads) == len(here.system.loads), "it must not bring a load that is not there yet",
                 step, self.called, "begin from a small value, such as gravity=1e-6")  # fmt: skip
         pairs = (here.omega**2, there.omega**2), (here.directions, there.directions), (here.zeta, there.zeta)

@@ -32,5 +32,4 @@ def observed(model: Model) -> Any:
     acting = [part.z for part in model.scene.acting if not part.coordinate.rotation]
     if acting and not model.scene.named:
         return acting[0]
-    known = model.shapes.usual if isinstance(model.shapes, PlacedShapes) else places(model.shapes)
-    return next(iter(known.values()))
+    return next(iter(places(model.shapes).values()))

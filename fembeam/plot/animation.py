@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.model import PlacedShapes
 from fembeam.plot.bodies import BodyStage
 from fembeam.plot.run_signals import samples_in
 from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled
 from fembeam.scene import ON
-from fembeam.support import require
+from fembeam.support import require, written_beside
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -72,10 +70,8 @@ def animate(
     stage = _stage(run, samples, fps)
     film = FuncAnimation(stage.figure, stage.show, frames=len(samples), init_func=lambda: [], blit=False)
     writer = (PillowWriter if target.suffix == ".gif" else FFMpegWriter)(fps=fps)  # type: ignore[arg-type]
-    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
-        draft = os.path.join(folder, target.name)
+    with written_beside(target) as draft:
         film.save(draft, writer=writer, dpi=100)
-        os.replace(draft, target)
     return target
 
 
@@ -102,8 +98,8 @@ def frame(run: Run, t: float, window: tuple[float, float] | None = None) -> Figu
 def _stage(run: Run, samples: NDArray[np.int64], fps: float | None) -> _Stage | BodyStage:
     """What is shown: a beam with its contacts, or the lines of another body."""
     pace = "" if fps is None else _pace(fps * float(np.median(np.diff(run.t[samples]))))
-    if not isinstance(run.shapes, PlacedShapes):
-        straight = not any(isinstance(shapes, PlacedShapes) for shapes in run.others)
+    if not run.shapes.named:
+        straight = not any(shapes.named for shapes in run.others)
         require(straight, "moving pictures of a Beam must be of Beams alone", run.others, "animate",
                 "draw plot.time_history or plot.mode_shapes")  # fmt: skip
         return _Stage(run, samples, pace)

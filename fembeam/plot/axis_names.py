@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import Any
 
-if TYPE_CHECKING:
-    from fembeam.scene import Scene
+from fembeam.scene import PointMoment, Scene
 
 SIGNALS = {"base": "base", "foot": "foot", "signal": "drive"}
 LAWS = {"stiffness": ("contact stiffness", "N/m^p"), "exponent": ("exponent of the contact law", ""),
@@ -44,7 +43,7 @@ def axis_name(path: str, scene: Scene) -> str:
     kind, number, beam = owner[3], owner[5], owner[2]
     signal = next((part for part in path.split(".") if part in SIGNALS), "")
     if signal:
-        turns = kind == "forces" and _turns(scene, beam, int(number))
+        turns = kind == "forces" and isinstance(_part(scene, beam, kind, int(number)), PointMoment)
         name, unit = _of_signal(kind, signal, last, turns)
         along = re.match(r"(?:bodies\[\d+\]\.)?base\.([xyz])\.", path)
         name += f" along {along[1]}" if name and along else ""
@@ -52,7 +51,8 @@ def axis_name(path: str, scene: Scene) -> str:
         name, unit = f"rotational damping of {_owner(scene, beam, kind, int(number))}", "N m s/rad"
     else:
         name, unit = (LAWS if ".law." in path else PARTS).get(last, ("", ""))
-        if kind in ("stops", "elements") and last not in ("z", "on", "to") and _rotates(scene, beam, kind, int(number)):
+        acts = kind in ("stops", "elements") and last not in ("z", "on", "to")
+        if acts and (part := _part(scene, beam, kind, int(number))) and part.coordinate.rotation:
             unit = TURNED.get(unit, unit)
         name += f" of {_owner(scene, beam, kind, int(number or 0))}" if name and kind in OWNERS else ""
     if not name:
@@ -63,23 +63,14 @@ def axis_name(path: str, scene: Scene) -> str:
 
 def _owner(scene: Scene, beam: str | None, kind: str, number: int) -> str:
     """What a part is called: its name, else its kind and number."""
+    part = _part(scene, beam, kind, number)
+    return f"{OWNERS[kind]} {number}" if part is None or part.name is None else str(part.name)
+
+
+def _part(scene: Scene, beam: str | None, kind: str, number: int) -> Any:
+    """A part of a scene, or of one of its further beams; None of one that it does not have."""
     parts = getattr(scene if beam is None else scene.bodies[int(beam)], kind)
-    named = number < len(parts) and parts[number].name is not None
-    return str(parts[number].name) if named else f"{OWNERS[kind]} {number}"
-
-
-def _rotates(scene: Scene, beam: str | None, kind: str, number: int) -> bool:
-    """Whether a stop or element of a scene, or of one of its further beams, acts on the slope."""
-    parts = getattr(scene if beam is None else scene.bodies[int(beam)], kind)
-    return number < len(parts) and parts[number].coordinate.rotation
-
-
-def _turns(scene: Scene, beam: str | None, number: int) -> bool:
-    """Whether a force of a scene, or of one of its further beams, is a moment."""
-    from fembeam.scene import PointMoment
-
-    forces = (scene if beam is None else scene.bodies[int(beam)]).forces
-    return number < len(forces) and isinstance(forces[number], PointMoment)
+    return parts[number] if number < len(parts) else None
 
 
 def _of_signal(kind: str, signal: str, last: str, turns: bool) -> tuple[str, str]:

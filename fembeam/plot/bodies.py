@@ -45,10 +45,7 @@ def _known(shapes: PlacedShapes) -> Vector:
 
 def displacements(shapes: PlacedShapes, q: Vector) -> Vector:
     """(p, 3) of all places for coordinates q (n,), or (n + k,) with the support dofs that move, m."""
-    moved = np.zeros((len(shapes.known), 3))
-    for axis, name in enumerate("xyz"):
-        if name in shapes.components:
-            moved[:, axis] = shapes.whole[:, shapes.components.index(name), : len(q)] @ q
+    moved: Vector = shapes.translations[:, :, : len(q)] @ q
     return moved
 
 
@@ -174,9 +171,7 @@ def _sample(run: Run, t: float | None) -> int:
         inside = is_finite(t) and run.t[0] <= t <= run.t[-1]
         require(inside, f"t must lie within the run, {run.t[0]:g} to {run.t[-1]:g} s", t, "deflected", "choose one")
         return int(np.argmin(np.abs(run.t - t)))
-    shapes = run.shapes
-    rows = [shapes.whole[:, shapes.components.index(name)] for name in "xyz" if name in shapes.components]
     squares = np.zeros(len(run.t))
-    for place in range(len(shapes.known)):
-        squares = np.maximum(squares, sum((q @ row[place]) ** 2 for row in rows))
+    for rows in run.shapes.translations:
+        squares = np.maximum(squares, ((q @ rows.T) ** 2).sum(axis=1))
     return int(np.argmax(squares))

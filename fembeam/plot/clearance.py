@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.rig_words import length
-from fembeam.plot.run_signals import samples_in, sampling_of
+from fembeam.plot.run_signals import between_samples, samples_in, sampling_of
 from fembeam.plot.style import BLUE, GREEN, GREY, RED, Vector, styled
 from fembeam.response import states
 from fembeam.structures import direction_of, named
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
     from fembeam.model import Run
 
-FINER = 8  # times the samples
 TRAIL = 25  # pictures
 ROUND = np.linspace(0.0, 2.0 * np.pi, 361)
 
@@ -53,28 +52,22 @@ def orbit_in_clearance(
     >>> [line.get_label() for line in orbit_in_clearance(run).axes[0].lines]
     ['clearance 1 mm', 'free', 'in contact']
     """
-    from scipy.interpolate import CubicHermiteSpline
-
     sampling_of(run)
     number = run._stop(stop)
     radius, *centre = run.circles[number].tolist()
     d, kept = run.place_in_clearance(number), samples_in(run, window, "orbit_in_clearance")
-    t, rates = run.t[kept], run.q_dot[kept] @ run.directions[run._rows[number]][:2].T
-    fine = np.linspace(t[0], t[-1], FINER * (len(t) - 1) + 1)
-    path = 1e3 * CubicHermiteSpline(t, d[kept], rates)(fine)
-    size = 1e3 * abs(radius)
-    touching = np.sign(radius) * (np.linalg.norm(path, axis=1) - size) > 0.0
+    t, path = between_samples(run.t[kept], d[kept], run.q_dot[kept] @ run.directions[run._rows[number]][:2].T)
+    touching = _beyond(path, radius)
     parts = [(BLUE, "free", ~touching), (RED, "in contact", touching)]
     if run.rubs[number, 1]:
-        codes = _codes(run, number, fine)
+        codes = _codes(run, number, t)
         stuck, slips = touching & (codes == 0.0), touching & (np.abs(codes) == 1.0)
         parts = [(BLUE, "free", ~(stuck | slips)), (RED, "slips", slips), (GREEN, "sticks", stuck)]
     figure, (axis,) = sheet(1, 1, (5.0, 5.0), axes)
-    axis.plot(size * np.cos(ROUND), size * np.sin(ROUND), "--", color=GREY, label=f"clearance {length(abs(radius))}")
+    axis.plot(*_circle(radius), "--", color=GREY, label=f"clearance {length(abs(radius))}")
     for colour, label, shown in parts:
-        own = np.where((shown | np.append(shown[1:], False))[:, None], path, np.nan)
-        axis.plot(*own.T, color=colour, linewidth=0.9, label=label)
-    x, y = (_way(direction) for direction in run.acting[number][1])
+        axis.plot(*_only(path, shown), color=colour, linewidth=0.9, label=label)
+    x, y = _ways(run, number)
     of_centre = " from the centre" if any(centre) else ""
     axis.set(xlabel=f"{x}{of_centre} / mm", ylabel=f"{y}{of_centre} / mm")
     axis.set_aspect("equal", adjustable="datalim")
@@ -130,7 +123,7 @@ def forces_in_clearance(
     for label, (colour, force) in drawn.items():
         shown = kept[normal[kept] > 0.0]
         axis.plot(angle[shown], force[shown], ".", color=colour, markersize=2.5, label=label)
-    x, y = (_way(direction) for direction in run.acting[number][1])
+    x, y = _ways(run, number)
     axis.set_xticks(0.5 * np.pi * np.arange(4), [x, y, f"-{x}", f"-{y}"])
     axis.set_ylim(0.0)
     axis.set_rlabel_position(67.5)
@@ -148,15 +141,14 @@ class Whirl:
     def __init__(self, axis: Axes, run: Run, stop: int, samples: NDArray[np.int64]) -> None:
         self.run, self.samples = run, samples
         radius = float(run.circles[stop, 0])
-        self.path, size = 1e3 * run.place_in_clearance(stop), 1e3 * abs(radius)
-        self.touching = np.sign(radius) * (np.linalg.norm(self.path, axis=1) - size) > 0.0
-        axis.plot(size * np.cos(ROUND), size * np.sin(ROUND), "--", color=GREY, linewidth=0.8)
-        shown = self.path[samples[0] : samples[-1] + 1]
-        axis.plot(*shown.T, color=GREY, linewidth=0.3)
+        self.path = run.place_in_clearance(stop)
+        self.touching = _beyond(self.path, radius)
+        axis.plot(*_circle(radius), "--", color=GREY, linewidth=0.8)
+        axis.plot(*1e3 * self.path[samples[0] : samples[-1] + 1].T, color=GREY, linewidth=0.3)
         self.trail = axis.plot([], [], color=BLUE, linewidth=1.2)[0]
         self.pressed = axis.plot([], [], color=RED, linewidth=1.6)[0]
         self.place = axis.plot([], [], "o", color=BLUE, markersize=6)[0]
-        x, y = (_way(direction) for direction in run.acting[stop][1])
+        x, y = _ways(run, stop)
         axis.set(xlabel=f"{x} / mm", ylabel=f"{y} / mm")
         axis.set_title(f"{run.name(stop)}, clearance {length(abs(radius))}", fontsize=8)
         axis.set_aspect("equal", adjustable="datalim")
@@ -166,13 +158,29 @@ class Whirl:
         """Move the place to one picture; its way is that of the last `TRAIL` pictures."""
         first, now = int(self.samples[max(number - TRAIL, 0)]), int(self.samples[number])
         way, touching = self.path[first : now + 1], self.touching[first : now + 1]
-        self.trail.set_data(*way.T)
-        self.pressed.set_data(*np.where((touching | np.append(touching[1:], False))[:, None], way, np.nan).T)
-        self.place.set_data(*self.path[[now]].T)
+        self.trail.set_data(*1e3 * way.T)
+        self.pressed.set_data(*_only(way, touching))
+        self.place.set_data(*1e3 * self.path[[now]].T)
         self.place.set_color(RED if self.touching[now] else BLUE)
         return [self.trail, self.pressed, self.place]
 
 
-def _way(direction: Any) -> str:
-    """A direction in words."""
-    return direction if isinstance(direction, str) else named(direction_of(direction, "orbit_in_clearance"))
+def _ways(run: Run, stop: int) -> list[str]:
+    """The two directions of a stop, in words."""
+    ways = run.acting[stop][1]
+    return [way if isinstance(way, str) else named(direction_of(way, "orbit_in_clearance")) for way in ways]
+
+
+def _circle(radius: float) -> Vector:
+    """The clearance (2, k), mm."""
+    return 1e3 * abs(radius) * np.array([np.cos(ROUND), np.sin(ROUND)])
+
+
+def _beyond(path: Vector, radius: float) -> NDArray[np.bool_]:
+    """Where a path (k, 2) presses on the circle, from inside or, of a negative radius, from outside."""
+    return np.sign(radius) * (np.linalg.norm(path, axis=1) - abs(radius)) > 0.0
+
+
+def _only(path: Vector, shown: NDArray[np.bool_]) -> Vector:
+    """Some of a path (k, 2), with the points before them; (2, k) in mm."""
+    return 1e3 * np.where((shown | np.append(shown[1:], False))[:, None], path, np.nan).T

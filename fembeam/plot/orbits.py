@@ -134,9 +134,7 @@ def _draw_branch(axis: Axes, one: Branch, z: Any, color: str, label: str) -> Non
         axis.plot(np.insert(parameter, jumps, np.nan), heights, color=color, **style)
     for orbit, height in zip(one.orbits, peaks, strict=True):
         if orbit.mark:
-            marker, edge = MARKS[orbit.mark]
-            face = "white" if marker != "x" else edge
-            axis.plot(orbit.parameter, height, marker, color=edge, markerfacecolor=face, markersize=3.5, linewidth=0.8)
+            axis.plot(orbit.parameter, height, **_look(orbit.mark))
 
 
 def _draw_ends(axis: Axes, several: list[Branch], z: Any) -> None:
@@ -195,15 +193,19 @@ def _linear_curve(one: Branch, span: tuple[float, float], z: Any, slipping: bool
     return omega, 1e3 * H.amplitude * abs(signals_of(model.scene)[path].amplitude)
 
 
+def _contact_rows(several: list[Branch]) -> list[Any]:
+    """Contacts and elements of all their models."""
+    return [row for one in several for row in one.family.model.contact_rows]
+
+
 def _sliders(several: list[Branch]) -> bool:
     """Whether an element slips or yields."""
-    rows = [row for one in several for row in one.family.model.contact_rows]
-    return any(row.always and row.remembers and row.law.reach > 0.0 for row in rows)
+    return any(row.always and row.remembers and row.law.reach > 0.0 for row in _contact_rows(several))
 
 
 def _linear_name(several: list[Branch], slipping: bool = False) -> str:
     """What the linear response leaves out: contacts are open, sliders stick or slip, others with memory are elastic."""
-    rows = [row for one in several for row in one.family.model.contact_rows]
+    rows = _contact_rows(several)
     words = ("slipping", "yielding") if slipping else ("stuck", "elastic")
     held = {words["slip" not in row.law.events] for row in rows if row.always and row.remembers}
     said = ["no contact"] * any(not row.always for row in rows) + [f"elements {' or '.join(sorted(held))}"] * bool(held)
@@ -253,15 +255,16 @@ def _entries(axis: Axes, several: list[Branch]) -> tuple[list[Any], list[str]]:
     if any(not np.all(one.stable) for one in several):
         handles.append(Line2D([], [], color=GREY, linestyle="--", linewidth=0.8))
         labels.append("unstable")
-    for kind in MARKS:
-        if kind in kinds:
-            marker, edge = MARKS[kind]
-            face = "white" if marker != "x" else edge
-            handles.append(
-                Line2D([], [], marker=marker, color=edge, markerfacecolor=face, markersize=3.5, linestyle="")
-            )
-            labels.append(kind)
-    return handles, labels
+    known = [kind for kind in MARKS if kind in kinds]
+    handles += [Line2D([], [], **_look(kind)) for kind in known]
+    return handles, labels + known
+
+
+def _look(kind: str) -> dict[str, Any]:
+    """How the mark of a special orbit is drawn."""
+    marker, edge = MARKS[kind]
+    face = "white" if marker != "x" else edge
+    return {"marker": marker, "linestyle": "", "color": edge, "markerfacecolor": face, "markersize": 3.5}
 
 
 @styled

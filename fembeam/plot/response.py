@@ -28,12 +28,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fembeam.model import PlacedShapes, places
+from fembeam.model import places
 from fembeam.plot.bodies import deflected_figure
 from fembeam.plot.body_shapes import body_mode_shapes
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.random import density_panels
-from fembeam.plot.run_signals import estimated, first_stop, natural, place_of, sampling_of, stationary
+from fembeam.plot.run_signals import between_samples, estimated, first_stop, natural, place_of, sampling_of, stationary
 from fembeam.plot.spectra import segment_for
 from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, place_name, styled
 from fembeam.scene import persistent_drive, unit_of
@@ -79,7 +79,7 @@ def time_history(
     lo, hi = window or _window(run)
     body, place = _watched(run, lo, hi) if z is None else (0, z)
     figure, drawn = sheet(2 if len(run.stops) else 1, 1, (7.0, 4.2), axes, sharex=True)
-    t, u = _between_samples(run, place, body, lo, hi)
+    t, u = _displacement(run, place, body, lo, hi)
     drawn[0].plot(t, 1e3 * u, color=BLUE)
     drawn[0].set_ylabel("displacement / mm")
     title = f"Displacement at {_name(run, body, place)} relative to the frame"
@@ -155,8 +155,8 @@ def deflected(run: Run, t: float | None = None, scale: float | None = None, axes
     >>> len(figure.axes[0].lines)
     2
     """
-    named = isinstance(run.shapes, PlacedShapes)
-    require(named, "the body must be a frame or a structure", "a Beam", "deflected", "use time_history or animate")
+    require(run.shapes.named, "the body must be a frame or a structure", "a Beam", "deflected",
+            "use time_history or animate")  # fmt: skip
     return deflected_figure(run, t, scale, axes)
 
 
@@ -222,15 +222,11 @@ def _within(run: Run, lo: float, hi: float) -> NDArray[np.bool_]:
     return (run.contacts.t_in < hi) & ~(run.contacts.t_out <= lo)  # NaN: not ended yet
 
 
-def _between_samples(run: Run, z: Any, body: int, lo: float, hi: float) -> tuple[Vector, Vector]:
-    """(t, u) on a grid eight times finer than the samples, by cubics through values and rates."""
-    from scipy.interpolate import CubicHermiteSpline
-
+def _displacement(run: Run, z: Any, body: int, lo: float, hi: float) -> tuple[Vector, Vector]:
+    """(t, u) in a window."""
     first, last = np.searchsorted(run.t, [lo, hi])
     kept = slice(max(0, first - 1), last + 1)
-    t, u, rate = run.t[kept], run.displacement(z, body=body)[kept], run.velocity(z, body=body)[kept]
-    fine = np.linspace(t[0], t[-1], 8 * (len(t) - 1) + 1)
-    return fine, CubicHermiteSpline(t, u, rate)(fine)
+    return between_samples(run.t[kept], run.displacement(z, body=body)[kept], run.velocity(z, body=body)[kept])
 
 
 def _shade_contacts(axes: list[Axes], run: Run, stops: NDArray[np.int64], lo: float, hi: float) -> None:

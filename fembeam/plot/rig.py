@@ -172,12 +172,10 @@ class _View:
         self.unit = 1e3 if self.high <= 1.0 else 1.0
         self.per_inch = (self.high - self.low) / (width - 2 * PAD)  # m
         gaps = [gap for gap in _gaps(scene) if gap > 1e-9 * self.high]
-        self.enlarged, self.factor = (
-            bool(gaps),
-            round_factor(GAP * self.per_inch / max(gaps, default=GAP * self.per_inch)),
-        )
+        self.enlarged = bool(gaps)
+        self.factor = round_factor(GAP * self.per_inch / max(gaps, default=GAP * self.per_inch))
         self.heights = _heights(self.beams)
-        self.heads = [*([f"base motion: {signal_words(scene.base, 'm')}".replace("\n", " ")] if scene.base else [])]
+        self.heads = [f"base motion: {signal_words(scene.base, 'm')}".replace("\n", " ")] if scene.base else []
         self.heads += [f"gravity {scene.gravity:.4g} m/s²"] if scene.gravity else []
         for body, beam in enumerate(self.beams):
             of = f" of beam {body}" if body else ""
@@ -357,7 +355,7 @@ class _View:
 
 
 def _colour(item: Item) -> str:
-    """Of the line from a stop or an element."""
+    """Colour of the line from a stop or an element."""
     return COLOURS["stop" if item.kind[:1] == ("Stop",) else "element"]
 
 

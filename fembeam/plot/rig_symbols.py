@@ -50,7 +50,7 @@ class Pen:
         ])  # fmt: skip
 
     def moved(self, xi: float, eta: float) -> Pen:
-        """The same further along and outwards."""
+        """A pen about a point further along and outwards."""
         ((x,), (y,)) = self.at([(xi, eta)])
         return replace(self, x=float(x), y=float(y))
 
@@ -133,13 +133,13 @@ def zigzag(pen: Pen, length: float, colour: str = BLACK) -> None:
     pen.line(np.column_stack([[0, *xi, 0], [0, *eta, length]]), colour)
 
 
-def pot(pen: Pen, length: float, colour: str = BLACK) -> None:
+def pot(pen: Pen, length: float) -> None:
     """A dashpot along η."""
     half, low, high = 0.07 * pen.size, 0.35 * length, 0.7 * length
-    pen.line([(0.0, 0.0), (0.0, 0.5 * length)], colour)
-    pen.line([(-0.7 * half, 0.5 * length), (0.7 * half, 0.5 * length)], colour, 2.0)
-    pen.line([(-half, low), (-half, high), (half, high), (half, low)], colour)
-    pen.line([(0.0, high), (0.0, length)], colour)
+    pen.line([(0.0, 0.0), (0.0, 0.5 * length)])
+    pen.line([(-0.7 * half, 0.5 * length), (0.7 * half, 0.5 * length)], width=2.0)
+    pen.line([(-half, low), (-half, high), (half, high), (half, low)])
+    pen.line([(0.0, high), (0.0, length)])
 
 
 def nonlinear(pen: Pen, length: float) -> None:

@@ -9,12 +9,14 @@ import numpy as np
 from fembeam.model import places
 from fembeam.plot.style import Vector
 from fembeam.scene import persistent_drive
+from fembeam.scene.places import unsigned
 from fembeam.statistics import Signal, pdf
 from fembeam.support import is_finite, require
 
 if TYPE_CHECKING:
     from fembeam.model import Run
 
+FINER = 8  # times the samples, what is drawn between them
 MOST_BATCHES, FEWEST_BATCHES = 32, 4  # of a history, for standard errors
 MEMORIES = 10.0  # time constants of the structure that a batch lasts at least
 STEADY = 0.1  # of the largest mean square over a quarter of the time: below it the motion comes and goes
@@ -55,7 +57,7 @@ def place_of(run: Run, stop: int) -> Any:
         return z
     place, direction = run.acting[stop]
     direction = direction[0] if run.circles[stop, 0] else direction
-    return place, direction.removeprefix("-") if isinstance(direction, str) else direction
+    return place, unsigned(direction)
 
 
 def natural(run: Run) -> Vector:
@@ -78,6 +80,14 @@ def samples_in(run: Run, window: tuple[float, float] | None, where: str, advice:
     inside = np.flatnonzero((run.t >= lo) & (run.t <= hi))
     require(len(inside) >= 2, "the window must hold at least 2 samples", (lo, hi), where, advice)
     return inside
+
+
+def between_samples(t: Vector, x: Vector, rates: Vector) -> tuple[Vector, Vector]:
+    """Times on a grid finer than the samples, and values there, by cubics through values and rates."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    fine = np.linspace(t[0], t[-1], FINER * (len(t) - 1) + 1)
+    return fine, CubicHermiteSpline(t, x, rates)(fine)
 
 
 def stationary(run: Run, discard: float = 0.0) -> bool:

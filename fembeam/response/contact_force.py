@@ -17,7 +17,6 @@ from fembeam.response.friction import FREE, friction_force, on_rows
 if TYPE_CHECKING:
     from fembeam.response.histories import Histories
     from fembeam.scene.contact_rows import ContactRow
-    from solvers.problem import Transitions
 
 Vector = NDArray[np.float64]
 
@@ -50,12 +49,25 @@ def _force_of(run: Histories, stop: int, contact: ContactRow) -> Vector:
 
 
 def force_at(run: Histories, stop: int, contact: ContactRow, t: Vector, delta: Vector, rate: Vector) -> Vector:
-    """Force of one that always acts at times t (k,), ascending, of deformations and rates there."""
-    if contact.remembers:
-        return _replayed(
-            _parameters_at_start(run, stop, contact.law), contact.law, run.transitions, stop, t, delta, rate
-        )
-    return np.asarray(contact.force(delta, rate))
+    """Force of one that always acts at times t (k,), ascending, of deformations and rates there.
+
+    With a memory it is that between the borders passed, each with the latched numbers of its time.
+    """
+    if not contact.remembers:
+        return np.asarray(contact.force(delta, rate))
+    law, log = contact.law, run.transitions
+    parameters = _parameters_at_start(run, stop, law)
+    mine = np.flatnonzero(log.contact == stop)
+    ends = np.append(np.searchsorted(t, log.t[mine]), len(t))
+    force, first = np.empty(len(t)), 0
+    for passed, end in enumerate(ends):
+        if end > first:
+            force[first:end] = law.batch(1.0, parameters)(delta[first:end], rate[first:end])
+        if passed < len(mine):
+            at = mine[passed]
+            renew(law, int(log.border[at]), log.delta[at], log.delta_dot[at], parameters)
+        first = max(first, end)
+    return force
 
 
 def latched_before(run: Histories, time: float) -> tuple[Vector, ...]:
@@ -80,20 +92,3 @@ def _parameters_at_start(run: Histories, stop: int, law: Any) -> Vector:
     if run.began:
         parameters[list(getattr(law, "memory", ()))] = run.began[stop]
     return parameters
-
-
-def _replayed(
-    parameters: Vector, law: Any, log: Transitions, stop: int, t: Vector, delta: Vector, rate: Vector
-) -> Vector:
-    """The force between the borders it passed, each with the latched numbers of its time."""
-    mine = np.flatnonzero(log.contact == stop)
-    ends = np.append(np.searchsorted(t, log.t[mine]), len(t))
-    force, first = np.empty(len(t)), 0
-    for passed, end in enumerate(ends):
-        if end > first:
-            force[first:end] = law.batch(1.0, parameters)(delta[first:end], rate[first:end])
-        if passed < len(mine):
-            at = mine[passed]
-            renew(law, int(log.border[at]), log.delta[at], log.delta_dot[at], parameters)
-        first = max(first, end)
-    return force

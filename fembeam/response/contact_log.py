@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import solvers
 from fembeam.scene import place_words, unit_of
 from fembeam.structures import TURN, UP, direction_of, named
-from fembeam.support import Part, Printed, is_finite, is_whole
+from fembeam.support import Part, Printed, by_rows, is_finite, is_whole
 from solvers.problem import counted
 
 MOST_PRINTED = 60  # contacts
@@ -133,9 +133,7 @@ class PlacedLog(solvers.ContactLog, Printed):
 
     def table(self) -> list[dict[str, Any]]:
         """One contact a row."""
-        columns = self.named_arrays()
-        rows = zip(*(np.asarray(column).tolist() for column in columns.values()), strict=True)
-        return [dict(zip(columns, row, strict=True)) for row in rows]
+        return by_rows(self.named_arrays())
 
     def unit(self, column: str) -> str:
         """Unit of a column; "m or rad" where stops of both kinds share it."""

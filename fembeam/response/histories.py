@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from fembeam.response.contact_force import forces
 from fembeam.response.contact_log import PlacedLog
 from fembeam.response.mean_force import mean_force
-from fembeam.response.placed_shapes import PlacedShapes
 from fembeam.response.readout import Readout
 from fembeam.response.section_forces import extremes, frame_forces_of, rows_of
 from fembeam.scene import split, unit_of
@@ -134,7 +133,7 @@ class Histories:
         """All components (k, c) of a place, m and rad: those of `shapes.components`; of a beam u and u_z."""
         shapes = self._beam(body)
         place = shapes.place(place)
-        if isinstance(shapes, PlacedShapes):
+        if shapes.named:
             return self._q_of(body) @ shapes.motion_with_supports(place).T
         return self._q_of(body) @ np.array([shapes.rows_with_supports(place, i) for i in (0, 1)]).T
 
@@ -144,7 +143,7 @@ class Histories:
             direction, body, absolute = None, direction, absolute or body is True
         shapes = self._beam(body)
         at = shapes.place(z)
-        if isinstance(shapes, PlacedShapes):
+        if shapes.named:
             at = directed(at, direction)
             rows = shapes.rows_with_supports(at if isinstance(at, list) else [at])
             rows = rows if isinstance(at, list) else rows[0]
@@ -154,7 +153,7 @@ class Histories:
         values = self.with_supports(rates, shapes.moving, order) @ rows.T
         if not absolute:
             return values
-        if not isinstance(shapes, PlacedShapes):
+        if not shapes.named:
             return (values.T + frame_motion(self, order)).T
         ways = [split(one, shapes.components)[1] for one in (at if isinstance(at, list) else [at])]
         moved = np.array([frame_motion(self, order, way) for way in ways]).T
@@ -211,25 +210,28 @@ class Histories:
         z : places (j,) in m; None: all nodes of the mesh. Of other bodies a list of (place, direction) for
             displacement, of (member, distance) for section forces.
         """
-        shapes = self._beam(body)
-        z = shapes.place(z)
-        if isinstance(shapes, PlacedShapes):
-            given: Any = z
-            if given is None:
-                given = list(shapes.usual.values()) if quantity == "displacement" else self._sections(body)
-            at: Any = [given] if isinstance(given, tuple) else list(given)
-        else:
-            at = shapes.nodes if z is None else np.atleast_1d(numbers("z", z, "Run", "give m along the beam"))
+        if z is None and quantity != "displacement" and self._beam(body).named:
+            z = self._sections(body)
+        at = self._places(z, body)
         require(len(at) > 0, "z must not be empty", z, "Run.extremes", "leave it out for all of the body")
         q = self._q_of(body)
-        found = extremes(self.t, q, *rows_of(self, quantity, at, body))
+        found = extremes(self.t, q, at, *rows_of(self, quantity, at, body))
         if quantity in ("displacement", "slope"):
             return found
-        return found.with_others(extremes(self.t, q, *rows_of(self, quantity, at, body, behind=True)))
+        return found.with_others(extremes(self.t, q, at, *rows_of(self, quantity, at, body, behind=True)))
 
     def _q_of(self, body: int) -> Vector:
         """Coordinates at the samples, with the support dofs that move."""
         return self.with_supports(self.q, self._beam(body).moving)
+
+    def _places(self, z: Any, body: int = 0) -> Any:
+        """Places (j,) of a beam in m, None all its nodes; of another body a list, None the usual ones."""
+        shapes = self._beam(body)
+        at = shapes.place(z)
+        if shapes.named:
+            at = list(shapes.usual.values()) if at is None else at
+            return [at] if isinstance(at, tuple) else list(at)
+        return shapes.nodes if at is None else np.atleast_1d(numbers("z", at, "Run", "give m along the beam"))
 
     def _sections(self, body: int) -> list[Any]:
         """All nodes of the mesh of a frame, as (member, distance)."""
@@ -245,12 +247,12 @@ class Histories:
     def _field(self, quantity: str, z: ArrayLike, body: int) -> Vector:
         """A field over time: (k,) at one z, (k, j) at z (j,)."""
         z = self._beam(body).place(z)
-        if isinstance(self._beam(body), PlacedShapes):
-            shapes, _, offset = rows_of(self, quantity, z if isinstance(z, list) else [z], body)
+        if self._beam(body).named:
+            shapes, offset = rows_of(self, quantity, z if isinstance(z, list) else [z], body)
             along = self._q_of(body) @ shapes.T + offset
             return along if isinstance(z, list) else along[:, 0]
         places = numbers("z", z, "Run", "give m along the beam")
-        shapes, _, offset = rows_of(self, quantity, np.atleast_1d(places), body)
+        shapes, offset = rows_of(self, quantity, np.atleast_1d(places), body)
         values = self._q_of(body) @ shapes.T + offset
         return values if places.ndim else values[:, 0]
 
@@ -302,7 +304,7 @@ class Histories:
         return self._at_samples(self._deformation(self._stop(stop)))
 
     def _deformation(self, stop: int) -> Vector:
-        """δ (k,), of the last state without samples."""
+        """δ (k,) of a stop, one value without samples: of the last state."""
         if radius := self.circles[stop, 0]:
             return np.asarray(np.sign(radius) * np.linalg.norm(self._in_circle(stop), axis=1) - radius)
         return -self.q @ self.directions[self._rows[stop].start] - self.stops[stop, 2]
@@ -312,7 +314,7 @@ class Histories:
         return self._at_samples(self._deformation_rate(self._stop(stop)))
 
     def _deformation_rate(self, stop: int) -> Vector:
-        """δ̇ (k,), likewise."""
+        """δ̇ (k,) of a stop, likewise."""
         if self.circles[stop, 0]:
             rates = self.q_dot @ self.directions[self._rows[stop]][:2].T
             return np.asarray(np.sum(self._outward(stop) * rates, axis=1))

@@ -41,6 +41,7 @@ class PlacedShapes:
     more: Callable[[Any], Vector] | None = field(default=None, repr=False)
     carried: Vector = field(default_factory=lambda: np.zeros((0, 0, 0)), repr=False)
     parts: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    named = True
 
     def __repr__(self) -> str:
         return f"<{self.values.shape[2]} shapes at {len(self.known)} places>"
@@ -54,6 +55,13 @@ class PlacedShapes:
     def whole(self) -> Vector:
         """(p, c, n + k): the values, then what supports carry."""
         return np.concatenate([self.values, self.carried], axis=2) if self.moving else self.values
+
+    @cached_property
+    def translations(self) -> Vector:
+        """(p, 3, n + k) along x, y and z; 0 along those that places do not have."""
+        own = [self.components.index(name) if name in self.components else None for name in COMPONENTS[:3]]
+        still = np.zeros_like(self.whole[:, 0])
+        return np.stack([still if i is None else self.whole[:, i] for i in own], axis=1)
 
     @property
     def words(self) -> dict[str, Any]:
@@ -133,7 +141,7 @@ class PlacedShapes:
         return np.array([self._row(one) for one in at]).reshape(len(at), self.whole.shape[2])
 
     def _row(self, at: Any) -> Vector:
-        """(n + k,) of one."""
+        """(n + k,) of one (place, direction)."""
         place, along = split(at, self.components)
         require_components(along, self.components, f"the place {told(place)}", "phi")
         part = np.array([along[COMPONENTS.index(component)] for component in self.components])

@@ -19,7 +19,7 @@ from fembeam.beams import Beam, Section, Taper
 from fembeam.response.section_forces import SectionForces
 from fembeam.scene import FEATURES, heights, loads
 from fembeam.structures import Frame, FrameForces, FrameMesh, JoinedForces, Member, located_among
-from fembeam.support import require
+from fembeam.support import require, tuples
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -249,7 +249,7 @@ def _numbers(part: Any) -> dict[str, Any]:
 def _part(words: dict[str, Any]) -> tuple[Any, int]:
     """A support, spring (without the motion of its foot) or dashpot, and its body."""
     made, body = HOLDING[words.pop("kind")], int(words.pop("body"))
-    return made(**{name: tuple(value) if isinstance(value, list) else value for name, value in words.items()}), body
+    return made(**{name: tuples(value) for name, value in words.items()}), body
 
 
 def _beam_as_words(beam: Beam) -> dict[str, Any]:
@@ -259,7 +259,7 @@ def _beam_as_words(beam: Beam) -> dict[str, Any]:
 
 
 def _beam_of_words(words: Mapping[str, Any]) -> Beam:
-    """The same as a beam."""
+    """The beam that `_beam_as_words` wrote."""
     spans = [(length, _section(section)) for length, section in words["spans"]]
     return Beam.of_spans(spans, words["foundation"], words["axial_force"])
 
@@ -320,5 +320,4 @@ def _section(words: Mapping[str, Any]) -> Section | Taper:
     """A section or a taper of two; JSON has lists for tuples."""
     if "start" in words:
         return Taper(Section(**words["start"]), Section(**words["end"]))
-    plain: dict[str, Any] = {name: tuple(value) if isinstance(value, list) else value for name, value in words.items()}
-    return Section(**plain)
+    return Section(**{name: tuples(value) for name, value in words.items()})

@@ -62,15 +62,13 @@ class SectionForces:
 
     def moment(self, z: ArrayLike, behind: bool = False) -> Vector:
         """(k, n) at z (k,); at a point moment that of the element ahead, or ``behind``."""
-        element, x, h = self._places(z, behind)
-        (a, b), (da, db) = np.moveaxis(self.moments[element], 1, 0), np.moveaxis(self.shears[element], 1, 0)
+        a, b, da, db, x, h = self._around(z, behind)
         ends = (1 - x) ** 2 * (1 + 2 * x) * a + x**2 * (3 - 2 * x) * b
         return ends + h * x * (1 - x) * ((1 - x) * da - x * db)
 
     def shear(self, z: ArrayLike, behind: bool = False) -> Vector:
         """(k, n) at z (k,); at a point load that of the element ahead, or ``behind``."""
-        element, x, h = self._places(z, behind)
-        (a, b), (da, db) = np.moveaxis(self.moments[element], 1, 0), np.moveaxis(self.shears[element], 1, 0)
+        a, b, da, db, x, h = self._around(z, behind)
         return 6 * x * (1 - x) * (b - a) / h + (1 - x) * (1 - 3 * x) * da + x * (3 * x - 2) * db
 
     def stress(self, z: ArrayLike, behind: bool = False) -> Vector:
@@ -78,14 +76,15 @@ class SectionForces:
         profile = self.beam.profile(np.atleast_1d(z), behind)
         return self.moment(z, behind) * (profile.fibre / profile.I)[:, None]
 
-    def _places(self, z: ArrayLike, behind: bool) -> tuple[NDArray[np.int64], Vector, Vector]:
-        """Elements, local coordinates in [0, 1] and lengths, as columns."""
+    def _around(self, z: ArrayLike, behind: bool) -> tuple[Vector, ...]:
+        """Moments and shear forces at both ends of the elements; where in them in [0, 1], and lengths: as columns."""
         z = on_beam(np.atleast_1d(np.asarray(z, dtype=float)), self.beam, "fields")
         element = np.clip(
             np.searchsorted(self.nodes, z, side="left" if behind else "right") - 1, 0, len(self.nodes) - 2
         )
         h = self.nodes[element + 1] - self.nodes[element]
-        return element, ((z - self.nodes[element]) / h)[:, None], h[:, None]
+        ends = [kind[element, end] for kind in (self.moments, self.shears) for end in (0, 1)]
+        return *ends, ((z - self.nodes[element]) / h)[:, None], h[:, None]
 
 
 def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | FrameForces | JoinedForces | None:
@@ -100,9 +99,8 @@ def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | Fram
     if beam.coupling is not None:
         rows = sparse.vstack([rows, beam.coupling[::3]])
     inertia, load = _inertia(beam, vectors, model.omega, rows.toarray().T)
-    inertia = _everywhere(beam, inertia)
-    carried = carried_on(model.scene, beam, body)
-    moved = np.hstack([_everywhere(beam, vectors), carried])
+    inertia, carried = beam.spread @ inertia, carried_on(model.scene, beam, body)
+    moved = np.hstack([beam.spread @ vectors, carried])
     # less the inertia of the shapes which follow supports: they have none
     inertia = np.hstack([inertia, -inertia @ model.following.T])
     if isinstance(beam, BodyMatrices):
@@ -172,15 +170,6 @@ def _of_vectors(beam: Matrices, vectors: Vector, inertia: Vector) -> SectionForc
     )
 
 
-def _everywhere(beam: Matrices, values: Vector) -> Vector:
-    """Values (N, n) on free dofs as (N_all, n) on all, zero at supports."""
-    if isinstance(beam, BodyMatrices):
-        return np.asarray(beam.spread @ values)
-    full = np.zeros((beam.dofs.size, values.shape[1]))
-    full[beam.dofs.ravel() >= 0] = values
-    return full
-
-
 @dataclass(frozen=True, eq=False)
 class Extremes:
     """Least and greatest values over a run, place by place.
@@ -208,7 +197,7 @@ class Extremes:
         return float(self.highest[high]), _place(self.z[high]), float(self.t_highest[high])
 
     def with_others(self, other: Extremes) -> Extremes:
-        """Those of two sets of values at the same places: the lesser and the greater ones."""
+        """The lesser and the greater ones of two sets of values at the same places."""
         less, more = other.lowest < self.lowest, other.highest > self.highest
         return Extremes(
             self.z,
@@ -224,8 +213,8 @@ def _place(z: Any) -> Any:
     return z if isinstance(z, tuple) else float(z)
 
 
-def extremes(t: Vector, q: Vector, shapes: Vector, z: Any, offset: Vector) -> Extremes:
-    """Extremes of q (k, n) @ shapes (j, n).T + offset (j,), some places at a time."""
+def extremes(t: Vector, q: Vector, z: Any, shapes: Vector, offset: Vector) -> Extremes:
+    """Extremes at places z (j,) of q (k, n) @ shapes (j, n).T + offset (j,), some places at a time."""
     found = np.empty((4, len(z)))
     step = max(1, 2_000_000 // max(len(t), 1))
     for first in range(0, len(z), step):
@@ -237,33 +226,31 @@ def extremes(t: Vector, q: Vector, shapes: Vector, z: Any, offset: Vector) -> Ex
     return Extremes(z, *found)
 
 
-def rows_of(run: Histories, quantity: str, z: Any, body: int, behind: bool = False) -> tuple[Vector, Any, Vector]:
-    """What turns q into a field: shapes (j, n), the places themselves, a constant part (j,).
+def rows_of(run: Histories, quantity: str, z: Any, body: int, behind: bool = False) -> tuple[Vector, Vector]:
+    """What turns q into a field: shapes (j, n) and a constant part (j,).
 
     ``behind``: of section forces those behind places where they jump, else those ahead.
     """
     if isinstance(z, list):  # of a body with places by name
         if quantity != "displacement":
             return _rows_of_frame(run, quantity, z, body, behind)
-        return (run.shapes, *run.others)[body].rows_with_supports(z), z, np.zeros(len(z))
+        return (run.shapes, *run.others)[body].rows_with_supports(z), np.zeros(len(z))
     known = ("displacement", "slope", "moment", "shear", "stress")
     require(quantity in known, f"quantity must be one of {', '.join(known)}", quantity, "Run", "choose one")
     if quantity in known[:2]:
-        return (run.shapes, *run.others)[body].rows_with_supports(z, known.index(quantity)), z, np.zeros(len(z))
+        return (run.shapes, *run.others)[body].rows_with_supports(z, known.index(quantity)), np.zeros(len(z))
     forces = run.readout.section_forces[body]
     rows = getattr(forces, quantity)(z, behind)
     if quantity != "stress":
-        return rows, z, np.zeros(len(z))
+        return rows, np.zeros(len(z))
     bare = ~np.isfinite(rows).all(axis=1)
     require(not bare.any(), "every section must know its outer fibre", z[bare][:1].tolist(), "Run.stress",
             "give Section(..., fibre=)")  # fmt: skip
-    return rows, z, forces.beam.axial_force / forces.beam.profile(z, behind).A
+    return rows, forces.beam.axial_force / forces.beam.profile(z, behind).A
 
 
-def _rows_of_frame(
-    run: Histories, quantity: str, places: list[Any], body: int, behind: bool
-) -> tuple[Vector, Any, Vector]:
-    """The same of section forces and stress along the members of a frame."""
+def _rows_of_frame(run: Histories, quantity: str, places: list[Any], body: int, behind: bool) -> tuple[Vector, Vector]:
+    """`rows_of` of section forces and stress along the members of a frame."""
     forces = frame_forces_of(run, body, quantity)
     known = (*forces.names, "stress")
     quantity = {"moment": "M", "shear": "Q"}.get(quantity, quantity)
@@ -273,7 +260,7 @@ def _rows_of_frame(
         forces.stress(z, behind=behind) if quantity == "stress" else forces.rows(z, (quantity,), behind)[0]
         for z in places
     ]
-    return np.array(rows), places, np.array([forces.preload(z, quantity) for z in places])
+    return np.array(rows), np.array([forces.preload(z, quantity) for z in places])
 
 
 def frame_forces_of(run: Histories, body: int, quantity: str = "a section force") -> FrameForces | JoinedForces:

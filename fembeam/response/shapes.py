@@ -27,6 +27,7 @@ class Shapes:
     values: Vector
     carried: Vector = field(default_factory=lambda: np.zeros((0, 0)), repr=False)
     parts: Mapping[str, float] = field(default_factory=dict, repr=False)  # z of those that have a name
+    named = False  # whether places have names and directions, see `PlacedShapes`
 
     def __repr__(self) -> str:
         return f"<{self.values.shape[1]} shapes over {self.nodes[0]:g} to {self.nodes[-1]:g} m>"

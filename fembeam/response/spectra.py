@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.support import numbers, require
+from fembeam.support import numbers, require, vector
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -164,18 +164,15 @@ def checked_oscillators(omega: ArrayLike | None, periods: ArrayLike | None) -> V
     require((omega is None) != (periods is None), "give omega or periods, one of them", (omega, periods),
             "response_spectrum", "omega in rad/s, or periods in s")  # fmt: skip
     name, given = ("omega", omega) if periods is None else ("periods", periods)
-    values = np.atleast_1d(numbers(name, given, "response_spectrum", "give at least one"))
-    valid = values.ndim == 1 and values.size > 0 and bool(np.all(np.isfinite(values) & (values > 0)))
-    require(valid, f"{name} must be positive and finite", given, "response_spectrum", "give at least one")
+    values = vector(name, given, "response_spectrum", "give at least one", "must be positive and finite",
+                    lambda x: np.isfinite(x) & (x > 0))  # fmt: skip
     return values if periods is None else 2 * np.pi / values
 
 
 def checked_damping(zeta: ArrayLike) -> Vector:
     """Damping ratios (d,)."""
-    values = np.atleast_1d(numbers("zeta", zeta, "response_spectrum", "give ratios such as 0.05"))
-    valid = values.ndim == 1 and values.size > 0 and bool(np.all((values >= 0) & (values < 1)))
-    require(valid, "zeta must be at least 0 and below 1", zeta, "response_spectrum", "give ratios such as 0.05")
-    return values
+    return vector("zeta", zeta, "response_spectrum", "give ratios such as 0.05", "must be at least 0 and below 1",
+                  lambda x: (x >= 0) & (x < 1))  # fmt: skip
 
 
 def _largest(step: float, record: Vector, omega: float, zeta: float) -> Vector:

@@ -165,7 +165,7 @@ def reactions(run: Histories) -> Reactions:
     found: list[Reaction] = []
     for (part, body), row in pairs:
         values = row @ histories
-        if hasattr(beams[body], "components"):
+        if beams[body].named:
             found.append(BodyReaction(part, body, run.t, values[:3].T, values[3:].T))
         else:
             found.append(Reaction(part, body, run.t, *(values if len(values) == 2 else (values[1], -values[3]))))
@@ -244,8 +244,10 @@ def _acting(model: Model, full: Matrices) -> Vector:
     pushed = sparse.vstack([sparse.csr_matrix((0, size)), *rows]).toarray().T
     moved = [*scene.motions, *scene.pulls]
     frame = -np.array([full.base_loads[direction] for direction in moved]).reshape(-1, size).T
-    vectors, damped = np.zeros((size, len(model.omega))), np.zeros((size, len(model.omega)))
-    vectors[:] = _on_all(model.matrices, full) @ model.basis.vectors
+    spread = [beam.spread for beam in model.matrices.beams]  # of massless dofs to what they follow
+    spread.append(sparse.eye(len(full.impactors)))
+    vectors = sparse.block_diag(spread, format="csr") @ model.basis.vectors
+    damped = np.zeros_like(vectors)
     for part, body, rates in _dashpots(model):
         if part.along is not None:
             damped += full.row(part.z, part.along, body).T @ rates
@@ -263,18 +265,6 @@ def _own_damping(full: Matrices) -> sparse.csr_matrix:
     own = [beam.assembled.C if isinstance(beam, BodyMatrices) else None for beam in full.beams]
     parts = [sparse.csr_matrix(beam.M.shape) if C is None else C for beam, C in zip(full.beams, own, strict=True)]
     return sparse.block_diag([*parts, sparse.csr_matrix(2 * (len(full.impactors),))], format="csr")
-
-
-def _on_all(matrices: Matrices, full: Matrices) -> sparse.csr_matrix:
-    """(N_all, N): the free dofs of all bodies among all; of massless ones what they follow."""
-    parts = []
-    for beam in matrices.beams:
-        if isinstance(beam, BodyMatrices):
-            parts.append(beam.spread)
-        else:
-            kept = np.flatnonzero(np.ravel(beam.dofs) >= 0)
-            parts.append(sparse.eye(beam.dofs.size, format="csr")[:, kept])
-    return sparse.block_diag([*parts, sparse.eye(len(full.impactors))], format="csr")
 
 
 class _Held:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.scene import signals_of, split, unit_of
 from fembeam.structures import COMPONENTS, turns
-from fembeam.support import is_finite, numbers, require
+from fembeam.support import is_finite, require, vector
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -96,7 +96,7 @@ def _of_support(model: Model, omega: Vector, driven: str, output: Any, body: int
     require(driven in names, f"input must be one of {', '.join(names) or 'none, as no support moves'}", driven, WHERE,
             "use one")  # fmt: skip
     shapes, n, k = (model.shapes, *model.others)[body], len(model.omega), names.index(driven)
-    alone = hasattr(shapes, "components") and not isinstance(output, list)
+    alone = shapes.named and not isinstance(output, list)
     rows = shapes.rows_with_supports([output] if alone else output)
     rows = rows[0] if alone else rows
     vectors = [np.asarray(model.system.loads[3 * k + order][0]) for order in range(3)]
@@ -109,7 +109,7 @@ def _of_support(model: Model, omega: Vector, driven: str, output: Any, body: int
 
 def _unit(unit: str, shapes: Any, output: Any) -> str:
     """The unit with rad for m where rotations are asked for."""
-    if not hasattr(shapes, "components"):
+    if not shapes.named:
         return unit
     at = output if isinstance(output, list) else [output]
     return unit.replace("m", unit_of("indentation", [turns(split(one, shapes.components)[1]) for one in at]), 1)
@@ -117,7 +117,7 @@ def _unit(unit: str, shapes: Any, output: Any) -> str:
 
 def _shown(shapes: Any, output: Any) -> Any:
     """The places as they were named, of a beam as numbers."""
-    return output if hasattr(shapes, "components") else np.array(output, dtype=float)[()]
+    return output if shapes.named else np.array(output, dtype=float)[()]
 
 
 def _carried_along(model: Model, driven: str | float, output: Any) -> Any:
@@ -169,9 +169,8 @@ def _driving(model: Model, driven: Any) -> tuple[Vector, int, str, str]:
 
 def _checked(omega: ArrayLike, model: Model, slipping: bool) -> Vector:
     """Frequencies (k,) at which the system is not singular."""
-    values = np.atleast_1d(numbers("omega", omega, WHERE, "give frequencies in rad/s"))
-    valid = values.ndim == 1 and values.size > 0 and bool(np.all(np.isfinite(values) & (values >= 0)))
-    require(valid, "omega must be at least 0 and finite, (k,)", omega, WHERE, "give frequencies in rad/s")
+    values = vector("omega", omega, WHERE, "give frequencies in rad/s", "must be at least 0 and finite, (k,)",
+                    lambda x: np.isfinite(x) & (x >= 0))  # fmt: skip
     C, K = _linear(model, slipping)
     natural = np.sqrt(np.maximum(np.linalg.eigvalsh(K), 0.0)) if model.scene.elements else model.omega
     singular = np.isin(values, natural[natural == 0.0] if np.any(C) else natural)

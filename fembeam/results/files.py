@@ -249,7 +249,7 @@ def json_text(content: Any, escaped: bool = False) -> str:
 
 
 def print_json(content: Any) -> None:
-    """On stdout, in ASCII unless its encoding is a Unicode one."""
+    """Print JSON, in ASCII unless its encoding is a Unicode one."""
     print(json_text(content, escaped="utf" not in (getattr(sys.stdout, "encoding", None) or "").lower()))
 
 
@@ -261,7 +261,7 @@ def write_json(target: Path, content: dict[str, Any]) -> Path:
 
 
 def _finite(value: Any) -> Any:
-    """The same with None for NaN and infinities."""
+    """A value with None for NaN and infinities."""
     if isinstance(value, dict):
         return {key: _finite(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):

@@ -82,7 +82,8 @@ def page(title: str, body: str) -> str:
 
 def _sections(files: Sequence[Path], source: Source | None, warnings: Sequence[str]) -> Iterator[str]:
     """The page from top to bottom."""
-    found = next((_json(path) for path in files if path.name == "summary.json"), {})
+    summaries = (path.read_text(encoding="utf-8") for path in files if path.name == "summary.json")
+    found = json.loads(next(summaries, "{}"))
     if found:
         yield _status(found)
     if warnings:
@@ -95,12 +96,6 @@ def _sections(files: Sequence[Path], source: Source | None, warnings: Sequence[s
             yield from _text(path.read_text(encoding="utf-8"))
     yield from _figures(files)
     yield from _settings(found, source)
-
-
-def _json(path: Path) -> dict[str, Any]:
-    """A JSON file."""
-    found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    return found
 
 
 def _status(found: dict[str, Any]) -> str:

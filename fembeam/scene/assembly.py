@@ -101,6 +101,11 @@ class Matrices:
     limit: dict[str, float] = field(default_factory=dict)
     named = False  # whether its places have names and directions, see `BodyMatrices`
 
+    @cached_property
+    def spread(self) -> sparse.csr_matrix:
+        """S (N_all, N): the free dofs of the scene's own beam among all, zero at supports."""
+        return sparse.eye(self.dofs.size, format="csr")[:, np.flatnonzero(self.dofs.ravel() >= 0)]
+
     @property
     def base_loads(self) -> dict[str, Vector]:
         """The load (N,) of every direction in which the frame may move: of a beam "y" alone."""
@@ -126,11 +131,14 @@ class Matrices:
 
     def loosened(self, scene: Scene) -> Matrices:
         """The matrices of the scene's own body without its supports, on all dofs of the same mesh."""
-        found = _on_nodes(scene, self.nodes, self.modes)
+        found = self._on_all(scene)
         if self.carried is None:
             return found
-        loads = moving(found.M, found.K, found.dashpots, sparse.eye(found.M.shape[0], format="csr"), self.carried)
-        return replace(found, **loads)
+        return replace(found, **moving(found.M, found.K, found.dashpots, found.spread, self.carried))
+
+    def _on_all(self, scene: Scene) -> Matrices:
+        """Matrices of a scene without supports, on the same mesh."""
+        return _on_nodes(scene, self.nodes, self.modes)
 
     @property
     def elements(self) -> int:
@@ -150,15 +158,14 @@ class Matrices:
         """
         own = self.beams[body]
         places = on_beam(np.atleast_1d(np.asarray(z, dtype=float)), own.beam, "interpolation")
-        rows = hermite_rows(own.nodes, places, derivative)[:, np.flatnonzero(own.dofs.ravel() >= 0)]
-        return self.among_all(rows, body)
+        return self.among_all(hermite_rows(own.nodes, places, derivative) @ own.spread, body)
 
     def row(self, place: Any, along: Six, body: int = 0) -> sparse.csr_matrix:
         """Row (1, N): the motion of a body's place along a direction, six numbers."""
         return self.among_all(self.beams[body].own_row(place, along), body)
 
     def own_row(self, place: Any, along: Six) -> sparse.csr_matrix:
-        """The same on the body's own dofs: of a beam u along y and -u_z about x."""
+        """`row` on the body's own dofs: of a beam u along y and -u_z about x."""
         require_components(along, ("y", "rx"), "a Beam bends in one plane: its places", f"{told(place)} of a Beam")
         return along[1] * self.interpolation(place) - along[3] * self.interpolation(place, 1)
 
@@ -364,7 +371,7 @@ def buckling_load(scene: Scene, elements: int | None = None) -> float:
 
 
 def _on_nodes(scene: Scene, nodes: Vector, modes: int | None) -> Matrices:
-    """The assembly itself."""
+    """Matrices of the own beam with elements between these nodes."""
     fixed = np.zeros((len(nodes), 2), dtype=bool)
     for support in scene.supports:
         fixed[np.argmin(np.abs(nodes - support.z))] |= support.fixed
@@ -388,7 +395,7 @@ def _on_nodes(scene: Scene, nodes: Vector, modes: int | None) -> Matrices:
     carried = _carried(scene, nodes)
     if carried is None:
         return found
-    return replace(found, **moving(M_all, K_all, C_all, sparse.eye(len(r), format="csr")[:, free], carried))
+    return replace(found, **moving(M_all, K_all, C_all, found.spread, carried))
 
 
 def _carried(scene: Scene, nodes: Vector) -> sparse.csr_matrix | None:

@@ -18,9 +18,19 @@ from scipy import sparse
 import reduction
 from fembeam.scene.assembly import DEFAULT_MODES, UNIT, Matrices, Vector, moved_by_rows, moving
 from fembeam.scene.places import place_words, told
-from fembeam.scene.rotors import Disk, gyroscopic, turned
+from fembeam.scene.rotors import Disk, gyroscopic, shaft_axes
 from fembeam.scene.signals import support_motion
-from fembeam.structures import COMPONENTS, Assembled, Frame, Six, check_buckling, following, named
+from fembeam.structures import (
+    COMPONENTS,
+    Assembled,
+    Frame,
+    Six,
+    arm_matrix,
+    check_buckling,
+    following,
+    named,
+    rows_along,
+)
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -53,7 +63,7 @@ class BodyMatrices(Matrices):
 
     def own_row(self, place: Any, along: Six) -> sparse.csr_matrix:
         """The motion (1, N) of a place along a direction, on the body's own free dofs."""
-        return (row_of(self.beam, self.assembled, place, along) @ self.spread).tocsr()
+        return (rows_along(self.beam, self.assembled, place, along) @ self.spread).tocsr()
 
     def rows_at(self, place: Any) -> sparse.csr_matrix:
         """All components (c, N) of a place, on the body's own free dofs."""
@@ -61,14 +71,11 @@ class BodyMatrices(Matrices):
 
     def _row_on_all(self, place: Any, along: Six) -> sparse.csr_matrix:
         """Row (1, N_all) of a place along a direction, supported dofs included."""
-        return row_of(self.beam, self.assembled, place, along)
+        return rows_along(self.beam, self.assembled, place, along)
 
-    def loosened(self, scene: Scene) -> Matrices:
-        """The matrices without supports, on all dofs, those without mass too."""
-        found = _of(scene, self.assembled, self.modes, held=np.zeros(0, dtype=int), condense=False)
-        if self.carried is None:
-            return found
-        return replace(found, **moving(found.M, found.K, found.dashpots, found.spread, self.carried))
+    def _on_all(self, scene: Scene) -> Matrices:
+        """Matrices of a scene without supports, on dofs without mass too."""
+        return _of(scene, self.assembled, self.modes, held=np.zeros(0, dtype=int), condense=False)
 
     def frequency_error(self, omega: ArrayLike) -> Vector:
         """Zeros: the matrices are what the structure is."""
@@ -99,12 +106,6 @@ def respun(matrices: Matrices, before: Scene, after: Scene) -> BodyMatrices | No
     ratio = spins[1] / spins[0]
     body = replace(matrices.assembled, gyroscopic=ratio * own)
     return replace(matrices, beam=after.beam, assembled=body, gyroscopic=ratio * both)
-
-
-def row_of(body: Any, assembled: Assembled, place: Any, along: Six) -> sparse.csr_matrix:
-    """The motion (1, N_all) of a place along a direction, on all dofs."""
-    part = [along[COMPONENTS.index(component)] for component in body.components]
-    return (sparse.csr_matrix([part]) @ assembled.rows(place)).tocsr()
 
 
 def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes: Sequence[Any]) -> BodyMatrices:
@@ -167,7 +168,7 @@ def _warn_of_massless(scene: Scene, matrices: BodyMatrices) -> None:
     bare = {matrices.assembled.labels.index(label) for label in matrices.massless}
     for name in ("stops", "elements", "forces") if bare else ():
         for index, part in enumerate(getattr(scene, name)):
-            rows = [row_of(scene.beam, matrices.assembled, part.z, place.along) for place in part.coordinates]
+            rows = [rows_along(scene.beam, matrices.assembled, part.z, place.along) for place in part.coordinates]
             if hit := bare & {dof for row in rows for dof in row.indices.tolist()}:
                 label = matrices.assembled.labels[min(hit)]
                 warnings.warn(f"{name}[{index}] acts on {label}, a dof without mass that follows the others: its own "
@@ -212,7 +213,7 @@ def _holding(scene: Scene) -> dict[Any, list[str]]:
 
 
 def _of(scene: Scene, assembled: Assembled, modes: int | None, held: Any, condense: bool) -> BodyMatrices:
-    """The assembly itself."""
+    """Matrices of the body once assembled, with the parts that stand on it, supports held."""
     M, K, C, root = _with_parts(scene, assembled)
     free = np.setdiff1d(np.arange(M.shape[0]), held)
     labels = [assembled.labels[i] for i in free]
@@ -271,26 +272,17 @@ def _dashpots(scene: Scene, assembled: Assembled) -> sparse.csr_matrix:
 
 def _strengthened(scene: Scene, assembled: Assembled, parts: list[tuple[Any, float]]) -> sparse.csr_matrix:
     """Rows √k n of springs or dashpots, so that rowsᵀ rows is their matrix."""
-    rows = [np.sqrt(size) * row_of(scene.beam, assembled, part.z, part.along) for part, size in parts]
+    rows = [np.sqrt(size) * rows_along(scene.beam, assembled, part.z, part.along) for part, size in parts]
     return sparse.vstack([sparse.csr_matrix((0, assembled.M.shape[0])), *rows], format="csr")
 
 
 def _arms(assembled: Assembled, scene: Scene, mass: Any) -> sparse.csr_matrix:
     """Rows A of a rigid body on a place, AᵀA its mass matrix: √m (u + θ × e), then √J θ."""
-    at, components = assembled.rows(mass.z).tocsr(), scene.beam.components
-    none = sparse.csr_matrix((1, at.shape[1]))
-    u, theta = ([at[components.index(c)] if c in components else none for c in group]
-                for group in (COMPONENTS[:3], COMPONENTS[3:]))  # fmt: skip
-    ex, ey, ez = mass.offset if isinstance(mass.offset, tuple) else (0.0, 0.0, float(mass.offset))
+    offset = mass.offset if isinstance(mass.offset, tuple) else (0.0, 0.0, float(mass.offset))
     J = np.array(mass.inertia if isinstance(mass.inertia, tuple) else 3 * (mass.inertia,))
-    about = turned(mass, scene.beam, assembled) if isinstance(mass, Disk) else theta
-    arm = [
-        u[0] + ez * theta[1] - ey * theta[2],
-        u[1] + ex * theta[2] - ez * theta[0],
-        u[2] + ey * theta[0] - ex * theta[1],
-    ]
-    spun = sparse.csr_matrix(_root_of(J)) @ sparse.vstack(about)
-    return sparse.vstack([*(np.sqrt(mass.mass) * row for row in arm), spun], format="csr")
+    axes = shaft_axes(mass, scene.beam) if isinstance(mass, Disk) else np.eye(6)[3:]
+    along = np.vstack([np.sqrt(mass.mass) * arm_matrix(offset)[:3], _root_of(J) @ axes])
+    return rows_along(scene.beam, assembled, mass.z, along)
 
 
 def _root_of(J: Vector) -> Vector:

@@ -23,6 +23,11 @@ def is_body(value: Any) -> bool:
     return all(callable(getattr(value, name, None)) for name in ("assembled", "check_place", "position", "lines"))
 
 
+def choice(scene: Scene) -> str:
+    """For messages: which further bodies a scene has."""
+    return f"1 to {len(scene.bodies)}" if scene.bodies else "and there is none"
+
+
 def components_at(body: Any, place: Any) -> tuple[str, ...]:
     """The components that a place of a body has."""
     ask = getattr(body, "components_at", None)
@@ -80,8 +85,7 @@ def check_ends(scene: Scene) -> None:
                 continue
             number, place = second
             known = 0 <= number < len(bodies)
-            among = f"1 to {len(scene.bodies)}" if scene.bodies else "and there is none"
-            require(known, f"{key} must name a body, {among}", number, where, "add it to bodies")
+            require(known, f"{key} must name a body, {choice(scene)}", number, where, "add it to bodies")
             require(number > 0 or place != part.z, f"{key} must be another place", place, where,
                     "leave it out for an end on the frame")  # fmt: skip
             for one in part.coordinates:

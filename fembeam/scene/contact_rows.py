@@ -21,7 +21,6 @@ from scipy import sparse
 
 from fembeam.excitation import Harmonic
 from fembeam.scene.annular_stop import AnnularStop
-from fembeam.scene.body_assembly import BodyMatrices
 from fembeam.scene.body_checks import components_at
 from fembeam.scene.element import force_both_ways
 from fembeam.scene.local_coordinate import LocalCoordinate
@@ -125,7 +124,7 @@ def contact_rows(scene: Scene, matrices: Matrices) -> list[ContactRow]:
 
 
 def _contact_rows(scene: Scene, matrices: Matrices) -> Iterator[ContactRow]:
-    """The same, one by one."""
+    """All contacts, not yet told apart by name."""
     count = 0
     for body, part in enumerate((scene, *scene.bodies)):
         for one in part.acting:
@@ -225,8 +224,7 @@ def support_loads(scene: Scene, matrices: Matrices) -> list[tuple[sparse.csr_mat
 def carried_on(scene: Scene, beam: Matrices, body: int) -> Vector:
     """(N_all, k): what each of the k dofs of supports that move, of all bodies, carries on the dofs of one."""
     counts = [sum(len(support_motion(s)) for s in part.supports) for part in (scene, *scene.bodies)]
-    first, size = sum(counts[:body]), beam.spread.shape[0] if isinstance(beam, BodyMatrices) else beam.dofs.size
-    found = np.zeros((size, sum(counts)))
+    first, found = sum(counts[:body]), np.zeros((beam.spread.shape[0], sum(counts)))
     if beam.carried is not None:
         found[:, first : first + counts[body]] = beam.carried.toarray()
     return found

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING, Any
 
-from fembeam.scene.body_checks import is_body
+from fembeam.scene.body_checks import choice, is_body
 from fembeam.scene.part_places import SECOND
+from fembeam.scene.places import scene_words
 from fembeam.structures import JoinedBodies
 from fembeam.support import is_numbered, require
 
@@ -28,7 +29,7 @@ def merged(scene: Scene, features: Sequence[str]) -> dict[str, Any]:
     count = _count(scene)
     joined = (scene, *scene.bodies[:count])
     for number, one in enumerate(joined):
-        where = f"bodies[{number - 1}] of Scene" if number else "Scene"
+        where = scene_words(number)
         require(is_body(one.beam), "joints must be of frames and structures", one.beam, where,
                 "make a Beam a Frame.straight")  # fmt: skip
         same = number == 0 or one.damping in (type(scene).damping, scene.damping)
@@ -46,8 +47,7 @@ def _count(scene: Scene) -> int:
     """How many of the bodies are joined; they come first."""
     named = {number for joint in scene.joints for number in (joint.body, joint.to[0])}
     beyond = [number for number in named if number > len(scene.bodies)]
-    among = f"1 to {len(scene.bodies)}" if scene.bodies else "and there is none"
-    require(not beyond, f"a joint must name a body, {among}", beyond, "joints of Scene", "add it to bodies")
+    require(not beyond, f"a joint must name a body, {choice(scene)}", beyond, "joints of Scene", "add it to bodies")
     count = max(named)
     skipped = sorted(set(range(count + 1)) - named)
     require(not skipped, "joined bodies must come before the others", skipped, "bodies of Scene",

@@ -79,6 +79,11 @@ def told(place: Any) -> str:
     return f"{place!r}" if isinstance(place, str) else f"z = {place}"
 
 
+def scene_words(body: int) -> str:
+    """For messages: the scene itself, or a further body of it by its number."""
+    return f"bodies[{body - 1}] of Scene" if body else "Scene"
+
+
 def place_words(place: Any) -> str:
     """A place as names have it: a number is z in m.
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fembeam.scene.places import scene_words
 from fembeam.scene.signals import signals_of
 
 if TYPE_CHECKING:
@@ -50,10 +51,14 @@ def drifting(scene: Scene) -> list[str]:
         if beam.named:
             continue  # known when its matrices are: see `fembeam.model.reduce`
         if loaded and not _held(scene, index) and (count := rigid_body_modes(beam)):
-            what = "1 rigid-body mode appears" if count == 1 else f"{count} rigid-body modes appear"
-            where = f"bodies[{index - 1}] of Scene" if index else "Scene"
-            found.append(f"{what} in {where}: supports and springs do not hold the beam, its loads may carry it away")
+            found.append(carried_away(count, index, "beam"))
     return found
+
+
+def carried_away(modes: int, body: int, kind: str) -> str:
+    """The warning of so many rigid-body modes of a beam or structure that is loaded."""
+    what = "1 rigid-body mode appears" if modes == 1 else f"{modes} rigid-body modes appear"
+    return f"{what} in {scene_words(body)}: supports and springs do not hold the {kind}, its loads may carry it away"
 
 
 def _held(scene: Scene, index: int) -> bool:

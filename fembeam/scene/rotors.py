@@ -17,7 +17,7 @@ from scipy import sparse
 from fembeam.excitation import Harmonic
 from fembeam.scene.local_coordinate import LocalCoordinate
 from fembeam.scene.part import ScenePart
-from fembeam.structures import COMPONENTS, Assembled, Direction
+from fembeam.structures import Assembled, Direction, rows_along
 from fembeam.support import require, require_finite, require_non_negative
 
 SLACK = 1e-9  # of the polar moment of a thin disk
@@ -151,11 +151,9 @@ def driven(body: Any, forces: tuple[Any, ...]) -> tuple[Any, ...]:
     return tuple(found)
 
 
-def turned(disk: Disk, body: Any, assembled: Assembled) -> list[sparse.csr_matrix]:
-    """Rows (1, N_all) of a disk's rotations about the three axes of the shaft."""
-    rows = assembled.rows(disk.z).tocsr()
-    theta = [rows[body.components.index(c)] if c in body.components else 0.0 * rows[0] for c in COMPONENTS[3:]]
-    return [sum(axis[j] * theta[j] for j in range(3)).tocsr() for axis in carrier(body, disk.z).axes[0]]
+def shaft_axes(disk: Disk, body: Any) -> NDArray[np.float64]:
+    """Rotations (3, 6) about the three axes of the shaft that carries a disk."""
+    return np.hstack([np.zeros((3, 3)), carrier(body, disk.z).axes[0]])
 
 
 def gyroscopic(scene: Any, assembled: Assembled) -> sparse.csr_matrix | None:
@@ -165,7 +163,7 @@ def gyroscopic(scene: Any, assembled: Assembled) -> sparse.csr_matrix | None:
         spin = carrier(scene.beam, disk.z).spin
         if spin == 0.0:
             continue
-        first, second, _ = turned(disk, scene.beam, assembled)
+        first, second, _ = rows_along(scene.beam, assembled, disk.z, shaft_axes(disk, scene.beam))
         half = disk.polar * spin * (first.T @ second)
         G = half - half.T if G is None else G + half - half.T
     return None if G is None else sparse.csr_matrix(G)

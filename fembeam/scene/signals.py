@@ -51,7 +51,7 @@ def persistent_drive(scene: Scene) -> bool | None:
 
 
 def _listed(scene: Scene) -> Iterator[tuple[str, Any]]:
-    """The same, one by one."""
+    """Paths and signals, one by one."""
     if isinstance(scene.base, dict):
         yield from ((f"base.{direction}", motion) for direction, motion in scene.base.items())
     elif scene.base is not None:

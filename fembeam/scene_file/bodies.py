@@ -53,9 +53,7 @@ def _changed(reader: TableReader, body: Any, table: Mapping[str, Any], where: st
             reader.fail(where, f"reduced must be a table {{ nodes = […], modes = … }}, got {options!r}")
         known = [key for key in REDUCED if key != "elements" or hasattr(body, "members")]
         reader.check_keys(options, known, f"{where} reduced", "key")
-        missing = [key for key in REDUCED[:2] if key not in options]
-        if missing:
-            reader.fail(f"{where} reduced", f"the key {missing[0]!r} is missing; it needs nodes and modes")
+        reader.need(options, REDUCED[:2], f"{where} reduced", "; it needs nodes and modes")
         if not isinstance(options["nodes"], list):
             reader.fail(f"{where} reduced", f"nodes must be a list of names, got {options['nodes']!r}")
         body = reader.made(body.reduced, dict(options), f"{where} reduced")
@@ -111,9 +109,8 @@ def joint(reader: TableReader, table: Any, number: int) -> Joint:
     """One of [[joints]]: `at` a place, `to` = [number of the other body, place there], `dofs`, `body`."""
     where = f"[[joints]] number {number}"
     reader.check_keys(table, JOINT, where, "key")
+    reader.need(table, JOINT[:2], where, "; a joint has at = a place, to = [1, a place there]")
     for key in JOINT[:2]:
-        if key not in table:
-            reader.fail(where, f"the key {key!r} is missing; a joint has at = a place, to = [1, a place there]")
         if not is_place(table[key]):
             reader.fail(where, f"{key} must name a place, got {table[key]!r}")
     values = {"place": tuples(table["at"]), "to": tuples(table["to"])}

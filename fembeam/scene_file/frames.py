@@ -20,15 +20,11 @@ MEMBER = ("up", "name", "release", "offset", "axial_force", "foundation")  # bes
 def frame(reader: TableReader, table: Mapping[str, Any]) -> Frame:
     """The frame of a table: `nodes` and `members`, or `mesh` and `sections`; `spin`, `bending_only`."""
     where = "[frame]"
-    if not isinstance(table, dict):
-        reader.fail(where, f"must be a table, got {table!r}")
     options = {key: table[key] for key in OPTIONS if key in table}
     if "mesh" in table:
         return _of_mesh(reader, table, options)
     reader.check_keys(table, (*DRAWN, *OPTIONS), where, "key")
-    for key in DRAWN:
-        if key not in table:
-            reader.fail(where, f"the key {key!r} is missing: nodes = {{ A = [0, 0], … }} and [[frame.members]]")
+    reader.need(table, DRAWN, where, ": nodes = { A = [0, 0], … } and [[frame.members]]")
     if not isinstance(table["members"], list):
         reader.fail(where, "members must be tables [[frame.members]] with nodes and section")
     members = [one for number, entry in enumerate(table["members"], start=1) for one in _members(reader, entry, number)]
@@ -42,9 +38,7 @@ def _members(reader: TableReader, entry: Any, number: int) -> list[Member]:
     if not isinstance(entry, dict):
         reader.fail(where, f"must be a table, got {entry!r}")
     reader.check_keys(entry, ("nodes", "section", *MEMBER), where, "key")
-    for key in ("nodes", "section"):
-        if key not in entry:
-            reader.fail(where, f"the key {key!r} is missing")
+    reader.need(entry, ("nodes", "section"), where)
     chain = entry["nodes"]
     if not (isinstance(chain, list) and len(chain) > 1):
         reader.fail(where, f"nodes must be two names or a chain of more, got {chain!r}")
@@ -59,11 +53,6 @@ def _of_mesh(reader: TableReader, table: Mapping[str, Any], options: dict[str, A
     """The frame in a file of lines."""
     where = "[frame]"
     reader.check_keys(table, (*READ, *OPTIONS), where, "key")
-    path, sections = table["mesh"], table.get("sections")
-    if not isinstance(sections, dict) or not isinstance(path, str):
-        reader.fail(where, "a mesh needs its path and a table sections = { name = { section }, … }")
-    found = {name: reader.section(entry, f"[frame] sections {name}") for name, entry in sections.items()}
     given = {key: table[key] for key in ("data", "up", "plane") if key in table}
-    values = {"path": reader.file(path, where), "sections": found, **given, **options}
-    made: Frame = reader.made(Frame.from_mesh, values, where)
+    made: Frame = reader.made(Frame.from_mesh, {**reader.mesh(table, where), **given, **options}, where)
     return made

@@ -16,7 +16,7 @@ from fembeam.scene_file import bodies
 from fembeam.scene_file.frames import MEMBER
 from fembeam.scene_file.keys import entries_of, options, parameters, required, takes_list
 from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
-from fembeam.scene_file.structures import FILES, KEYS, MODES, PLACES
+from fembeam.scene_file.structures import FILES, KEYS, MODES, NEEDED, PLACES
 from fembeam.scene_file.study_tables import STUDIES
 from fembeam.scene_file.tables import USUAL, beam_of_section, kind_name
 from fembeam.structures import COMPONENTS
@@ -138,7 +138,7 @@ class _Kinds:
         """[structure]: files of matrices, a file of modes, or modes."""
         files = _object({**{key: {} for key in KEYS}, "turned": THREE, "reduced": REDUCED}, list(FILES[:2]))
         file = _object({key: {} for key in MODES}, [MODES[0]])
-        return {"anyOf": [files, file, _object({key: {} for key in MODES[1:]}, ["omega", "shapes", "labels"])]}
+        return {"anyOf": [files, file, _object({key: {} for key in MODES[1:]}, list(NEEDED))]}
 
     def frame(self) -> Schema:
         """[frame]: nodes and members, or the lines of a mesh."""

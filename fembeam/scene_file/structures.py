@@ -17,6 +17,7 @@ FILES = ("stiffness", "mass", "damping")
 PLACED = ("labels", "nodes", "points", "lines")
 KEYS = (*FILES, *PLACED, "scale")
 GIVEN = ("omega", "shapes", "participation")
+NEEDED = ("omega", "shapes", "labels")  # of modes
 MODES = ("modes", *GIVEN, *PLACED)
 
 
@@ -34,9 +35,7 @@ def structure(reader: TableReader, table: Mapping[str, Any]) -> Structure | Give
     if any(key in table for key in MODES[:3]):
         return _of_modes(reader, table, where)
     reader.check_keys(table, KEYS, where, "key")
-    for key in FILES[:2]:
-        if key not in table:
-            reader.fail(where, f"the key {key!r} is missing (a path, or path and name of one of several matrices)")
+    reader.need(table, FILES[:2], where, " (a path, or path and name of one of several matrices)")
     given: dict[str, Any] = {}
     for key in (*FILES, "labels", "nodes"):
         if key in table:
@@ -71,9 +70,7 @@ def _of_modes(reader: TableReader, table: Mapping[str, Any], where: str) -> Give
     if isinstance(table.get("nodes"), str):
         given["nodes"] = reader.made(read_nodes, {"path": reader.file(table["nodes"], where)}, where)
     given |= {key: _inline(key, table[key]) for key in (*GIVEN, *PLACED) if key in table and key not in given}
-    for key in ("omega", "shapes", "labels"):
-        if key not in given:
-            reader.fail(where, f"the key {key!r} is missing; modes need omega, shapes and labels, here or in a .npz")
+    reader.need(given, NEEDED, where, "; modes need omega, shapes and labels, here or in a .npz")
     made: GivenModes = reader.made(Structure.of_modes, given, where)
     return made
 

@@ -86,9 +86,7 @@ class ModeStudy:
     @property
     def seeds(self) -> tuple[int, ...]:
         """The seeds 0, 1, ... of that many realisations."""
-        count = self.arguments.get("seeds", 0)
-        require(0 <= count <= MOST_SEEDS, f"seeds must be 0 to {MOST_SEEDS}", count, "study", "e.g. 8")
-        return tuple(range(count))
+        return _seeds(self.arguments.get("seeds", 0))
 
     def check(self, scene: Scene) -> None:
         """Raise ValueError when the scene cannot be run like this."""
@@ -106,6 +104,12 @@ class ModeStudy:
         given = {**self.arguments, "seeds": self.seeds, **_mesh_of(file), "checkpoint": kept}
         found: ModeCount | SmallestModel = self.study(file.scene, **given)
         return found
+
+
+def _seeds(count: int) -> tuple[int, ...]:
+    """So many of them, 0, 1, …."""
+    require(0 <= count <= MOST_SEEDS, f"seeds must be 0 to {MOST_SEEDS}", count, "study", "e.g. 8")
+    return tuple(range(count))
 
 
 def _mesh_of(file: SceneFile) -> dict[str, Any]:
@@ -303,7 +307,7 @@ def _check_places(scene: Scene, places: list[Any], name: str) -> None:
 
 
 def _check_place(scene: Scene, z: Place | None) -> None:
-    """The same of one place, where it is given."""
+    """Raise ValueError for a place, if one is given, that does not exist."""
     if z is not None:
         _check_places(scene, [z], "z")
 
@@ -749,10 +753,9 @@ def _drawn(path: str, table: Mapping[str, Any]) -> Any:
 
 def _plan_of(table: VaryTable | MinimiseTable) -> dict[str, Any]:
     """The arguments of a table that say how points are run."""
-    require(0 <= table.seeds <= MOST_SEEDS, f"seeds must be 0 to {MOST_SEEDS}", table.seeds, "study", "e.g. 8")
     require(table.workers >= 1, "workers must be at least 1", table.workers, "study", "e.g. 2")
     names = "duration", "dt", "discard", "solver"
-    return {name: getattr(table, name) for name in names} | {"seeds": tuple(range(table.seeds))}
+    return {name: getattr(table, name) for name in names} | {"seeds": _seeds(table.seeds)}
 
 
 def _check_trials(table: VaryTable | MinimiseTable, scene: Scene, names: list[str], asked: Any, points: Any) -> None:

@@ -150,14 +150,8 @@ class TableReader:
         options = {key: table[key] for key in common if key in table}
         if "mesh" in table:
             self.check_keys(table, ["mesh", "sections", "data", *common], "[beam]", "key")
-            sections, path = table.get("sections"), table["mesh"]
-            if not isinstance(sections, dict) or not isinstance(path, str):
-                self.fail("[beam]", "a mesh needs its path and a table sections = { name = { section }, … }")
-            found = {name: self.section(entry, f"[beam] sections {name}") for name, entry in sections.items()}
             options |= {"data": table["data"]} if "data" in table else {}
-            return self.made(
-                Beam.from_mesh, {"path": self.file(path, "[beam]"), "sections": found, **options}, "[beam]"
-            )
+            return self.made(Beam.from_mesh, {**self.mesh(table, "[beam]"), **options}, "[beam]")
         if "spans" not in table:
             return self.build(beam_of_section, table, "[beam]")
         self.check_keys(table, ["spans", *common], "[beam]", "key")
@@ -167,6 +161,14 @@ class TableReader:
             self.build(_span, entry, f"[beam] span {number}") for number, entry in enumerate(table["spans"], start=1)
         ]
         return self.made(Beam.of_spans, {"spans": spans, **options}, "[beam]")
+
+    def mesh(self, table: Table, where: str) -> dict[str, Any]:
+        """Path and sections of a beam or frame that a mesh holds."""
+        sections, path = table.get("sections"), table["mesh"]
+        if not isinstance(sections, dict) or not isinstance(path, str):
+            self.fail(where, "a mesh needs its path and a table sections = { name = { section }, … }")
+        found = {name: self.section(entry, f"{where} sections {name}") for name, entry in sections.items()}
+        return {"path": self.file(path, where), "sections": found}
 
     def section(self, table: Any, where: str) -> Section | Taper:
         """A section by its shape."""
@@ -205,9 +207,11 @@ class TableReader:
         if not isinstance(table, dict):
             self.fail(where, f"must be a table, got {table!r}")
         keys = parameters(constructor)
-        if self.named and "z" in keys:
-            return self._placed(constructor, keys, table, where, *also, chosen_by=chosen_by)
-        self.check_keys(table, [chosen_by, *keys, *also] if chosen_by else [*keys, *also], where, "key")
+        by_name = self.named and "z" in keys
+        known = ["at" if by_name and key == "z" else key for key in keys]
+        self.check_keys(table, [*filter(None, [chosen_by]), *known, *also], where, "key")
+        if by_name:
+            return self._placed(keys, table, where)
         for key, parameter in keys.items():
             if key not in table and parameter.default is inspect.Parameter.empty:
                 kind = f" ({words})" if (words := wanted(parameter.annotation)) else ""
@@ -218,20 +222,12 @@ class TableReader:
             if key in table
         }
 
-    def _placed(
-        self, constructor: Callable[..., Any], keys: Mapping[str, inspect.Parameter], table: Table, where: str,
-        *also: str, chosen_by: str,
-    ) -> dict[str, Any]:  # fmt: skip
-        """The same of what has a place by name: `at` for z; `on` and `to` hold such places too."""
-        known = ["at" if key == "z" else key for key in keys]
-        self.check_keys(table, [*([chosen_by] if chosen_by else []), *known, *also], where, "key")
-        found = {key: tuples(table[key]) for key in PLACES if key in table and is_place(table[key])}
-        wrong = [key for key in PLACES if key in table and key not in found]
-        if wrong:
-            self.fail(
-                where,
-                f"{wrong[0]} must be the name of a point or node, or [member, distance], got {shown(table[wrong[0]])}",
-            )
+    def _placed(self, keys: Mapping[str, inspect.Parameter], table: Table, where: str) -> dict[str, Any]:
+        """`arguments` of what has a place by name: `at` for z; `on` and `to` hold such places too."""
+        found = {key: table[key] for key in PLACES if key in table}
+        for key, at in found.items():
+            if not is_place(at):
+                self.fail(where, f"{key} must be the name of a point or node, or [member, distance], got {shown(at)}")
         needed = ["at" if key == "z" else key for key in required(keys)]
         if "at" not in found and "at" in needed:
             self.fail(where, f"the key 'at' is missing (the name of a point or node); it needs {listed(needed)}")
@@ -241,7 +237,7 @@ class TableReader:
             if key not in rest and keys[key].default is inspect.Parameter.empty:
                 self.fail(where, f"the key {key!r} is missing; it needs {listed(needed)}")
         values = {keys[key].name: self.value(rest[key], key, keys[key], where) for key in plain if key in rest}
-        return {**values, **{"z" if key == "at" else key: one for key, one in found.items()}}
+        return {**values, **{"z" if key == "at" else key: tuples(one) for key, one in found.items()}}
 
     def value(self, value: Any, key: str, parameter: inspect.Parameter, where: str) -> Any:
         """One value: a table for what has its own constructor, else checked by the annotation."""
@@ -276,6 +272,12 @@ class TableReader:
         for key in table:
             if key not in valid:
                 self.fail(where, f"unknown {what} {key!r}{nearest(key, valid)} (valid: {listed(valid)})")
+
+    def need(self, table: Table, keys: Sequence[str], where: str, told: str = "") -> None:
+        """Every key stands in the table."""
+        for key in keys:
+            if key not in table:
+                self.fail(where, f"the key {key!r} is missing{told}")
 
     def fail(self, where: str, message: str, cause: Exception | None = None) -> NoReturn:
         """Raise with file and table in front."""

@@ -15,9 +15,11 @@ from fembeam.structures.directions import (
     named,
     nearest,
     require_components,
+    rows_along,
     turns,
 )
 from fembeam.structures.frame import Frame
+from fembeam.structures.frame_checks import arm_matrix
 from fembeam.structures.frame_forces import FORCES, FrameForces
 from fembeam.structures.frame_mesh import FrameMatrices, FrameMesh
 from fembeam.structures.joined_bodies import JoinedBodies, JoinedForces, has_place, located_among

@@ -53,7 +53,7 @@ def real(name: str, values: Any, where: str) -> Any:
     require(kind in "iufc", f"{name} must be numbers", values, where, "give an array of them")
     if kind != "c":
         return values
-    turned = float(np.abs(np.imag(values.data if sparse.issparse(values) else values)).max(initial=0.0))
+    turned = float(np.abs(np.imag(given)).max(initial=0.0))
     require(turned == 0.0, f"{name} must be real; its largest imaginary part is", turned, where,
             "give damping as C, as ratios of modes or as dashpots: motion in time has no complex K")  # fmt: skip
     return values.real if sparse.issparse(values) else np.real(values)

@@ -10,8 +10,10 @@ from difflib import get_close_matches
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy import sparse
 
-from fembeam.structures.assembled import COMPONENTS
+from fembeam.structures.assembled import COMPONENTS, Assembled
 from fembeam.support import is_finite, require
 
 Direction: TypeAlias = str | Sequence[float]
@@ -88,6 +90,12 @@ def require_components(direction: Six, known: Sequence[str], what: str, where: s
     missing = [name for name, number in zip(COMPONENTS, direction, strict=True) if number and name not in known]
     require(not missing, f"{what} must move along {' and '.join(missing)}; it has {', '.join(known) or 'no dof'}",
             named(direction), where, "choose one of these")  # fmt: skip
+
+
+def rows_along(body: Any, assembled: Assembled, place: Any, along: ArrayLike) -> sparse.csr_matrix:
+    """The motion (k, N) of a body's place along directions (k, 6), or along one (6,)."""
+    known = [COMPONENTS.index(component) for component in body.components]
+    return (sparse.csr_matrix(np.atleast_2d(along)[:, known]) @ assembled.rows(place)).tocsr()
 
 
 def nearest(name: object, known: Sequence[object]) -> str:

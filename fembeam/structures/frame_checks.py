@@ -158,7 +158,7 @@ def check_held(frame: Frame, held: Mapping[str, Collection[str]], where: str) ->
 
 
 def _held(frame: Frame, node: str, components: Collection[str], where: str) -> None:
-    """The same of one node."""
+    """Raise ValueError if releases leave this node free."""
     ends = [(i, end) for i, one in enumerate(frame.members) for end in range(2) if node == (one.a, one.b)[end]]
     carried = [_kept(frame, i, end) @ arm_matrix(frame.members[i].offset[end]) for i, end in ends]
     free = _free_motion(frame, [*carried, *(np.eye(6)[[COMPONENTS.index(name)]] for name in components)])

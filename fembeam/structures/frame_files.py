@@ -100,7 +100,7 @@ def _in_order(
 
 
 def _up_of(up: Any, group: str) -> Any:
-    """The direction of one group."""
+    """The direction ``up`` of one group."""
     return up.get(group) if isinstance(up, Mapping) else up
 
 
@@ -114,7 +114,7 @@ def _names(mesh: Any) -> dict[int, str]:
 
 
 def _numbered(names: list[str]) -> list[str]:
-    """The same, each one of several numbered but for empty ones."""
+    """Names, each one of several alike numbered but for empty ones."""
     sizes, seen, told = Counter(names), Counter[str](), []
     for name in names:
         seen[name] += 1

@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     from fembeam.structures.frame import Frame
 
 Vector = NDArray[np.float64]
-Counts = list[NDArray[np.int64]]
 
 DEFAULT_MODES = 10
 MOST_ELEMENTS = 10_000
@@ -242,12 +241,10 @@ def _stops(frame: Frame, places: Sequence[Any]) -> list[Vector]:
     """For every member the distances that must be nodes, ends included, ascending."""
     wanted: list[list[float]] = [[0.0, float(length)] for length in frame.lengths]
     shortest = SHORTEST_PRESSED if any(one.axial_force < 0 for one in frame.members) else SHORTEST
-    for place in places:
+    for place in spaced(frame, places, shortest):
         site = frame.site(place, "places of Frame.assembled")
         if not isinstance(site, str):
-            known, s = wanted[site[0]], site[1]
-            if min(abs(s - other) for other in known) > shortest * frame.lengths[site[0]]:
-                known.append(s)
+            wanted[site[0]].append(site[1])
     return [np.array(sorted(one)) for one in wanted]
 
 
@@ -334,7 +331,7 @@ def _highest(frame: Frame, places: Sequence[Any], modes: int) -> float:
 
 
 def _on(frame: Frame, borders: list[Vector], promise: str) -> FrameMatrices:
-    """The assembly itself."""
+    """Matrices with elements between these borders on every member."""
     labels, join = _numbered(frame, borders)
     mesh = FrameMesh(frame, tuple(borders), tuple(labels), join)
     elements = mesh.elements

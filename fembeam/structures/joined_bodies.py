@@ -328,7 +328,7 @@ class JoinedForces:
         return tuple(dict.fromkeys(name for forces in self.each.values() for name in forces.names))
 
     def names_at(self, place: Any) -> tuple[str, ...]:
-        """Those at a place."""
+        """Components that a place has."""
         forces, own = self._of(place)
         return forces.names_at(own)
 

@@ -87,13 +87,10 @@ def joined_fields(bodies: Sequence[Body], made: Sequence[Assembled], T: sparse.c
     roots = [one.root for one in made if one.root is not None]
     root = sparse.block_diag(roots, format="csr") @ T if len(roots) == len(made) else None
     return {
-        "M": (T.T @ sparse.block_diag([one.M for one in made], format="csr") @ T).tocsr(),
-        "K": (T.T @ sparse.block_diag([one.K for one in made], format="csr") @ T).tocsr(),
+        **{name: _joined(made, name, T) for name in ("M", "K", "C", "gyroscopic")},
         "labels": tuple(labels[i] for i in free),
         "translations": _shared(bodies, made, "translations")[free],
         "root": None if root is None else root.tocsr(),
-        "C": _optional(made, "C", T),
-        "gyroscopic": _optional(made, "gyroscopic", T),
         "accuracy": "; ".join(one.accuracy for one in made if one.accuracy),
         "moved": None
         if all(one.moved is None for one in made)
@@ -183,8 +180,8 @@ def translations_of(body: Any) -> list[str]:
     return [name for name in COMPONENTS[:3] if name in getattr(body, "base_directions", body.components)]
 
 
-def _optional(made: Sequence[Assembled], name: str, T: sparse.csr_matrix) -> sparse.csr_matrix | None:
-    """A matrix that some bodies have, or None."""
+def _joined(made: Sequence[Assembled], name: str, T: sparse.csr_matrix) -> sparse.csr_matrix | None:
+    """TᵀAT of a matrix of all bodies, zero of those without; None where none has it."""
     if all(getattr(one, name) is None for one in made):
         return None
     blocks = [sparse.csr_matrix(one.M.shape) if (own := getattr(one, name)) is None else own for one in made]

@@ -183,7 +183,7 @@ def basins(
         require(whole, f"{name} counts periods of the load and must be above 0", count, WHERE, "give a whole number")
     starts = starts_of(origin, across, up)
     asked = partial(basins, x=across, y=up, start=origin, settle=settle, longest=longest)
-    kept = Checkpoint(checkpoint, {} if checkpoint is None else identity(model, asked))
+    kept = Checkpoint(checkpoint, partial(identity, model, asked))
     known = _found(model, _coarse(starts), longest, T)
     missing = [row for row in range(rows) if str(row) not in kept.values]
     task = partial(_settled, model, starts, known, settle, T, threads)

@@ -17,7 +17,7 @@ from fembeam import plot
 from fembeam.scene import Scene
 from fembeam.structures import COMPONENTS, Frame
 from fembeam.study.result import Result
-from fembeam.support import Part, is_whole, numbers, require
+from fembeam.support import Part, is_whole, require, vector
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -110,9 +110,9 @@ def campbell(scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | Non
     >>> found.signed[1].round(1).tolist(), found.critical.round(1).tolist()
     ([-208.8, 223.9], [-211.1, 221.9])
     """
-    speeds = np.atleast_1d(numbers("spins", spins, WHERE, "give rad/s, such as np.linspace(0, 600)"))
-    valid = speeds.ndim == 1 and speeds.size > 0 and bool(np.isfinite(speeds).all() and np.all(np.diff(speeds) > 0))
-    require(valid, "spins must be finite and ascending, (k,)", spins, WHERE, "give rad/s, such as np.linspace(0, 600)")
+    speeds = vector("spins", spins, WHERE, "give rad/s, such as np.linspace(0, 600)",
+                    "must be finite and ascending, (k,)",
+                    lambda x: np.isfinite(x).all() and np.all(np.diff(x) > 0))  # fmt: skip
     check_modes(modes)
     basis, G, across = _at_unit_spin(scene, int(modes), elements)
     found = [reduction.whirl(basis, spin * G, *across) for spin in speeds]

@@ -178,7 +178,7 @@ def ensemble(
     chosen = _seeds(model, seeds)
     if until is not None and not 0.0 < number("until", until, above=0.0) < 1.0:
         raise ValueError(f"until must be a relative standard error below 1, got {until!r}")
-    kept = Checkpoint(checkpoint, {} if checkpoint is None else identity(model, quantity))
+    kept = Checkpoint(checkpoint, partial(identity, model, quantity))
     failed: dict[str, Failure] = {}
     for count in _rounds(len(chosen), until):
         missing = [seed for seed in chosen[:count] if seed_key(seed) not in {*kept.values, *failed}]

@@ -21,7 +21,7 @@ from contacts import Law, Sum
 from contacts.path import walk
 from fembeam import plot
 from fembeam.study.result import Result
-from fembeam.support import Part, number, numbers, require
+from fembeam.support import Part, by_rows, number, require, vector
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,9 +75,8 @@ class Equivalent(Result):
 
     def table(self) -> list[dict[str, Any]]:
         """A row for each amplitude, in SI units."""
-        columns = {"amplitude": self.amplitude, "energy": self.energy, "stiffness": self.stiffness,
-                   "loss_stiffness": self.loss_stiffness, "loss_factor": self.loss_factor}  # fmt: skip
-        return [dict(zip(columns, map(float, row), strict=True)) for row in zip(*columns.values(), strict=True)]
+        names = "amplitude", "energy", "stiffness", "loss_stiffness", "loss_factor"
+        return by_rows({name: getattr(self, name) for name in names})
 
     def figure(self) -> Figure:
         """Energy per cycle, stiffness and loss factor over the amplitude; see `plot.equivalent`."""
@@ -132,9 +131,8 @@ def equivalent(
     ([0.0, 0.02], [20000.0, 10000.0])
     """
     require(isinstance(law, Law), "law must be a contact law", law, WHERE, "give one of `contacts`, such as Jenkins")
-    X = np.atleast_1d(numbers("amplitudes", amplitudes, WHERE, "give them in m"))
-    valid = X.ndim == 1 and X.size > 0 and bool(np.all(np.isfinite(X) & (X > 0.0)))
-    require(valid, "amplitudes must be above 0 and finite, (k,)", amplitudes, WHERE, "give them in m")
+    X = vector("amplitudes", amplitudes, WHERE, "give them in m", "must be above 0 and finite, (k,)",
+               lambda x: np.isfinite(x) & (x > 0.0))  # fmt: skip
     if omega is not None:
         number("omega (rad/s)", omega, above=0.0)
     middle = number("mean (m)", mean)

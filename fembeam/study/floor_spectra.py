@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import ArrayLike
 
 from fembeam import plot
-from fembeam.response import PlacedShapes, ResponseSpectrum
+from fembeam.response import ResponseSpectrum
 from fembeam.scene import is_directed, place_words, said
 from fembeam.structures import COMPONENTS
 from fembeam.study.result import Result
@@ -111,7 +111,7 @@ def floor_spectra(
 
 def _along(run: Run, place: Any) -> dict[str, Any]:
     """What is asked for at a place, by its name."""
-    if not isinstance(run.shapes, PlacedShapes):
+    if not run.shapes.named:
         return {place_words(place): place}
     ways = [place] if is_directed(place) else [(place, c) for c in run.shapes.components if c in COMPONENTS[:3]]
     return {said(at): at for at in ways}

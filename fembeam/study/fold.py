@@ -20,7 +20,7 @@ from fembeam.model.branch import Family
 from fembeam.plot.axis_names import axis_name
 from fembeam.scene import called, path_of, value_of
 from fembeam.study.result import Result
-from fembeam.support import Part, is_finite, is_whole, require
+from fembeam.support import Part, by_rows, is_finite, is_whole, require
 from solvers.branches import fold_curve
 
 Vector = NDArray[np.float64]
@@ -64,8 +64,8 @@ class Fold(Result):
 
     def table(self) -> list[dict[str, Any]]:
         """A row for each point, in SI units."""
-        columns = self.values.tolist(), self.at.tolist(), self.amplitude.tolist(), [one.mark for one in self.orbits]
-        return [dict(zip(("value", "at", "amplitude", "mark"), row, strict=True)) for row in zip(*columns, strict=True)]
+        marks = [one.mark for one in self.orbits]
+        return by_rows({"value": self.values, "at": self.at, "amplitude": self.amplitude, "mark": marks})
 
     def plain(self) -> dict[str, Any]:
         """What was found, as JSON has it, without orbits."""

@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -191,7 +192,7 @@ def minimise(
     trial = Trial.of(scene, list(parameters), asked, plan, reduction).prepared(_within(box, first))
     if gradients is not False:
         gradients = has_gradients(trial, insist=gradients is True)
-    kept = Checkpoint(checkpoint, {} if checkpoint is None else identity_of(trial))
+    kept = Checkpoint(checkpoint, partial(identity_of, trial))
     search = _Search(trial, box, np.array([bound for _, bound in limits]), kept)
     search.look(first, executor, WHERE if progress else None)
     converged = search.descend(tolerance, most, gradients)

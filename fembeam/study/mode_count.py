@@ -17,6 +17,7 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -247,7 +248,7 @@ def mode_count(
         Case(scene, tuple(a.items()), plan, kept, (method, *(_looser(method, plan) if a == finest else ())))
         for a in arguments
     ]
-    finished = Checkpoint(checkpoint, {} if checkpoint is None else identity_of(scene, plan, kept))
+    finished = Checkpoint(checkpoint, partial(identity_of, scene, plan, kept))
     found = measured(items, executor, f"modes for {label(kept)}", finished)
     exact, *loose = found[arguments.index(finest)]
     rows = _rows(arguments, [first for first, *_ in found], exact)

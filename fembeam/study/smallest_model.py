@@ -17,6 +17,7 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -200,7 +201,7 @@ def smallest_model(
     check_goal(tolerance, most)
     plan, kept = Plan(duration, dt, discard, seeds, start), named(quantity)
     plan.check(scene, kept)
-    finished = Checkpoint(checkpoint, {} if checkpoint is None else identity_of(scene, plan, kept))
+    finished = Checkpoint(checkpoint, partial(identity_of, scene, plan, kept))
     return Search(
         scene, kept, plan, float(tolerance), int(most), kinds_of(scene, residual), executor, elements, finished
     ).answer()
@@ -225,8 +226,8 @@ class Search:
     most: int
     kinds: tuple[bool, ...]
     executor: Executor | None
-    elements: int | None = None
-    finished: Checkpoint = field(default_factory=lambda: Checkpoint(None, {}))
+    elements: int | None
+    finished: Checkpoint
     seen: dict[Choice, Measured] = field(default_factory=dict)
 
     def answer(self) -> SmallestModel:

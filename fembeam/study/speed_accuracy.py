@@ -137,8 +137,6 @@ class SpeedAccuracy(Result):
                  for n in self.reduction]  # fmt: skip
         return [(head, [_cells(row) for row in self.table()]), *known, *filter(None, [self.claim()])]
 
-    rows = table
-
     figure = plot.speed_accuracy
 
 
@@ -147,11 +145,9 @@ def end_displacement(run: Run) -> Vector:
 
     δ of a first stop of rotation, of an annular one, or at a place by name.
     """
-    if len(run.stops) and run.circles[0, 0]:
+    if len(run.stops) and (run.circles[0, 0] or run.kinds[0, 0] or np.isnan(run.stops[0, 0])):
         return np.asarray(run._deformation(0)[-1])
-    if len(run.stops) and (run.kinds[0, 0] or np.isnan(run.stops[0, 0])):
-        return np.asarray(-run.directions[0] @ run.q[-1] - run.stops[0, 2])
-    if not hasattr(run.shapes, "nodes"):
+    if run.shapes.named:
         return np.asarray(run.shapes(next(iter(places(run.shapes).values()))) @ run.q[-1])
     return np.asarray(run.shapes(run.stops[0, 0] if len(run.stops) else run.shapes.nodes[-1]) @ run.q[-1])
 

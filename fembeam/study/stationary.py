@@ -32,7 +32,7 @@ from fembeam.scene import signals_of
 from fembeam.statistics import Batches, Estimate, Impacts, Signal
 from fembeam.statistics.initial_transient import Settling, settling
 from fembeam.statistics.spectra import FINEST_RESOLUTION
-from fembeam.study.execution.checkpoint import Checkpoint, scene_identity
+from fembeam.study.execution.checkpoint import Checkpoint, model_identity
 from fembeam.study.execution.fingerprint import fingerprint
 from fembeam.study.result import Result
 from fembeam.study.segments import FEWEST_SAMPLES, Segment, Segments
@@ -212,8 +212,7 @@ def stationary(
     plan = Segments.of(model, duration, dt, discard, start, solver, segment)
     watched = dict(watch) if watch else watched_by_default(model)
     sums = Sums(watched, dt, segment, dict(bins or {}), dict(levels or {}), len(model.scene.stops))
-    about = {} if checkpoint is None else _identity(model, watched, sums, plan, discard, start, solver)
-    kept = Checkpoint(checkpoint, about)
+    kept = Checkpoint(checkpoint, partial(_identity, plan, sums, discard, start))
     settled, enough = _resumed(kept, plan, sums), None if until is None else False
     if until is not None and plan.taken >= FEWEST_BATCHES:  # as it was asked before the end of an earlier call
         enough = _enough(sums.response(plan, settled, enough), of, until)
@@ -241,14 +240,11 @@ def stationary(
     return response
 
 
-def _identity(
-    model: Model, watched: Mapping[str, Watch], sums: Sums, plan: Segments, discard: Any, start: Any, solver: Any
-) -> dict[str, str]:
+def _identity(plan: Segments, sums: Sums, discard: Any, start: Any) -> dict[str, str]:
     """What the segments depend on, seeds among it, as texts that can be compared."""
-    asked = [plan.duration, plan.dt, discard, None if start is None else np.asarray(start), solver]
+    asked = [plan.duration, plan.dt, discard, None if start is None else np.asarray(start), plan.solver]
     asked += [sums.segment, sums.bins, sums.levels]
-    about = scene_identity(model.scene) | {"modes": repr(model.modes), "frequencies": fingerprint(model.omega)}
-    about |= {"watch": f"{', '.join(watched)} #{fingerprint(dict(watched), 'watch')}"}
+    about = model_identity(plan.model) | {"watch": f"{', '.join(sums.watched)} #{fingerprint(sums.watched, 'watch')}"}
     return about | {"stationary": f"{plan.duration:g} s, dt = {plan.dt:g} s #{fingerprint(asked, 'stationary')}"}
 
 

@@ -109,7 +109,7 @@ class Trial:
 
     @property
     def titles(self) -> tuple[str, ...]:
-        """Of the parameters, for axes."""
+        """Names of the parameters for axes."""
         if not isinstance(self.scene, Scene):
             return self.names
         return tuple(axis_name(name, self.scene) for name in self.names)

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -183,7 +184,7 @@ def vary(
     plan = Plan(duration, dt, discard, seeds, start, solver)
     names, points, axes = points_of(parameters, samples, seed)
     trial = Trial.of(scene, names, quantity, plan, reduction).prepared(points)
-    kept = Checkpoint(checkpoint, {} if checkpoint is None else identity_of(trial))
+    kept = Checkpoint(checkpoint, partial(identity_of, trial))
     failures = computed(trial, points, kept, executor, WHERE if progress else None)
     if failures:
         i, reason = failures[0]
@@ -226,7 +227,7 @@ def collected(
 
 
 def _key(point: Vector) -> str:
-    """A point, exactly."""
+    """A point as text that tells all of its digits."""
     return " ".join(map(repr, point.tolist()))
 
 

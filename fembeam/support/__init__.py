@@ -20,10 +20,11 @@ from fembeam.support.checks import (
     require_place,
     require_positive,
     tuples,
+    vector,
 )
-from fembeam.support.files import write_rows, written_whole
+from fembeam.support.files import write_rows, written_beside, written_whole
 from fembeam.support.notes import note
 from fembeam.support.printed import Part, Printed, html_table
 from fembeam.support.progress import bar, counting
-from fembeam.support.text_tables import aligned
+from fembeam.support.text_tables import aligned, by_rows
 from fembeam.support.versions import versions

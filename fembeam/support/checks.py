@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -120,6 +121,16 @@ def numbers(name: str, values: Any, where: str, advice: str) -> NDArray[np.float
         given = np.asarray(None)
     require(given.dtype.kind in "iuf", f"{name} must be real numbers", values, where, advice)
     return given.astype(np.float64)
+
+
+def vector(
+    name: str, values: Any, where: str, advice: str, rule: str, valid: Callable[[NDArray[np.float64]], Any]
+) -> NDArray[np.float64]:
+    """One number or a row of them (k,), all valid by a rule told in words, or a clear error."""
+    found = np.atleast_1d(numbers(name, values, where, advice))
+    right = found.ndim == 1 and found.size > 0 and bool(np.all(valid(found)))
+    require(right, f"{name} {rule}", values, where, advice)
+    return found
 
 
 def tuples(value: Any) -> Any:

@@ -31,6 +31,15 @@ def written_whole(target: Path) -> Iterator[Any]:
         raise
 
 
+@contextmanager
+def written_beside(target: Path) -> Iterator[str]:
+    """Where others' code writes a file, alone or with more: they get their names once complete, the target last."""
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
+        yield os.path.join(folder, target.name)
+        for name in sorted(os.listdir(folder), key=target.name.__eq__):
+            os.replace(os.path.join(folder, name), target.with_name(name))
+
+
 def write_rows(target: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Rows with the same keys as a CSV file that appears whole or not at all."""
     text = io.StringIO()

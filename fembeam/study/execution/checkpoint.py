@@ -30,14 +30,15 @@ class Checkpoint:
     Parameters
     ----------
     path : the file; None keeps nothing. One that exists is read.
-    about : what the values belong to, name -> text; where it ends in "#" and a digest, this decides. A file about
-        something else is refused.
+    about : function that tells what the values belong to, name -> text; where this ends in "#" and a digest, that
+        decides. A file about something else is refused. Without a path it is not asked.
     """
 
-    def __init__(self, path: str | os.PathLike[str] | None, about: Mapping[str, str]) -> None:
+    def __init__(self, path: str | os.PathLike[str] | None, about: Callable[[], dict[str, str]] = dict) -> None:
         right = isinstance(path, (str, os.PathLike, type(None)))
         require(right, "checkpoint must be the path of a file", path, "study", 'e.g. "kept.npz"')
-        self.path, self.about = None if path is None else Path(path), dict(about)
+        self.path = None if path is None else Path(path)
+        self.about = {} if path is None else about()
         self.values: dict[str, Values] = {}
         if self.path is not None and self.path.exists():
             self.values = self._read(self.path)
@@ -89,9 +90,13 @@ def identity(model: Model, quantity: Callable[..., Any]) -> dict[str, str]:
     ------
     ValueError : something the quantity or the scene reads cannot be told from another of its kind.
     """
-    about = scene_identity(renewed(model, lambda j, _: j).scene)
-    about |= {"modes": repr(model.modes), "frequencies": fingerprint(model.omega)}
-    return about | {"quantity": f"{_name(quantity)} #{fingerprint(quantity, 'the quantity')}"}
+    asked = f"{_name(quantity)} #{fingerprint(quantity, 'the quantity')}"
+    return model_identity(renewed(model, lambda j, _: j)) | {"quantity": asked}
+
+
+def model_identity(model: Model) -> dict[str, str]:
+    """The same of a model: its scene, seeds among it, and its modes."""
+    return scene_identity(model.scene) | {"modes": repr(model.modes), "frequencies": fingerprint(model.omega)}
 
 
 def scene_identity(scene: Scene | Callable[..., Scene]) -> dict[str, str]:
