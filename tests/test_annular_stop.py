@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import fembeam as fb
 import solvers
@@ -106,6 +107,26 @@ def test_reactions_carry_what_the_hole_does_not():
     assert about_y + 0.4 * force[0] + 0.6 * 300.0 == pytest.approx(0.0, abs=1e-5)
     assert model.static_share.shape == (4,)
     np.testing.assert_allclose(model.static_share, 1.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("pull", "lies_on_it"), [((30.0, 10.0), True), ((50.0, 0.1), False)])
+def test_an_equilibrium_is_found_round_a_post(pull, lies_on_it):
+    """What weight presses to a post slides round it until springs or the post hold it: it was refused."""
+    body = fb.Structure(np.diag([8e3, 5e3]), 1.3 * np.eye(2), labels=[("D", "x"), ("D", "y")], nodes={"D": (0, 0, 0)})
+    centre = np.array([3e-3, 3e-3] if lies_on_it else [4.1e-3, 0.0])
+    post = fb.AnnularStop("D", KelvinVoigt(2e5, 0.0), 4e-3, centre=tuple(centre), outer=True, directions=("x", "y"))
+    model = fb.Scene(body, stops=[post], gravity=(*pull, 0.0)).reduce(modes=2)
+
+    def slopes(t, d):
+        away = d - centre
+        r = np.linalg.norm(away)
+        return 1.3 * np.array(pull) - np.array([8e3, 5e3]) * d + 2e5 * max(4e-3 - r, 0.0) * away / r
+
+    rest = solve_ivp(slopes, (0.0, 0.1), np.zeros(2), "LSODA", rtol=1e-10, atol=1e-14).y[:, -1]
+    start = model.equilibrium()[:2]
+    found = np.array([model.phi(("D", way)) @ start for way in "xy"])
+    assert (np.linalg.norm(found - centre) < 4e-3) == lies_on_it
+    np.testing.assert_allclose(found, rest, rtol=0.0, atol=1e-9)
 
 
 def _placed(reactions):

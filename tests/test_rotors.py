@@ -10,6 +10,8 @@ from scipy.optimize import brentq
 import fembeam as fb
 from contacts import Hertz, KelvinVoigt
 from fembeam import plot, scene_file
+from fembeam.scene import value_of, with_signals, with_value
+from fembeam.scene.parameters import scalars
 
 SECTION = fb.Section.circle(2.1e11, 7850.0, 0.04)
 LENGTH, DISK = 0.5, fb.Disk("B", mass=12.0, diametral=0.04, polar=0.075)
@@ -163,6 +165,43 @@ def test_an_unbalance_follows_the_spin():
     t = np.linspace(0.0, 0.1, 7)
     np.testing.assert_allclose(scene.forces[0].signal(t), 9.0 * np.cos(300.0 * t + 0.3), atol=1e-12)
     np.testing.assert_allclose(scene.forces[1].signal(t), 9.0 * np.sin(300.0 * t + 0.3), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("moment", 3e-4), ("phase", 1.1), ("forces[0].moment", 0.0), ("forces[u].phase", -2.0)]
+)
+@pytest.mark.parametrize("spin", [300.0, -300.0])
+def test_a_parameter_of_an_unbalance_changes_both_of_its_forces(name, value, spin):
+    """One along e₁ was changed alone, so that what turned became an ellipse, and a phase changed nothing."""
+    given = {"moment": 1e-4, "phase": 0.3}
+    scene = rotor(spin, forces=[fb.Unbalance("B", name="u", **given)])
+    asked = {**given, name.split(".")[-1]: value}
+    fresh = rotor(spin, forces=[fb.Unbalance("B", name="u", **asked)])
+    changed = with_value(scene, name, value)
+    assert changed.forces == fresh.forces
+    assert with_value(changed, name, value_of(scene, name)).forces == scene.forces
+    known = [path for path in scalars(scene) if path.startswith("forces")]
+    assert known == ["forces[0].moment", "forces[0].phase"]
+    with pytest.raises(ValueError, match="no such parameter"):
+        with_value(scene, "forces[0].signal.amplitude", 2.0)
+
+
+def test_a_response_is_linear_in_its_unbalance():
+    """Also by its exact derivative, along both directions: it was 1.14 and 0.56 of that."""
+    scene = rotor(200.0, forces=[fb.Unbalance("B", 1e-3), fb.PointForce("B", fb.Harmonic(0.0, 9.0), direction="x")])
+    run = scene.reduce(2).simulate(0.2, 1e-3)
+    found = run.sensitivity("forces[0].moment")
+    for way in "xy":
+        expected = run.displacement("B", way) / 1e-3
+        np.testing.assert_allclose(found.displacement("B", way), expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_a_signal_made_of_that_of_an_unbalance_stays():
+    """As that of an orbit from a later time on, whose phase alone differs."""
+    scene = rotor(forces=[fb.Unbalance("B", 1e-4, phase=0.3)])
+    later = with_signals(scene, lambda signal: replace(signal, phase=signal.phase + 1.0))
+    assert [force.signal.phase for force in later.forces] == pytest.approx([1.3, 1.3 - 0.5 * np.pi])
+    assert with_value(later, "gravity", 9.81).forces == later.forces
 
 
 # --- runs -------------------------------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ import solvers
 from contacts import Hertz, KelvinVoigt, WaltonBraun
 from fembeam.model import run_csv
 from fembeam.response import backbone, states
+from fembeam.results import files, html_page
 from fembeam.scene_file import SceneFileError, json_schema
 from fembeam.study.measure import cut
 
@@ -253,6 +254,24 @@ def test_tables(corner, tube, tmp_path):
     head = (tmp_path / "histories.csv").read_text().splitlines()[0]
     assert head.endswith("force 0 [N],force 0 along [N]")
     assert "loss by friction / J" in str(tube)
+
+
+def test_the_energy_of_a_summary_and_its_page_balances_with_friction(tube, tmp_path):
+    """The work of a spin and what friction took, 33 times the work done on the stop here, were in neither."""
+    run = hole(spin=150.0, radius=0.00955).reduce(modes=4).simulate(0.02, 1e-4, solver=METHOD)
+    found = files.summary(run)
+    energy, losses = found["energy"], found["losses"]
+    taken = energy["damping"] + energy["contact"] + energy["friction"]
+    assert energy["input"] + energy["spin"] - taken - energy["stored"] == pytest.approx(0.0, abs=1e-9 * energy["spin"])
+    assert energy["friction"] > energy["contact"]
+    assert losses["loss"][0] == pytest.approx(losses["work"][0] - losses["stored"][0] + losses["friction"][0], rel=1e-9)
+    assert losses["spin"][0] == pytest.approx(energy["spin"], rel=1e-9)
+    files.write_json(tmp_path / "summary.json", found)
+    page = html_page.write_page(tmp_path).read_text(encoding="utf-8")
+    assert "put in by spin" in page
+    assert "lost in friction" in page
+    plain = replace(hole(), stops=[replace(hole().stops[0], friction=None)]).reduce(modes=4)
+    assert "spin" not in files.summary(plain.simulate(0.002, 1e-4))["energy"]
 
 
 def test_equilibrium_and_strikes_know_no_friction():

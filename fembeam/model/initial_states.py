@@ -227,10 +227,12 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
         J = np.diag(1 / tau + K) + (W.T * slopes) @ W
         for own, block in circles:
             J += W[own].T @ block @ W[own]
-        trial = q + np.linalg.solve(J, residual)
+        step = np.linalg.solve(J, residual)
+        trial = q + step
         trial_forces, trial_slopes, trial_circles = _pushed(model, -W @ trial - gaps)
         after = f + trial_forces @ W - K * trial
-        if np.linalg.norm(after) <= (1 + 1e-12) * np.linalg.norm(residual):
+        downhill = residual @ step > 0.0 and after @ step > 0.0  # round a post the forces may grow on the way down
+        if downhill or np.linalg.norm(after) <= (1 + 1e-12) * np.linalg.norm(residual):
             q, forces, residual, tau = trial, trial_forces, after, min(2 * tau, 1e300)
             slopes, circles = trial_slopes, trial_circles
         elif not tau > 1e-30:

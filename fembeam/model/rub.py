@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])  # turns x to y
 ROUND = 1e-6  # of the size of matrices and loads: what a rotor may lack of being round
-FELT = 1e-6  # of the size of the largest row of a matrix: what rounding leaves of rows of nothing, as of twist
+FELT = 1e-4  # of the size of the largest row of a matrix: what rounding leaves of rows of nothing, as of twist
 DEEPEST, LEAST, TRIED = 1e3, 1e-9, 2000  # indentations looked at, of clearance or free whirl, and how many
 WHERE = "Model.rub"
 
@@ -113,9 +113,12 @@ def _spun(model: Model, spin: float | None) -> tuple[Model, float]:
 
 
 def _check(model: Model, entry_rate: float | None) -> None:
-    """Raise ValueError for a circle off the axis, a law whose damping goes by a speed of entry that is not known."""
+    """Raise ValueError for what floats, a circle off the axis, damping by a speed of entry that is not known."""
     stop = model.scene.stops[0]
     assert isinstance(stop, AnnularStop)
+    held = bool(np.all(model.omega > 0.0))
+    require(held, "the rotor must be held, also in twist, which friction would drive ever faster", "a free motion",
+            WHERE, "write bending_only=True, or hold it by a spring, however soft")  # fmt: skip
     require(not any(stop.centre), "the circle must lie round the axis", stop.centre, WHERE, "leave the centre out")
     latches = tangent(stop.law, 1e-6, 0.0, 1.0) != tangent(stop.law, 1e-6, 0.0, 2.0)
     require(not latches or entry_rate is not None, "the damping of this law goes by the speed of entry", stop.law,

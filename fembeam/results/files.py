@@ -137,7 +137,7 @@ def summary(
         "contacts": _contacts(run, discard),
         **({"outputs": extremes_table(histories(run, **outputs), discard)} if outputs else {}),
         "energy": _energy(run),
-        "losses": {k: x.tolist() for k, x in run.losses.arrays().items()},
+        "losses": _losses(run),
         "cost": asdict(run.cost),
         "dt": float(run.t[1] - run.t[0]) if len(run.t) > 1 else None,
         "scene": run.scene,
@@ -209,15 +209,24 @@ def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:
 
 
 def _energy(run: Run) -> dict[str, float]:
-    """The energy balance at the end, J, and its residual relative to what went in."""
+    """The energy balance at the end, J, and its residual relative to what went in, the work of spins included."""
     if not len(run.t):
         return {}
     ledger = run.energy
-    names = ("input", "damping", "contact", "stored", "residual")
+    rubbed = ("friction", "spin") if run.rubs[:, 1].any() else ()
+    names = ("input", "damping", "contact", *rubbed, "stored", "residual")
     end = {name: float(getattr(ledger, name)[-1]) for name in names}
-    scale = max(abs(end["input"]), abs(float(ledger.initial)))
+    scale = max(abs(end["input"]), abs(end.get("spin", 0.0)), abs(float(ledger.initial)))
     end["residual_over_input"] = abs(end["residual"]) / scale if scale > 0 else 0.0
     return end
+
+
+def _losses(run: Run) -> dict[str, list[float]]:
+    """What each stop and element took, J, with friction and the work of spins where there is friction."""
+    found = run.losses.arrays()
+    if run.rubs[:, 1].any():
+        found |= {"friction": run.losses.friction, "spin": run.losses.spin}
+    return {name: np.asarray(values, dtype=float).tolist() for name, values in found.items()}
 
 
 def text(found: dict[str, Any]) -> str:

@@ -34,6 +34,8 @@ CONTACT_ROWS = (  # words, unit of the figures per SI unit, place in the summary
     ("mean entry / {speed}", 1.0, "entry_speed", "mean"),
 )
 WHERE = "z", "place", "side", "direction"  # of which a summary has two
+ENERGY = {"input": "put in", "spin": "put in by spin", "damping": "lost in damping", "contact": "lost in contacts",
+          "friction": "lost in friction", "stored": "stored"}  # fmt: skip
 MOMENT_ROWS = (
     ("mean / {}", 1e3, "mean"),
     ("std / {}", 1e3, "std"),
@@ -149,9 +151,9 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
         rows = [[name, *map(_number, row.values())] for name, row in found["outputs"].items()]
         yield "<h2>Outputs</h2>" + html_table(["", *OUTPUT_COLUMNS], rows)
     if found["energy"]:
-        names = {"input": "put in", "damping": "lost in damping", "contact": "lost in contacts", "stored": "stored"}
-        rows = [[words, with_prefix(found["energy"][name], "J")] for name, words in names.items()]
-        residual = found["energy"]["residual_over_input"]
+        ledger = found["energy"]
+        rows = [[words, with_prefix(ledger[name], "J")] for name, words in ENERGY.items() if name in ledger]
+        residual = ledger["residual_over_input"]
         yield "<h2>Energy</h2>" + html_table(["", ""], rows)
         yield f'<p class="note">Missing in this balance, an estimate of the error: {residual:.1e} of the input.</p>'
 

@@ -63,8 +63,9 @@ def _numbers(path: str, item: Any) -> dict[str, float]:
     if not is_dataclass(item):
         return {}
     found: dict[str, float] = {}
+    varied = getattr(item, "varied", None)
     for part in fields(item):
-        if part.init and part.repr:
+        if part.init and part.repr and (varied is None or part.name in varied):
             found.update(_numbers(f"{path}.{part.name}", getattr(item, part.name)))
     return found
 

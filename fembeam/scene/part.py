@@ -36,7 +36,7 @@ class ScenePart:
                 object.__setattr__(self, key, tuple(given))
 
     def __repr__(self) -> str:
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.repr}
         values["name"] = values.pop("name")  # the last one
         shown = (f"{key}={value!r}" for key, value in values.items() if key not in UNSAID or value is not None)
         return f"{type(self).__name__}({', '.join(shown)})"

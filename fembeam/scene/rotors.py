@@ -74,6 +74,8 @@ class Unbalance(ScenePart):
     ----------
     z : place on the shaft. moment : m e in kg m, ≥ 0. phase : rad, at t = 0 from e₁ to e₂; of a shaft along z x to y.
     direction, signal : left to the scene, which makes two forces of it, along e₁ and e₂, and lets them follow the spin.
+    made, across : left to the scene too: of what moment, phase and spin the signal is, and whether it acts along e₂;
+        such a one follows the one before it. As parameters both are one, `forces[0].moment` of the first.
 
     Examples
     --------
@@ -88,6 +90,8 @@ class Unbalance(ScenePart):
     phase: float = 0.0
     direction: Direction | None = field(default=None, kw_only=True)
     signal: Any = field(default=None, kw_only=True)
+    made: tuple[float, float, float] | None = field(default=None, kw_only=True, repr=False, compare=False)
+    across: bool = field(default=False, kw_only=True, repr=False, compare=False)
     word = "unbalance"
 
     def __post_init__(self) -> None:
@@ -100,22 +104,39 @@ class Unbalance(ScenePart):
         """What it acts on."""
         return LocalCoordinate(self.z, 0, None, self.along)
 
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Fields that are parameters: those of both forces are those of the first, and their signals follow."""
+        return () if self.across else ("z", "moment", "phase")
+
     def pair(self, axes: NDArray[np.float64]) -> tuple[Unbalance, ...]:
         """The forces along both axes across the shaft; itself if it is one of them."""
         if self.direction is not None:
             return (self,)
         first, second = (tuple(float(x) for x in axis) for axis in axes[:2])
         later = self.name if self.name is None else f"{self.name}, across"
-        across = replace(self, direction=second, phase=self.phase - 0.5 * math.pi, name=later)
+        across = replace(self, direction=second, phase=_behind(self.phase), name=later, across=True)
         return replace(self, direction=first), across
+
+    def beside(self, first: Any) -> Unbalance:
+        """The second of a pair, where what was changed of the first is changed; itself beside anything else."""
+        before = first.made if isinstance(first, Unbalance) and self.across and not first.across else None
+        if before is None or self.made != (before[0], _behind(before[1]), before[2]):
+            return self
+        return replace(self, z=first.z, moment=first.moment, phase=_behind(first.phase))
 
     def spun(self, spin: float) -> Unbalance:
         """The same with the signal of a spin; what was made of that signal stays."""
-        size, known = self.moment * spin**2, self.signal
-        if known is not None and (getattr(known, "omega", abs(spin)), getattr(known, "amplitude", size)) == (
-            abs(spin), size):  # fmt: skip
-            return self
-        return replace(self, signal=Harmonic(size, abs(spin), math.copysign(1.0, spin) * self.phase))
+        made = self.moment, self.phase, spin
+        if self.signal is not None and self.made in (None, made):
+            return self if self.made == made else replace(self, made=made)
+        signal = Harmonic(self.moment * spin**2, abs(spin), math.copysign(1.0, spin) * self.phase)
+        return replace(self, signal=signal, made=made)
+
+
+def _behind(phase: float) -> float:
+    """Phase of the force along e₂, rad."""
+    return phase - 0.5 * math.pi
 
 
 def carrier(body: Any, place: Any) -> Any:
@@ -144,8 +165,8 @@ def driven(body: Any, forces: tuple[Any, ...]) -> tuple[Any, ...]:
     for index, force in enumerate(forces):
         if isinstance(force, Unbalance):
             check_shaft(body, force, f"forces[{index}] (Unbalance) of Scene")
-            shaft = carrier(body, force.z)
-            found += [one.spun(shaft.spin) for one in force.pair(shaft.axes[0])]
+            shaft, pair = carrier(body, force.z), force.beside(forces[index - 1] if index else None)
+            found += [one.spun(shaft.spin) for one in pair.pair(shaft.axes[0])]
         else:
             found.append(force)
     return tuple(found)
