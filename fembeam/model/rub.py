@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])  # turns x to y
 ROUND = 1e-6  # of the size of matrices and loads: what a rotor may lack of being round
-FELT = 1e-6  # of the size of the largest row of a matrix: what rounding leaves of rows of nothing, as of twist
+FELT = 1e-4  # of the size of the largest row of a matrix: what rounding leaves of rows of nothing, as of twist
 DEEPEST, LEAST, TRIED = 1e3, 1e-9, 2000  # indentations looked at, of clearance or free whirl, and how many
 WHERE = "Model.rub"
 
