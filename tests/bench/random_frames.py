@@ -110,7 +110,7 @@ def compared(
     if any(np.shape(own[k]) != np.shape(other[k]) for k in own):
         return wrong or ["ill-conditioned"], 0
     moving = any("motion" in one for one in tables["supports"])  # there each has a shape more, and starts otherwise
-    factor = 10 if moving or superelement else 1
+    factor = 100 if moving else 10 if superelement else 1
     apart = differences(their_numbers(tables, run, drawer.plane), own, other, 1 / model.omega[0], moving)
     if any(amplified > WORST for name, (_, amplified) in apart.items() if name.startswith("u ")):
         return wrong or ["ill-conditioned"], 0
