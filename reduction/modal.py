@@ -30,8 +30,7 @@ ELASTIC = 1e3  # of that shift, above which ω² is not that of a rigid-body mod
 RIGID = 1e-7  # of max √(K_ii/M_ii): rounding of K, a few √eps, hides lower frequencies
 RIGID_WITH_ROOT = 1e-12  # same, when R is given: rounding stays below 4e-14 up to 2000 elements
 ROUNDED, GAP = 10.0, 1e6  # times that: rounding of superelements reaches 1.2e-12; no elastic mode within the gap behind
-FINE = 1000  # free dofs, above which more vectors than wanted are corrected
-GUARDS = 6  # so many further: two vectors alone do not settle on 5000 elements, eight do
+GUARDS = 6  # so many more vectors than wanted are corrected: a mode next to the last one wanted settles too slowly
 SETTLED = 1e-9  # relative change of the frequencies by the last correction
 SHAPED = 1e-11  # same, of the shapes' curvature
 STALLED = 0.25  # of the correction before: the shapes' rounding, about eps (length/h)², is reached
@@ -89,14 +88,18 @@ def modal_basis(
     wanted = _wanted(M.shape[0], count, indices)
     _check_mass(M)
     highest = int(wanted[-1]) + 1
-    guards = GUARDS if root is not None and M.shape[0] > FINE else 0
-    wider = min(highest + guards, M.shape[0])
     if root is None:
-        basis = _without_root(M, K, *_solve(M, K, wider))
+        basis = _without_root(M, K, *_solve(M, K, highest))
         _verify(basis, M, K)
     else:
-        basis = _settled(M, K, sparse.csr_matrix(root), wider)
+        basis = _settled(M, K, sparse.csr_matrix(root), highest)
     return oriented(Basis(basis.vectors[:, wanted], basis.omega[wanted]))
+
+
+def _guarded(size: int, count: int) -> int:
+    """`count` and guards behind, as many as leave `_solve` its way."""
+    share = 2 if size <= DENSE_LIMIT else 4
+    return max(count, min(count + GUARDS, size // share))
 
 
 def _solve(M: sparse.csc_matrix, K: sparse.csc_matrix, count: int, factor: float = 1.0) -> tuple[Vector, Vector]:
@@ -163,7 +166,8 @@ def _settled(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix, c
     failure = None
     for factor in WIDER:
         try:
-            basis = _with_root(M, K, R, _solve(M, K, count, factor)[1], factor * _shift(M, K))
+            vectors = _solve(M, K, _guarded(M.shape[0], count), factor)[1]
+            basis = _with_root(M, K, R, vectors, factor * _shift(M, K), count)
             _verify(basis, M, K)
         except AccuracyError as error:
             failure = failure or error
@@ -174,9 +178,9 @@ def _settled(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix, c
 
 
 def _with_root(
-    M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix, vectors: Vector, shift: float
+    M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix, vectors: Vector, shift: float, count: int
 ) -> Basis:
-    """Rayleigh–Ritz in R, then corrections by the residual in R until the frequencies settle."""
+    """Rayleigh–Ritz in R, then corrections by the residual in R until the lowest `count` frequencies settle."""
     mismatch = abs(R.T @ R - K).max() if R.shape[1] == K.shape[0] else np.inf
     if not mismatch <= SYMMETRY_TOLERANCE * abs(K).max():
         raise ValueError(f"root must satisfy rootᵀ root = K, got a difference of {mismatch} in modal_basis; fix it")
@@ -191,11 +195,11 @@ def _with_root(
                 "use fewer elements or less extreme stiffnesses"
             )
         step, old = solve(R.T @ (R @ vectors) - (M @ vectors) * omega**2), omega
-        before, turn = turn, _largest(np.linalg.norm(R @ step, axis=0), omega, rigid)
+        before, turn = turn, _largest(np.linalg.norm(R @ step, axis=0)[:count], omega[:count], rigid)
         omega, vectors = _ritz(M, R, vectors - step)
-        change = _largest(np.abs(omega - old), omega, rigid)
+        change = _largest(np.abs(omega - old)[:count], omega[:count], rigid)
         corrections += 1
-    return Basis(vectors, np.where(omega <= rigid, 0.0, omega))
+    return Basis(vectors[:, :count], np.where(omega <= rigid, 0.0, omega)[:count])
 
 
 def _rigid_with_root(omega: Vector, scale: float) -> float:

@@ -8,6 +8,7 @@ from frames import portal, space_l, turned
 
 import fembeam as fb
 import reduction
+import solvers
 from contacts import Hysteretic, KelvinVoigt
 from fembeam.response import coordinates
 from fembeam.scene import with_value
@@ -276,3 +277,31 @@ def test_numbers_of_members_can_be_varied():
     changed = with_value(scene, "beam.members[0].axial_force", -100.0)
     expected = pressed(-100.0, space=True).reduce(modes=2).omega
     np.testing.assert_allclose(changed.reduce(modes=2).omega, expected, rtol=1e-12)
+
+
+def across_its_plane(way):
+    """A flat cantilever in space, softest along z, its base moving one way, stops at its tip along z and y."""
+    frame = fb.Frame({"A": (0, 0, 0), "B": (1, 0, 0)}, [fb.Member("A", "B", STEEL, up="z")])
+    stops = [fb.Stop("B", LAW, direction=one) for one in "zy"]
+    return fb.Scene(frame, [fb.Clamped("A")], stops=stops, base={way: fb.Harmonic(1e-3, 40.0)}, **PARTS)
+
+
+def test_a_stop_across_all_modes_is_at_rest_and_told():
+    """Rounding of shapes is no motion: of it came contacts 1e-18 m deep, which changed those of others by 2e-6."""
+    scene = across_its_plane("z")
+    with pytest.warns(UserWarning, match="no mode kept moves the place of 'stop at B, y'"):
+        model = scene.reduce(modes=[0])
+    assert model.directions[1].tolist() == [0.0]
+    assert set(model.simulate(0.5, 1e-3).contacts.stop) == {0}
+    assert solvers.Newmark(dt=1e-4).stable_dt(model.system).flight > 0.0
+    with pytest.raises(ValueError, match="a mode must move the stop"):
+        model.strike(0.1, stop=1)
+    assert "no mode kept moves" in str(scene.check(0.5, 1e-3, modes=1))
+
+
+def test_a_load_across_all_modes_moves_nothing():
+    """It moved them by 1e-20 m, and the log of a stop that just touches had 28 contacts."""
+    with pytest.warns(UserWarning, match="no mode kept moves"):
+        run = across_its_plane("y").reduce(modes=[0]).simulate(0.5, 1e-3)
+    assert len(run.contacts) == 0
+    assert not run.q.any()

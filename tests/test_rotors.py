@@ -373,3 +373,21 @@ def test_half_a_pair_of_a_shaft_at_rest_is_told_and_moves_along_x():
     assert said[0].filename == __file__
     np.testing.assert_allclose(model.phi(("B", "y"))[[0, 2]], 0.0, atol=1e-8)
     assert np.all(np.abs(model.phi(("B", "x"))[[0, 2]]) > 1.0)
+
+
+def test_rotor_of_nelson_and_mcvaugh():
+    """Critical speeds, rpm, as H.D. Nelson, J.M. McVaugh print for isotropic bearings, J. Eng. Ind. 98 (1976) 593."""
+    z = [0, 1.27, 5.08, 7.62, 8.89, 10.16, 10.67, 11.43, 12.7, 13.46, 16.51, 19.05, 22.86, 26.67, 28.7, 30.48, 31.5]
+    z += [34.54, 35.5]  # cm, as all of their table
+    outer = [0.51, 1.02, 0.76, 2.03, 2.03, 3.3, 3.3, 2.54, 2.54, 1.27, 1.27, 1.52, 1.52, 1.27, 1.27, 3.81, 2.03, 2.03]
+    inner = {6: 1.52, 7: 1.78, 17: 1.52}
+    members = []
+    for i, radius in enumerate(outer):
+        hole = {"outer": 0.02 * radius, "inner": 0.02 * inner[i]} if i in inner else {"diameter": 0.02 * radius}
+        make = fb.Section.tube if i in inner else fb.Section.circle
+        members.append(fb.Member(f"{i}", f"{i + 1}", make(2.078e11, 7806.0, **hole)))
+    shaft = fb.Frame({f"{i}": (0, 0, 0.01 * x) for i, x in enumerate(z)}, members, spin=1000.0, bending_only=True)
+    bearings = [fb.Spring(place, 4.378e7, direction=way) for place in ("10", "14") for way in "xy"]
+    rotor = fb.Scene(shaft, masses=[fb.Disk("4", 1.401, diametral=0.00136, polar=0.002)], springs=bearings)
+    found = rotor.campbell(np.linspace(0.0, 11000.0, 23)).critical * 30.0 / np.pi
+    np.testing.assert_allclose(found, [-15470, 17159, -46612, 49983, -64752, 96457], rtol=7e-3)

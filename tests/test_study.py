@@ -1,5 +1,6 @@
 """Studies: many runs spread over executors, quantities, mode counts, smallest models."""
 
+import warnings
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -586,3 +587,13 @@ def test_a_campbell_diagram_of_a_file_uses_the_mesh_that_reduce_says(tmp_path, f
     assert np.abs(found / file.scene.campbell([0.0, 300.0], 2).omega - 1).max() > 1e-7
     with pytest.raises(scene_file.SceneFileError, match="modes must be at most 64, got 1000 in campbell"):
         file_of(text, "campbell.modes=1000")
+
+
+def test_the_mean_energy_of_samples_that_miss_contacts_is_told():
+    """Of 1.4 samples in a contact it is off by 4e-3, with a standard error of 1e-15."""
+    scene = paper_scene(fb.Harmonic(1e-3, 108.0))
+    with pytest.warns(UserWarning, match="contacts last .* samples, .* of the time: the mean energy is as uncertain"):
+        fb.study.vary(scene, {"base.amplitude": [1e-3]}, "energy", modes=2)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        fb.study.vary(scene, {"base.amplitude": [1e-3]}, "energy", modes=2, dt=1e-5, discard=0.1, duration=0.3)

@@ -96,7 +96,7 @@ def _touched(model: Model, log: solvers.ContactLog | None, stop: int, struck: bo
 def _strike(model: Model, speed: float, stop: int) -> solvers.ContactLog | None:
     """Contacts with a stop struck by the first mode; None when that does not move there."""
     rows = model.directions[model.rows_of[stop]]
-    if np.abs(rows[:, 0]).max() < 1e-9 * np.abs(rows).max():
+    if np.abs(rows[:, 0]).max() <= 1e-9 * np.abs(rows).max():
         return None
     try:
         return model.strike(speed, stop)

@@ -106,6 +106,8 @@ class Model(Printed, ModalEquations):
         require(known, f"stop must be below {len(self.scene.stops)}", stop, "Model.strike",
                 "count from 0")  # fmt: skip
         contact = initial_states.smooth(self.system.contacts[stop])
+        require(bool(contact.direction.any()), "a mode must move the stop", contact.name, "Model.strike",
+                "keep more modes, or residual=True")  # fmt: skip
         start, mode = np.zeros((2, len(self.omega))), 0
         if contact.map == "annulus":
             start[:, 0] = initial_states.onto_circle(contact, speed)

@@ -66,7 +66,9 @@ def reduced(
     _warn_of_drift(scene, matrices, bases)
     shapes, *others = _shapes_of_each(scene, matrices, basis)
     modes_of_all = sum(numbers, ()) + (0,) * len(matrices.impactors)
-    return Model(scene, matrices, basis, modes_of_all, shapes, counts, tuple(others), options)
+    model = Model(scene, matrices, basis, modes_of_all, shapes, counts, tuple(others), options)
+    _warn_of_still_places(model)
+    return model
 
 
 def check_reduction(
@@ -196,6 +198,16 @@ def _warn_of_drift(scene: Scene, matrices: Matrices, bases: list[reduction.Basis
         acting = [*part.stops, *(one for one in scene.acting if number and (one.coordinate.to or (0,))[0] == number)]
         if beam.named and count and loads and not part.elements and sum(len(one.coordinates) for one in acting) < 2:
             warnings.warn(carried_away(count, number, "structure"), UserWarning, stacklevel=4)
+
+
+def _warn_of_still_places(model: Model) -> None:
+    """Warn when no mode moves the place of a stop or element, such as one across the plane of all of them."""
+    still = [one.name for one, own in zip(model.contact_rows, model.rows_of, strict=True)
+             if not model.directions[own].any()]  # fmt: skip
+    if still:
+        named = ", ".join(repr(name) for name in still)
+        said = f"no mode kept moves the place of {named}: nothing happens there; keep more modes, or residual=True"
+        warnings.warn(said, UserWarning, stacklevel=4)
 
 
 def _warn_of_cut_pairs(beam: Matrices, omega: Vector, chosen: tuple[int, ...]) -> None:

@@ -128,7 +128,7 @@ class Fixed(_Holding):
         super().__post_init__()
         for dof in chosen:
             require(dof in COMPONENTS, f"dofs must be of {', '.join(COMPONENTS)}", dof, self.where,
-                    "choose from these, or name none to fix all")  # fmt: skip
+                    "name each by itself, Fixed(place, 'x', 'rz'), or none to fix all")  # fmt: skip
         require(len(set(chosen)) == len(chosen), "dofs must be named once", chosen, self.where, "keep one")
         object.__setattr__(self, "dofs", chosen or COMPONENTS)
         object.__setattr__(self, "motion", motion)

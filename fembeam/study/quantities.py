@@ -8,6 +8,7 @@ looked at is δ of a stop, or u at `z`, or u of the tip in a scene without stops
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -28,6 +29,7 @@ Vector = NDArray[np.float64]
 Quantity = Callable[[Run], Any]
 
 PROBABILITIES = np.arange(1, 20) / 20
+FEWEST_IN_CONTACT = 4  # samples: of 4.4 the mean energy of a beam on its stop is right to 1e-4, of 1.4 to 4e-3
 
 
 @dataclass(frozen=True)
@@ -191,12 +193,16 @@ class Density(OfSignal):
 
 @dataclass(frozen=True)
 class MeanEnergy:
-    """Mean energy stored in the beam, ½ Σ (q̇² + ω² q²), J; trapezoidal over the samples."""
+    """Mean energy stored in the beam, ½ Σ (q̇² + ω² q²), J; trapezoidal over the samples.
+
+    While a contact lasts it is less, by what the stop holds: a UserWarning tells of contacts too short for the samples.
+    """
 
     sampled: ClassVar[bool] = True
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
+        _warn_of_short_contacts(run)
         return mean_in_time(run, np.sum(run.q_dot**2 + (run.q * run.readout.omega) ** 2, axis=1) / 2)
 
     def derivative(self, change: Change) -> float:
@@ -313,6 +319,16 @@ def mean_in_time(run: Run, values: Vector) -> float:
     """Mean over the time of the samples by trapezia: of a period, whose last sample is its first, each counts once."""
     require(len(run.t) > 1, "the run must have samples", len(run.t), "quantity", "give dt")
     return float(np.trapezoid(values, run.t) / (run.t[-1] - run.t[0]))
+
+
+def _warn_of_short_contacts(run: Run) -> None:
+    """Warn where samples pass over what a contact takes from the beam and gives back."""
+    lasted = run.contacts.t_out - run.contacts.t_in
+    lasted = lasted[np.isfinite(lasted)]
+    if len(lasted) and len(run.t) > 1 and np.median(lasted) < FEWEST_IN_CONTACT * (step := float(run.t[1] - run.t[0])):
+        share = lasted.sum() / (run.t[-1] - run.t[0])
+        warnings.warn(f"contacts last {np.median(lasted) / step:.2g} samples, {share:.2g} of the time: the mean energy "
+                      "is as uncertain as that; give a smaller dt", UserWarning, stacklevel=2)  # fmt: skip
 
 
 def _mean(values: Vector) -> float:

@@ -174,7 +174,10 @@ def tangents(system: System, indentation: float | None) -> list[tuple[float, flo
 
 def tangent(system: System, contact: Contact, indentation: float | None) -> tuple[float, float, float]:
     """∂F/∂δ, ∂F/∂δ̇ of a stop at its expected indentation, and the mass 1/(wᵀM⁻¹w) it feels."""
-    mass = 1.0 / float(contact.direction @ _solve(system.M, contact.direction))
+    reach = float(contact.direction @ _solve(system.M, contact.direction))
+    if not reach > 0.0:  # nothing moves it
+        return 0.0, 0.0, math.inf
+    mass = 1.0 / reach
     if indentation is None:
         delta, speed = max(_depth(contact.law, mass, EXPECTED_SPEED), -contact.gap), EXPECTED_SPEED
     else:

@@ -34,6 +34,7 @@ from second_motion import Acting, Motion, TooManyError
 from second_signals import breaks, signal
 
 import fembeam as fb
+from reduction import AccuracyError
 from solvers import Exponential, SolverError
 
 ALLOWED = 300.0
@@ -111,7 +112,7 @@ def judge(seed: int, depth: int = 4, part: float = 1.0) -> tuple[str, list[str],
         warnings.simplefilter("ignore", UserWarning)
         try:
             model = scene_of(drawn.tables).reduce(**drawn.how)
-        except ValueError as error:
+        except (ValueError, AccuracyError) as error:
             return told(drawn, seed), [f"refused: {error}"], 0
         return told(drawn, seed), *compared(drawn, model, seed)
 

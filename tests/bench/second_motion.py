@@ -25,6 +25,7 @@ FACTORS = {
 }
 FLOOR = 1e-3  # m/s, the least rate of entry that a law sees unless it says otherwise
 MOST_BORDERS = 3000
+WITHIN = 1.0 - 1e-12  # of its limit is where a slider sticks: at it, rounding could let it slip on at once
 
 
 class TooManyError(RuntimeError):
@@ -125,7 +126,7 @@ class Acting:
             self.enter(d, v)
             return
         if to == "stick":
-            self.place = d - SIGN[self.state] * self.f / self.k
+            self.place = d - SIGN[self.state] * WITHIN * self.f / self.k
         self.state = to
 
 
