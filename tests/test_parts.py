@@ -25,8 +25,14 @@ from contacts import Hertz, KelvinVoigt
 from solvers import Contact, Exponential, System, integrate
 from solvers.compiled.kernels import PlanarProblem, Problem
 from solvers.compiled.parts import *
-def run(law=Hertz(1e6), stops=1, **options):
-    ball = System(M=[[2.0]], C=[[0.0]], K=[[0.0]], contacts=[Contact([1.0], law, 1e-4 * i) for i in range(stops)])
+class Kink:
+    def __call__(self, t):
+        return abs(t - 0.01)
+    def nodes(self, duration, rtol):
+        return 0.01, np.array([[0.01, -1, 0, 0.01, -1, 0], [0, 1, 0, 0, -1, 0], [0.01, 1, 0, 0.01, 1, 0]])
+def run(law=Hertz(1e6), stops=1, loads=(), **options):
+    contacts = [Contact([1.0], law, 1e-4 * i) for i in range(stops)]
+    ball = System(M=[[2.0]], C=[[0.0]], K=[[0.0]], contacts=contacts, loads=loads)
     integrate(ball, [1e-3], [-0.5], duration=0.02, **options)
 def loaded():
     return [np.flatnonzero(addresses_of(kind)).tolist() for kind in (Problem, PlanarProblem)]
@@ -87,7 +93,7 @@ def test_two_threads_compile_a_part_once(problem, monkeypatch):
 def test_every_place_has_a_function():
     importlib.import_module("solvers.exponential.method")
     groups = parts.EVERY_RUN, parts.ENERGY, parts.BORDERS, parts.TWO_STOPS, parts.MANY_STOPS, parts.CIRCLES
-    groups += (parts.FRICTION,)
+    groups += parts.KINKS, parts.FRICTION
     assert sorted(place for group in groups for place in group) == list(range(parts.PLACES))
     assert sorted(parts._DECLARED) == list(range(parts.PLACES))
 
@@ -103,6 +109,7 @@ def test_a_run_loads_what_it_needs_and_nothing_of_circles():
         ("run(KelvinVoigt(1e6, 0.5, clamp=True))", "BORDERS"),
         ("run(stops=2)", "TWO_STOPS"),
         ("run(stops=4)", "MANY_STOPS"),
+        ("run(loads=[([1.0], Kink())])", "KINKS"),
     ):
         code += f"{run}\nneeded |= set({needed})\nassert loaded() == [sorted(needed), []], ({run!r}, loaded())\n"
     fresh_process.run(code, HOME, {**os.environ, "PYTHONPATH": str(HOME)})

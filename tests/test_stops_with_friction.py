@@ -266,6 +266,7 @@ def test_the_energy_of_a_summary_and_its_page_balances_with_friction(tube, tmp_p
     assert energy["friction"] > energy["contact"]
     assert losses["loss"][0] == pytest.approx(losses["work"][0] - losses["stored"][0] + losses["friction"][0], rel=1e-9)
     assert losses["spin"][0] == pytest.approx(energy["spin"], rel=1e-9)
+    assert list(run.losses.arrays()) == ["work", "stored", "loss", "slip", "friction", "spin"]
     files.write_json(tmp_path / "summary.json", found)
     page = html_page.write_page(tmp_path).read_text(encoding="utf-8")
     assert "put in by spin" in page

@@ -223,10 +223,7 @@ def _energy(run: Run) -> dict[str, float]:
 
 def _losses(run: Run) -> dict[str, list[float]]:
     """What each stop and element took, J, with friction and the work of spins where there is friction."""
-    found = run.losses.arrays()
-    if run.rubs[:, 1].any():
-        found |= {"friction": run.losses.friction, "spin": run.losses.spin}
-    return {name: np.asarray(values, dtype=float).tolist() for name, values in found.items()}
+    return {name: np.asarray(values, dtype=float).tolist() for name, values in run.losses.arrays().items()}
 
 
 def text(found: dict[str, Any]) -> str:

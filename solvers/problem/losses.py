@@ -67,8 +67,9 @@ class Losses:
         return self.work - self.stored
 
     def arrays(self) -> dict[str, Array]:
-        """The columns with one entry per contact, by name."""
-        return {"work": self.work, "stored": self.stored, "loss": self.loss, "slip": self.slip}
+        """The columns with one entry per contact, by name; friction and the work of spins of runs with friction."""
+        columns = {"work": self.work, "stored": self.stored, "loss": self.loss, "slip": self.slip}
+        return columns | ({"friction": self.friction, "spin": self.spin} if np.ndim(self.friction) else {})
 
     def to_dataframe(self) -> Any:
         """A table of pandas, one contact a row, in SI units; ImportError where pandas is missing."""
