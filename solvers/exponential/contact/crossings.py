@@ -278,7 +278,7 @@ def _bend_at_nodes(tables, scratch, node_set, h, s, begin, largest):
 
 @inner
 def _bend_between_nodes(problem, tables, state, scratch, node_set, h, s, begin, largest):
-    """The same where it is on the right side at all nodes, but on the other one near a minimum between them."""
+    """The time of a minimum between nodes on the wrong side, where all nodes are on the right one; or inf."""
     values, side, there = scratch.bend_values, scratch.side[s], scratch.numbers
     tolerance = max(_ROUNDING * largest, -2.0 * side * begin)
     for i in range(S):

@@ -67,7 +67,7 @@ def local_maximum(values, limit, coefficients):
 
 @inner
 def maximum_and_place(values, limit, coefficients):
-    """The same and its place.
+    """Maximum of the same polynomial and its place, at the limit that of the highest value.
 
     Newton's method for a zero of the slope begins at the vertex of the parabola through that point and its neighbours;
     the error of the maximum is of the third order in the last step.
