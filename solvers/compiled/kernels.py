@@ -265,17 +265,22 @@ def abs_dot(a, b, n):
 
 
 @inlined
+def at_end(problem):
+    """Column of the node tables from which on a row has s, s', s'' of the cell that ends there."""
+    return problem.table.shape[1] - 3
+
+
+@inlined
 def cell_ends(problem, row):
     """[s, s', s''] at the start and at the end of the cell that begins with a row of the node tables."""
-    table = problem.table
-    return table[row], table[row + 1, table.shape[1] - 3 :]
+    return problem.table[row], problem.table[row + 1, at_end(problem) :]
 
 
 @inlined
 def bends_at(problem, row):
     """Whether slope or curvature of a sampled signal jump at a row of the node tables."""
-    table, before = problem.table, problem.table.shape[1] - 3
-    return table[row, 1] != table[row, before + 1] or table[row, 2] != table[row, before + 2]
+    both, e = problem.table[row], at_end(problem)
+    return both[1] != both[e + 1] or both[2] != both[e + 2]
 
 
 @inner
@@ -284,11 +289,11 @@ def table_value(problem, j, t):
     dt, start = problem.table_dt[j], problem.table_start[j]
     cell = min(max(int(t / dt), 0), problem.table_start[j + 1] - start - 2)
     x = t / dt - cell
-    a, b = cell_ends(problem, start + cell)
+    a, b, e = problem.table[start + cell], problem.table[start + cell + 1], at_end(problem)
     s0, s1 = a[1] * dt, a[2] * dt * dt * 0.5
-    e0 = b[0] - a[0] - s0 - s1
-    e1 = b[1] * dt - s0 - 2.0 * s1
-    e2 = b[2] * dt * dt * 0.5 - s1
+    e0 = b[e] - a[0] - s0 - s1
+    e1 = b[e + 1] * dt - s0 - 2.0 * s1
+    e2 = b[e + 2] * dt * dt * 0.5 - s1
     c3 = 10.0 * e0 - 4.0 * e1 + e2
     c4 = -15.0 * e0 + 7.0 * e1 - 2.0 * e2
     c5 = 6.0 * e0 - 3.0 * e1 + e2

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from solvers.compiled.kernels import cell_ends, copy, inlined, inner
+from solvers.compiled.kernels import at_end, copy, inlined, inner
 from solvers.compiled.simd import WIDTH, bit_pattern, load8, splat8, sqrt8, store8, sum8
 from solvers.compiled.sums import combine
 
@@ -44,11 +44,12 @@ def cell_of(problem, t):
 def quintic(problem, j, cell):
     """Coefficients of the quintic of node table j on a cell, in powers of (t - start)/dt."""
     dt = problem.table_dt[j]
-    a, b = cell_ends(problem, problem.table_start[j] + cell)
+    row, e = problem.table_start[j] + cell, at_end(problem)
+    a, b = problem.table[row], problem.table[row + 1]
     s1, s2 = a[1] * dt, 0.5 * a[2] * dt * dt
-    e0 = b[0] - a[0] - s1 - s2
-    e1 = b[1] * dt - s1 - 2.0 * s2
-    e2 = 0.5 * b[2] * dt * dt - s2
+    e0 = b[e] - a[0] - s1 - s2
+    e1 = b[e + 1] * dt - s1 - 2.0 * s2
+    e2 = 0.5 * b[e + 2] * dt * dt - s2
     return a[0], s1, s2, 10.0 * e0 - 4.0 * e1 + e2, -15.0 * e0 + 7.0 * e1 - 2.0 * e2, 6.0 * e0 - 3.0 * e1 + e2
 
 
@@ -113,9 +114,9 @@ def cross_cell(problem, tables, x, cell, result):
     for i in range(0, width, WIDTH):
         place, rate = splat8(0.0), splat8(0.0)
         for j in range(problem.table_dt.size):
-            rows, ends = tables.cell_signal[problem.table_load[j]], cell_ends(problem, problem.table_start[j] + cell)
+            rows, node = tables.cell_signal[problem.table_load[j]], problem.table_start[j] + cell
             for d in range(3):
-                begin, end = splat8(ends[0][d]), splat8(ends[1][d])
+                begin, end = splat8(problem.table[node, d]), splat8(problem.table[node + 1, at_end(problem) + d])
                 place += begin * load8(rows, 2 * d * width + i) + end * load8(rows, (2 * d + 6) * width + i)
                 rate += begin * load8(rows, (2 * d + 1) * width + i) + end * load8(rows, (2 * d + 7) * width + i)
         p, v, a, b = load8(x[0], i), load8(x[1], i), load8(tables.cell[0], i), load8(tables.cell[1], i)

@@ -398,7 +398,7 @@ def _pulls_inside(work, column, width):
     return pulls
 
 
-@inlined
+@inner
 def _turns_inside(problem, work, s, side, allowed, width):
     """Whether δ̇ of a stop is on the wrong ``side`` by more than ``allowed`` at an inner stage of a landing."""
     turns = False

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.compiled.kernels import REAL, bends_at, inlined, merged
+from solvers.compiled.kernels import REAL, bends_at, inlined, inner, merged
 from solvers.compiled.parts import PASSED, TO_KINK, part
-from solvers.compiled.state import STEPS, T
+from solvers.compiled.state import STEPS, T_END, T
 from solvers.exponential.contact.borders import passed
 from solvers.exponential.contact.crossings import CLEAR, before_landing
 from solvers.exponential.contact.first_step import (
@@ -91,3 +91,16 @@ def step_to_kink(problem, tables, state, scratch, horizon):
     control[NEW] = SEGMENT
     control[NODE_SET] = entry_nodes(problem, tables, state, latest_entered(state), control[NEXT_LEVEL])
     return 0.0
+
+
+@inner
+def longest_under_signals(problem, tables, state, scratch, level):
+    """Longest step, s, that sampled loads allow: to their next kink, if a step of a level reaches so far, and a cell
+    beyond the end of the run. It is 0 if a step to the kink has been done.
+    """
+    remaining = state.now[T_END] - state.now[T]
+    longest = remaining + problem.table_dt[0]
+    if problem.table.shape[1] > 3:
+        horizon = min(tables.contact_step[level], remaining)
+        longest = min(longest, step_to_kink(problem, tables, state, scratch, horizon))
+    return longest

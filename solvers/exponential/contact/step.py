@@ -65,7 +65,7 @@ from solvers.exponential.contact.first_step import (
     latest_entered,
     level_of,
 )
-from solvers.exponential.contact.kinks import step_to_kink
+from solvers.exponential.contact.kinks import longest_under_signals
 from solvers.exponential.contact.landing import LAST_RESORT, may_land
 from solvers.exponential.contact.node_response import force_of, free_response
 from solvers.exponential.contact.nodes import S
@@ -287,13 +287,9 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
     node_set = control[NODE_SET] if control[NEW] else 0
     longest, wanted = 0.8 * time_to_border, control[NEXT_LEVEL]
     if problem.table_dt.size:
-        remaining = state.now[T_END] - state.now[T]
-        longest = min(longest, remaining + problem.table_dt[0])
-        if problem.table.shape[1] > 3:
-            time_to_kink = step_to_kink(problem, tables, state, scratch, min(tables.contact_step[wanted], remaining))
-            if time_to_kink == 0.0:
-                return RUNNING
-            longest = min(longest, time_to_kink)
+        longest = min(longest, longest_under_signals(problem, tables, state, scratch, wanted))
+        if longest == 0.0:
+            return RUNNING
     level = level_of(tables, longest) if longest < tables.contact_step[wanted] else wanted
     copy(scratch.side, scratch.side_at_begin, scratch.side.size)
     while True:
