@@ -22,7 +22,7 @@ from solvers.problem.signals import Forcing, joined
 
 _ROUGH = 1e-2  # jump of derivative p = 1, 2, 3 in units of max|s|/dtᵖ; of a smooth signal at most 1e-3 (rtol <= 1e-6)
 _KINKS_FIRST = 1e6  # weight of jumps of slope and curvature: the grid divides the table that has them
-_CELLS_A_STEP = 128  # of a rough table whose nodes are not on the grid
+_CELLS_A_STEP = 160  # of a rough table whose nodes are not on the grid
 _FEWEST_CELLS = 4096  # where two tables are rough: what is left falls with the fourth power of the step
 
 

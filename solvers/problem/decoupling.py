@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,16 +130,7 @@ def _state_blocks(phi: Array, k: Array, damping: Array, size: Array, turning: Ar
     columns = np.array([p[2] for p in pairs] + [p[3] for p in pairs]).T
     if len(pairs) != n or np.linalg.cond(columns) > 1e12:
         raise ValueError(_INSEPARABLE if turning is None else _INSEPARABLE_TURNING)
-    zero = np.zeros((phi.shape[0], free))
-    T = np.hstack(
-        (
-            np.vstack((rigid, zero)),
-            np.vstack((zero, rigid)),
-            *(np.vstack((phi @ c[:n], phi @ c[n:])) for c in (columns[:, :n], columns[:, n:])),
-        )
-    )
-    order = np.concatenate((np.arange(free), 2 * free + np.arange(n)))
-    T = T[:, np.concatenate((order, order + np.where(np.arange(free + n) < free, free, n)))]
+    T: Any = _states_of_blocks(rigid, phi, columns)
     loss = np.zeros((2 * (free + n), 2 * (free + n)))
     places = np.concatenate((free + np.arange(n), 2 * free + n + np.arange(n)))
     loss[np.ix_(places, places)] = columns[n:].T @ damping @ columns[n:]
@@ -148,6 +140,20 @@ def _state_blocks(phi: Array, k: Array, damping: Array, size: Array, turning: Ar
     none = [0.0] * free
     c = _without_rounding(np.array(none + [p[1] for p in pairs]), terms)
     return Blocks(np.array(none + [p[0] for p in pairs]), c, T, np.linalg.inv(T), loss)
+
+
+def _states_of_blocks(rigid: Array, phi: Array, columns: Array) -> Array:
+    """[q, q̇] of the blocks' states [p, v], rigid-body modes first; ``columns`` are p, then v of the others."""
+    free, n, zero = rigid.shape[1], phi.shape[1], np.zeros_like(rigid)
+    T = np.hstack(
+        (
+            np.vstack((rigid, zero)),
+            np.vstack((zero, rigid)),
+            *(np.vstack((phi @ c[:n], phi @ c[n:])) for c in (columns[:, :n], columns[:, n:])),
+        )
+    )
+    order = np.concatenate((np.arange(free), 2 * free + np.arange(n)))
+    return T[:, np.concatenate((order, order + np.where(np.arange(free + n) < free, free, n)))]
 
 
 _OVERDAMPED = (

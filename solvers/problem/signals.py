@@ -132,7 +132,12 @@ def tones_as_nodes(forcing: Forcing, chosen: list[int], duration: float, rtol: f
 
 
 def _check_nodes(rows: Array, dt: float, duration: float, load: int) -> None:
-    """A node table is finite and covers the run."""
+    """A node table has three columns, or six, is finite and covers the run."""
+    if np.ndim(rows) != 2 or np.shape(rows)[1] not in (3, 6):
+        raise ValueError(
+            f"nodes() of the signal of load {load} must give rows [s, s', s''], (N, 3), or of both sides, (N, 6); "
+            f"got the shape {np.shape(rows)}"
+        )
     if not np.all(np.isfinite(rows)):
         bad = int(np.argwhere(~np.isfinite(rows))[0, 0])
         raise ValueError(f"the signal of load {load} is not finite at t = {bad * dt:g} s")
