@@ -3,7 +3,7 @@
 The energy handled is the initial energy, the input, the energy dissipated and stored, and for every contact the peak
 force times the peak indentation. A run with an energy balance is refused if the residual exceeds (`MULTIPLE` rtol +
 `ROUNDING`) times the energy handled. Of coupled blocks what cancels in their energies is tolerated too, up to
-`CANCELLED` of that.
+`CANCELLED` of that; and `LOADS` roundings of the energy that each load would give alone, as loads may cancel.
 
 Without a balance, let E be the energy of the motion minus the steady response to tones. At the end it is at most that
 at the start plus the work of the contacts,
@@ -33,6 +33,7 @@ from solvers.problem.system import stored_energy
 
 MULTIPLE, ROUNDING = 20.0, 1e-9  # see the module; relative to the energy handled
 CANCELLED = 1e-6  # the most that may cancel in the energies of coupled blocks, relative to the energy handled
+LOADS = 100.0  # roundings tolerated of the energy of loads that cancel
 FACTOR = 4.0  # margin of the check without a balance
 _SAMPLES = 64  # samples whose balance is checked, the last one among them
 FIRST, LAST, ALLOWED = range(3)  # places in Scratch.energy: own energy at start and end, and E_c, J
@@ -133,7 +134,23 @@ def unbalanced(record: Record, rtol: float) -> bool:
     if left > allowed and system.blocks.loss.size:
         told = _told(system, record.back, np.concatenate((record.begin[None], record.motion[rows])))
         allowed += handled * min(float(np.finfo(float).eps * told / stored.max()), CANCELLED)
+    if left > allowed:
+        allowed += LOADS * np.finfo(float).eps * _energy_of_loads(system, record.t[rows])
     return not left <= allowed
+
+
+def _energy_of_loads(system: System, t: Array) -> float:
+    """Energy, J, of the motion that the loads would give if they did not cancel, by their largest values at times t.
+
+    A block answers a force by at most about its static amplitude or, within a duration below 1/ω, by its impulse.
+    """
+    k, n, root = system.blocks.k, system.size, 0.0
+    lasts = 1.0 / np.maximum(np.sqrt(k), 1.0 / t[-1])
+    for vector, signal in system.loads:
+        rate = system.push @ np.asarray(vector)
+        size = np.linalg.norm(np.hypot(rate[n:], np.sqrt(k) * rate[:n]) * lasts)
+        root += float(np.abs([signal(float(at)) for at in t]).max() * size)
+    return 0.5 * root**2
 
 
 def _told(system: System, back: Array, motion: Array) -> float:
