@@ -174,6 +174,24 @@ def test_roots_of_damping_that_nearly_fall_together():
         integrate(nearly_critical(1e-7), *start, 10.0, 0.1, Exponential(1e-10))
 
 
+@pytest.mark.parametrize(
+    ("signal", "duration"),
+    [(fb.Harmonic(2.0, 13.0), 2.0), (fb.Harmonic(2.0, 13.0), 200.0), (Nodes(), 2.0)],
+    ids=["short", "long", "nodes"],
+)
+@pytest.mark.parametrize("left", [0.0, 1e-16, 1e-9])
+def test_loads_that_cancel_leave_a_motion_that_is_rounding(signal, duration, left):
+    """Rounding of the work of each load was taken for a gain of energy; what they leave beyond it is right."""
+    push, turned = np.array([0.6, -1.7]), np.array([[0.8, 0.6], [-0.6, 0.8]])
+    vectors = turned @ push, -(turned @ push) * (1.0 - left)
+    stop = Contact(turned @ np.array([1.0, 0.0]), Hertz(1e6), gap=1e-3)
+    system = System(np.eye(2), 0.3 * np.eye(2), np.diag([30.0, 400.0]), [stop], [(one, signal) for one in vectors])
+    run = integrate(system, [0.0, 0.0], [0.0, 0.0], duration, 0.01)
+    alone = replace(system, loads=[(vectors[0] * max(left, 1e-16), signal)])
+    exact = integrate(alone, [0.0, 0.0], [0.0, 0.0], duration, 0.01)
+    np.testing.assert_allclose(run.q, exact.q, rtol=0.0, atol=2e-16 if left < 1e-9 else 2e-15)
+
+
 class RoughNodes(Nodes):
     """A signal whose values, slopes and curvatures at the nodes have nothing to do with one another."""
 
