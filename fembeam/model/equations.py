@@ -22,6 +22,7 @@ from fembeam.model import initial_states
 from fembeam.response import Site, site
 from fembeam.response.shapes import Vector
 from fembeam.scene import (
+    ON,
     contact_rows,
     load_signals,
     loads,
@@ -33,7 +34,7 @@ from fembeam.scene import (
     weight,
 )
 from fembeam.scene.contact_rows import ContactRow
-from fembeam.support import is_whole, require
+from fembeam.support import is_finite, is_whole, require
 
 if TYPE_CHECKING:
     from fembeam.response import SectionForces
@@ -232,6 +233,26 @@ class ModalEquations:
         """Which of the rows of `directions` are those of each contact."""
         ends = np.cumsum([0, *(one.row.shape[0] for one in self.contact_rows)]).tolist()
         return [slice(a, b) for a, b in pairwise(ends)]
+
+    @cached_property
+    def told_by_runs(self) -> dict[str, Any]:
+        """What every run keeps of its scene and contacts, by the name of its attribute; the arrays are read-only."""
+        rows = self.contact_rows
+        along = [one.z if is_finite(one.z) and one.direction is None else np.nan for one in rows]
+        found: dict[str, Any] = {
+            "stops": np.array([(z, one.push, one.gap) for z, one in zip(along, rows, strict=True)], float).reshape(
+                -1, 3
+            ),
+            "on": np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
+            "kinds": np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
+            "circles": np.array([one.circle for one in rows], dtype=float).reshape(-1, 3),
+            "rubs": np.array([one.rub for one in rows], dtype=float).reshape(-1, 4),
+            "impactor_masses": np.array([impactor.mass for impactor in self.matrices.impactors], dtype=float),
+        }
+        for array in found.values():
+            array.flags.writeable = False
+        words = {name: tuple(getattr(one, name) for one in rows) for name in ("given", "acting")}
+        return {**found, **words, "names": tuple(one.name for one in rows), "scene": repr(self.scene)}
 
     @cached_property
     def system(self) -> solvers.System:

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam.response import Histories, PlacedLog
-from fembeam.scene import ON, Source
-from fembeam.support import Part, Printed, is_finite
+from fembeam.scene import Source
+from fembeam.support import Part, Printed
 from solvers.integration import loads_taken
 from solvers.problem import counted
 
@@ -94,10 +94,6 @@ class Run(Histories, Printed):
         made: Made | None = None,
     ) -> Run:
         """The run of a model from its solution."""
-        rows = model.contact_rows
-        along = [one.z if is_finite(one.z) and one.direction is None else np.nan for one in rows]
-        stops = np.array([(z, one.push, one.gap) for z, one in zip(along, rows, strict=True)], dtype=float)
-        masses = np.array([impactor.mass for impactor in model.matrices.impactors], dtype=float)
         status = solution.status.value
         if not solution.status.good:
             status += f" (t = {solution.t[-1]:g} s)" if len(solution.t) else " (before the first sample)"
@@ -112,28 +108,19 @@ class Run(Histories, Printed):
             status=status,
             cost=solution.cost,
             shapes=model.shapes,
-            stops=stops.reshape(-1, 3),
             directions=model.directions,
-            impactor_masses=masses,
-            scene=repr(model.scene),
             borders=solution.record.transitions,
             lost=solution.record.losses,
             model=model,
             others=model.others,
             began=began,
             end=solution.end,
-            on=np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
-            kinds=np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
-            names=tuple(one.name for one in rows),
-            given=tuple(one.given for one in rows),
-            acting=tuple(one.acting for one in rows),
             sampled=sampled,
-            circles=np.array([one.circle for one in rows], dtype=float).reshape(-1, 3),
-            rubs=np.array([one.rub for one in rows], dtype=float).reshape(-1, 4),
             rubbing=solution.record.friction,
             reached=reached,
             taken=taken,
             made=made,
+            **model.told_by_runs,
         )
 
     @property

@@ -437,7 +437,7 @@ class System:
 def stored_energy(M: Any, K: Any, q: Array, q_dot: Array) -> Array:
     """½ q'ᵀ M q' + ½ qᵀ K q of (..., n) arrays; inf of a run that diverged."""
     with np.errstate(over="ignore", invalid="ignore"):
-        return 0.5 * sum(np.einsum("...i,...i", product(x, matrix), x) for x, matrix in ((q_dot, M), (q, K)))
+        return 0.5 * (np.vecdot(product(q_dot, M), q_dot) + np.vecdot(product(q, K), q))
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ import numpy as np
 
 from solvers.compiled.kernels import inner, merged, row_of, rubs, slider_of
 from solvers.compiled.state import PEAK_FORCE, T
-from solvers.problem import Array, Energy, Record, System, dense
+from solvers.problem import Array, Record, System, dense
 from solvers.problem.friction import ARM, MU, SPIN, may_pull
 from solvers.problem.system import stored_energy
 
@@ -35,6 +35,7 @@ MULTIPLE, ROUNDING = 20.0, 1e-9  # see the module; relative to the energy handle
 CANCELLED = 1e-6  # the most that may cancel in the energies of coupled blocks, relative to the energy handled
 LOADS = 100.0  # roundings tolerated of the energy of loads that cancel
 FACTOR = 4.0  # margin of the check without a balance
+_NONE = np.zeros(0)
 _SAMPLES = 64  # samples whose balance is checked, the last one among them
 FIRST, LAST, ALLOWED = range(3)  # places in Scratch.energy: own energy at start and end, and E_c, J
 
@@ -123,20 +124,33 @@ def _checked_places(count: int) -> Any:
 
 def unbalanced(record: Record, rtol: float) -> bool:
     """Whether the energy balance at the samples of a run has a residual above the tolerated one."""
-    rows, system, rubbed = _checked_places(len(record.motion)), record.system, record.works_of_friction
-    motion = np.concatenate(((record.back @ record.begin)[None], record.motion[rows]))
+    rows, system = _checked_places(len(record.motion)), record.system
+    motion = np.concatenate(((record.back @ record.begin)[None], record.motion.take(rows, axis=0)))
     stored = stored_energy(system.M, system.K, motion[:, : system.size], motion[:, system.size :])
-    works, sampled = record.works[rows], (part[rows] if np.ndim(part) else part for part in rubbed)
-    balance = Energy(works[:, 0], works[:, 1], works[:, 2::2].sum(axis=1), stored[1:], stored[0], *sampled)
-    handled = balance.initial + np.abs((balance.stored, balance.input, balance.damping)).max(axis=1).sum()
-    handled += sum(np.abs(part).max() for part in rubbed)
-    left, allowed = np.abs(balance.residual).max(), tolerated_energy(handled, record.exchanged(), rtol)
-    if left > allowed and system.blocks.loss.size:
+    works = record.works.take(rows, axis=0)
+    left, handled = stored[1:] - stored[0] - works @ _signs(works.shape[1]), stored[0] + stored[1:].max()
+    if record.rubbed is not None:
+        friction, spin = (part[rows] for part in record.works_of_friction)
+        left, handled = left + friction - spin, handled + np.abs(friction).max() + np.abs(spin).max()
+    handled += np.abs(works[:, :2]).max(axis=0).sum()
+    residual, allowed = np.abs(left).max(), tolerated_energy(handled, _NONE, rtol)
+    if residual <= allowed:
+        return False
+    allowed = tolerated_energy(handled, record.exchanged(), rtol)
+    if system.blocks.loss.size:
         told = _told(system, record.back, np.concatenate((record.begin[None], record.motion[rows])))
-        allowed += handled * min(float(np.finfo(float).eps * told / stored.max()), CANCELLED)
-    if left > allowed:
+        allowed += handled * min(float(np.finfo(float).eps * told / stored[1:].max()), CANCELLED)
+    if residual > allowed:
         allowed += LOADS * np.finfo(float).eps * _energy_of_loads(system, record.t[rows])
-    return not left <= allowed
+    return not residual <= allowed
+
+
+@lru_cache(maxsize=64)
+def _signs(count: int) -> Any:
+    """(2 + 2m,) what a work adds to the energy: input, damping, then work and impulse of every contact."""
+    signs = np.zeros(count)
+    signs[0], signs[1], signs[2::2] = 1.0, -1.0, -1.0
+    return signs
 
 
 def _energy_of_loads(system: System, t: Array) -> float:
