@@ -192,6 +192,20 @@ def test_loads_that_cancel_leave_a_motion_that_is_rounding(signal, duration, lef
     np.testing.assert_allclose(run.q, exact.q, rtol=0.0, atol=2e-16 if left < 1e-9 else 2e-15)
 
 
+@pytest.mark.parametrize("seed", [2, 3, 5, 6, 7])
+def test_stops_that_rounding_moves_on_their_surface_take_few_steps(seed):
+    """At a rate that is rounding a stop drifted out of a contact, which then took 1e7 steps of the shortest length."""
+    rng = np.random.default_rng(seed)
+    angle, push = rng.uniform(0.0, 6.28), 3.0 * rng.normal(size=2)
+    turned = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    stop = Contact(turned @ np.array([1.0, 0.3]), KelvinVoigt(1e6, 0.0), gap=0.0)
+    loads = [(turned @ push * way, fb.Harmonic(2.0, 60.0)) for way in (1.0, -1.0)]
+    system = System(np.eye(2), 0.3 * np.eye(2), np.diag([3e4, 4e4]), [stop], loads)
+    run = integrate(system, [0.0, 0.0], [0.0, 0.0], 0.05, 0.01)
+    assert run.cost.steps < 20_000
+    assert np.abs(run.q).max() < 1e-15
+
+
 class RoughNodes(Nodes):
     """A signal whose values, slopes and curvatures at the nodes have nothing to do with one another."""
 

@@ -44,6 +44,7 @@ DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAIN
 T, H_FLIGHT, H_CONTACT, LAST_EVENT, T_END, LEFT = range(6)  # places in State.now
 STEPS, REJECTED, CALLS, EVENTS, LOGGED, SAMPLED, AT_ONCE, RECORDED = range(8)  # places in State.count
 T_IN, PEAK_DELTA, PEAK_FORCE = range(3)  # columns of State.active
+OUTSIDE = 8.0  # roundings of δ by which a step in contact may leave its segment
 MOST_EVENTS_AT_ONCE = 100  # events at one instant above which a run ends with CHATTER
 STEP, PART, LANDING, EVENT, RENEWAL = 0.0, 1.0, 2.0, 3.0, 4.0  # kinds of rows of State.event_record
 KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of State.event_record: FIRST and SECOND are two
@@ -282,7 +283,7 @@ def switch_on_surface(problem, state, locates):
     switched = False
     for s in range(problem.law.size):
         direction = _exit_direction(problem, state, s, locates)
-        if direction != 0 and abs(indentation_rate(problem, s, state.x)) > rate_tolerance(problem, s, state.x):
+        if direction != 0:
             switch(problem, state, s, direction)
             switched = True
     return switched
@@ -290,14 +291,20 @@ def switch_on_surface(problem, state, locates):
 
 @inlined
 def _exit_direction(problem, state, s, locates):
-    """Direction, 1 or -1, in which a stop on a border of its segment moves out of it, or 0."""
+    """Direction, 1 or -1, in which a stop on a border of its segment moves out of it, or 0.
+
+    One whose rate is rounding stays, unless it has drifted out of the contact by more than a step may leave it.
+    """
     delta, delta_dot = indentation_and_rate(problem, s, state.x)
     tolerance, segment = surface_tolerance(problem, s, state.x) if locates else 0.0, state.segment[s]
+    direction = 0
     if delta >= problem.knots[s, segment] - tolerance and delta_dot > 0.0:
-        return 1
-    if segment > 0 and delta <= problem.knots[s, segment - 1] + tolerance and delta_dot < 0.0:
-        return -1
-    return 0
+        direction = 1
+    elif segment > 0 and delta <= problem.knots[s, segment - 1] + tolerance:
+        if locates and segment == 1 and delta < problem.knots[s, 0] - OUTSIDE * tolerance:
+            return -1
+        direction = -1 if delta_dot < 0.0 else 0
+    return direction if direction == 0 or abs(delta_dot) > rate_tolerance(problem, s, state.x) else 0
 
 
 @inlined

@@ -37,7 +37,7 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.parts import BOUNDS, LEAVES, SIDE, part
 from solvers.compiled.simd import largest8, least8, load8, splat8, store8
-from solvers.compiled.state import PEAK_FORCE, T_IN, T, acts, begins_and_ends, is_open
+from solvers.compiled.state import OUTSIDE, PEAK_FORCE, T_IN, T, acts, begins_and_ends, is_open
 from solvers.compiled.sums import above
 from solvers.exponential.circles.contact import radial_nodes, stays_in_circle
 from solvers.exponential.contact.many_stops import CONTINUING, ENTERING, add_block_motion, motion_at_nodes, uses_blocks
@@ -189,7 +189,7 @@ def leaves_segment(problem, tables, state, scratch, node_set, level):
         sign_changes = _rate_changes_sign(motion[1], scratch.start_motion[s, 1], end, segment > 0, upper < np.inf)
         if not sign_changes and lower <= lowest and highest + ripple <= upper:
             continue
-        tolerance = 8.0 * surface_tolerance(problem, s, state.x)
+        tolerance = OUTSIDE * surface_tolerance(problem, s, state.x)
         if not (lower - tolerance <= lowest and highest + ripple <= upper + tolerance):
             return True
         if segment == 0 and largest_indentation(problem, tables, state, scratch, node_set, h, s) > upper + tolerance:

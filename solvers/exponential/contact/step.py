@@ -32,6 +32,7 @@ from solvers.compiled.parts import ACCEPT, CONTACT, FIRST_END, PRESSED, part
 from solvers.compiled.state import (
     CALLS,
     LAW_NOT_FINITE,
+    OUTSIDE,
     REJECTED,
     RUNNING,
     SAMPLED,
@@ -119,6 +120,14 @@ def _nearest_surface(problem, state, scratch):
         if time < first:
             first, stop, direction = time, s, side
     return first, stop, direction
+
+
+@inlined
+def _rests_there(problem, state, scratch, stop, time_to_border):
+    """Whether a stop is on a border that it reaches in a given time at a rate that is rounding: it need not land."""
+    rate = abs(scratch.start_motion[stop, 1])
+    near = stop >= 0 and abs(time_to_border) * rate <= OUTSIDE * surface_tolerance(problem, stop, state.x)
+    return near and rate <= rate_tolerance(problem, stop, state.x)
 
 
 @merged
@@ -273,10 +282,13 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
     """One accepted step in contact, a landing if a border is near, else by collocation; returns a status code."""
     control, shortest = scratch.control, tables.contact_step.size - 1
     time_to_border, stop, direction = _nearest_surface(problem, state, scratch)
-    if time_to_border <= 0.0 and switch_on_surface(problem, state, True):
-        if in_contact(state):
-            begin_steps(problem, tables, state, scratch, latest_entered(state))
-        return RUNNING
+    if time_to_border < tables.contact_step[shortest] or control[NEXT_LEVEL] == shortest:
+        if switch_on_surface(problem, state, True):
+            if in_contact(state):
+                begin_steps(problem, tables, state, scratch, latest_entered(state))
+            return RUNNING
+        if _rests_there(problem, state, scratch, stop, time_to_border):
+            time_to_border, stop, direction = np.inf, -1, 0
     if control[NEW] == ENTRY and problem.parts[PRESSED] and _switch_pressed(problem, state):
         begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
