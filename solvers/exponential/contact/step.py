@@ -229,8 +229,14 @@ def _continue_after(problem, tables, state, scratch, stop, level, alone):
 
 @merged
 def _try_nearest(problem, tables, state, scratch, stop, direction, time_to_border):
-    """Land on the border reached first if that is worth a trial; returns whether it was done."""
-    scratch.landed[LAST_RESORT] = 1 if time_to_border < tables.contact_step[tables.contact_step.size - 1] else 0
+    """Land on the border reached first if that is worth a trial; returns whether it was done.
+
+    Within the shortest step a landing of any error is taken, unless it may last longer: by the rounding of δ at a rate.
+    """
+    last_resort, shortest = 0, tables.contact_step[tables.contact_step.size - 1]
+    if time_to_border < shortest:
+        last_resort = surface_tolerance(problem, stop, state.x) <= shortest * abs(scratch.start_motion[stop, 1])
+    scratch.landed[LAST_RESORT] = last_resort
     worth = stop >= 0 and may_land(problem, tables, state, scratch, stop, direction, time_to_border)
     return worth and _try_landing(problem, tables, state, scratch, stop, direction, time_to_border)
 

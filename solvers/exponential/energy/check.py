@@ -138,8 +138,7 @@ def unbalanced(record: Record, rtol: float) -> bool:
         return False
     allowed = tolerated_energy(handled, record.exchanged(), rtol)
     if system.blocks.loss.size:
-        told = _told(system, record.back, np.concatenate((record.begin[None], record.motion[rows])))
-        allowed += handled * min(float(np.finfo(float).eps * told / stored[1:].max()), CANCELLED)
+        allowed += handled * min(float(np.finfo(float).eps * _told(system, motion) / stored.max()), CANCELLED)
     if residual > allowed:
         allowed += LOADS * np.finfo(float).eps * _energy_of_loads(system, record.t[rows])
     return not residual <= allowed
@@ -167,12 +166,13 @@ def _energy_of_loads(system: System, t: Array) -> float:
     return 0.5 * root**2
 
 
-def _told(system: System, back: Array, motion: Array) -> float:
-    """Largest Σ|z_i H_ij z_j| over motions z (k, …) of coupled blocks, whose energy is zᵀHz: what of this cancels.
+def _told(system: System, motion: Array) -> float:
+    """Largest Σ|z_i H_ij z_j| over motions [q, q̇] (k, 2n), told by coupled blocks z with the energy zᵀHz: it cancels.
 
     Nearly critical damping makes two blocks almost alike: large parts of them cancel in q and q̇, by 1e4 where the
     rates of decay differ by 1e-4 of themselves, and their squares in the energy.
     """
-    q, q_dot, z = back[: system.size], back[system.size :], np.abs(motion[:, : back.shape[1]])
+    blocks = system.blocks
+    (q, q_dot), z = np.split(blocks.T, 2), np.abs(motion @ blocks.inverse.T)
     form = np.abs(q.T @ (system.K @ q) + q_dot.T @ (system.M @ q_dot))
     return float(0.5 * (z @ form * z).sum(axis=1).max())
