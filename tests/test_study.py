@@ -15,7 +15,7 @@ import solvers
 from contacts import Hertz, Jenkins, KelvinVoigt
 from fembeam import scene_file
 from fembeam.cli import main
-from fembeam.model import Model
+from fembeam.model import Model, extremes_of
 from fembeam.study import ModeCount, NotMetError, measure, mode_count, smallest_model
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import cut
@@ -64,6 +64,14 @@ def test_amplitude_finds_extremes_between_samples():
     exact = 1e-3 * model.phi(0.2599)[0]
     assert Amplitude(z=0.2599)(run) == pytest.approx(exact, rel=2e-6)
     assert np.ptp(run.displacement(0.2599)) / 2 < exact * (1 - 1e-5)  # the samples alone miss it
+
+
+def test_extremes_of_cubics_that_begin_at_rest():
+    """Where the slope is 0 at a sample the other extreme of the cubic was left out: 0.2 instead of 0.31."""
+    a, b, c = 0.0, 1.6, -1.4
+    top = -2.0 * b / (3.0 * c)
+    found = extremes_of(np.array([0.0, 1.0]), np.array([0.0, a + b + c]), np.array([a, a + 2.0 * b + 3.0 * c]))
+    assert found == pytest.approx((0.0, b * top**2 + c * top**3), rel=1e-12)
 
 
 def test_parts_of_a_run_make_the_whole():
