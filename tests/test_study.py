@@ -359,6 +359,17 @@ def test_smallest_model_says_when_modes_do_not_suffice():
     assert len(evidence.figure().axes) == 1
 
 
+def jumping(run):
+    """As of a mean over contacts where that of six modes has one contact less."""
+    return 1.25 if run.q.shape[1] == 6 else 1.0
+
+
+def test_smallest_model_says_when_a_quantity_jumps_with_modes():
+    """It said that modes converge too slowly and the best of up to 16 modes is off by 6.63e-06 of 0.02."""
+    with pytest.raises(NotMetError, match=r"does not settle with modes .*, \d modes? .* and 6 modes by 2\.50e-01"):
+        smallest_model(FREE, jumping, 0.02, duration=0.02, dt=1e-3, most=4, residual=False)
+
+
 def test_smallest_model_says_when_scatter_hides_it():
     noise = replace(SCENE, base=fb.BandNoise(std=2.5e-4, band=(0.0, 1226.6)))
     with pytest.raises(NotMetError, match=r"scatter hides it.*more seeds"):
