@@ -188,7 +188,8 @@ def stationary(
     Notes
     -----
     Standard errors are those between realisations of the noise: at least 16 in a run, of 8 to 100 correlation times
-    each; fewer where the duration allows no more. Intervals of 95 % hold 93 to 97 % from two realisations on. Records
+    each; fewer where the duration allows no more. Intervals of 95 % hold 93 to 97 % from two realisations on; of the
+    kurtosis of a tip whose slider slips, 3.9, they hold 88 % in 80 and in 320 correlation times. Records
     and other signals that cannot be continued are run as one segment of eight batches, a sum of tones in batches of
     about 50 correlation times. A response that switches between two regimes less often than that needs an `ensemble`.
 
