@@ -284,6 +284,7 @@ def growing(run):
         ((SCENE, [1], "peak_force", 1.0, None, 0.0, 8), "seeds must be a list of seeds, got 8"),
         ((SCENE, [1], "peak_force", 1.0, None, 0.0, [1, 2, 1]), "seeds must differ, got "),
         ((SCENE, [1], "peak_force", 1.0, None, 0.0, [1.5, 2, 3]), "seeds must be whole numbers"),
+        ((SCENE, [1], "peak_force", 1.0, None, 0.0, (), "no"), "residual must be True, False or None, got 'no'"),
         ((SCENE, 3, "peak_force", 1.0), "counts must be a list of numbers of modes, got 3"),
         ((SCENE.reduce(modes=1), [1], "peak_force", 1.0), "scene must be a Scene, got .* of a model, give model.scene"),
         ((SCENE, [1], "peak_force", 1.0, None, 0.0, (), None, None, [0.0, 0.0]), "start must be a function of a model"),
