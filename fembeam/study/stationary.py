@@ -56,7 +56,8 @@ class Response(Result):
     ----------
     signals : name -> `statistics.Signal`: mean, variance, std, skewness, kurtosis, crossing_rate, pdf, psd; also
         ``response["δ"]``.
-    impacts : one `statistics.Impacts` per stop: rate, probability, mean(quantity).
+    impacts : one `statistics.Impacts` per stop of the scene itself, not of its bodies: rate, probability,
+        mean(quantity).
     duration : s the statistics use. discarded : s left out, lead-ins included.
     settling : end of the transient; None when `discard` was given.
     enough : whether the standard error asked for by `until` was reached; None when none was.
@@ -100,7 +101,7 @@ class Response(Result):
         return plot.random_densities(self.signals)
 
     def power(self, contact: int | str | None = None) -> Estimate:
-        """Mean power (W) that a stop or element takes, numbered or named as in a `Run`; None: all of them together.
+        """Mean power (W) that a stop or element takes, numbered or named as in `names`; None: all of them together.
 
         From the work done on it, and its loss by friction; the change of the energy stored averages to zero.
         """
