@@ -182,9 +182,13 @@ def _largest(step: float, record: Vector, omega: float, zeta: float) -> Vector:
     decay, largest = complex(-zeta * omega, omega * np.sqrt(1 - zeta**2)), np.zeros(3)
     for a, z in _motion(step, record, decay):
         for k in range(3):
-            largest[k] = max(largest[k], float(np.abs(_quantity(k, decay, a, z)[0]).max()))
-            look = _in_parts if omega * step <= FINE else _between
-            largest[k] = look(k, decay, step, a, z, largest[k])
+            value, slope = _quantity(k, decay, a, z)
+            known = max(largest[k], float(np.abs(value).max()))
+            if omega * step <= FINE:
+                at = np.flatnonzero(_bound(value, slope, step) > known)
+                largest[k] = _in_parts(k, decay, step, a, z, at, known) if len(at) else known
+            else:
+                largest[k] = _between(k, decay, step, a, z, known)
     return largest
 
 
@@ -211,15 +215,12 @@ def _motion(step: float, record: Vector, decay: complex) -> Iterator[tuple[Vecto
         yield a, z
 
 
-def _in_parts(k: int, decay: complex, step: float, a: Vector, z: Complex, known: float) -> float:
-    """Max |f_k| between samples, too, at least ``known``, where ω step is small.
+def _in_parts(k: int, decay: complex, step: float, a: Vector, z: Complex, at: NDArray[np.intp], known: float) -> float:
+    """Max |f_k| in some intervals, too, at least ``known``, where ω step is small.
 
     What is left of a record that alternates from sample to sample may lie between samples alone, and be the small
-    difference of what its two samples do. So only intervals that cannot exceed what is known are left out, and the
-    others are cut into `PARTS`, by the exact step.
+    difference of what its two samples do: intervals are cut into `PARTS`, by the exact step.
     """
-    value, slope = _quantity(k, decay, a, z)
-    at = np.flatnonzero(_bound(value, slope, step) > known)
     tau, early, later = step / PARTS * np.arange(PARTS + 1), a[at], a[at + 1] - a[at]
     record, inner = early + np.outer(tau / step, later), np.empty((PARTS + 1, len(at)), dtype=complex)
     inner[0], inner[-1] = z[at], z[at + 1]
@@ -227,7 +228,7 @@ def _in_parts(k: int, decay: complex, step: float, a: Vector, z: Complex, known:
         x = decay * tau[j]
         first, second = np.expm1(x) / x, _phi2(x)
         inner[j] = np.exp(x) * z[at] - tau[j] * ((first - second) * early + second * record[j])
-    return max(known, _peak(*_quantity(k, decay, record.T, inner.T), float(tau[1]))) if len(at) else known
+    return max(known, _peak(*_quantity(k, decay, record.T, inner.T), float(tau[1])))
 
 
 def _between(k: int, decay: complex, step: float, a: Vector, z: Complex, known: float) -> float:
@@ -249,7 +250,7 @@ def _between(k: int, decay: complex, step: float, a: Vector, z: Complex, known: 
     order, first, count = np.argsort(-bound), 0, FIRST_LOOK
     while first < len(order) and bound[order[first]] > (1 + ENOUGH) * known:
         at = order[first : first + count, None]
-        for t in (tau, tau + (step - lead)):
+        for t in (tau, tau + (step - lead))[: 1 + (lead < step)]:
             inner = c[at] + d[at] * t + free[at] * np.exp(decay * t)
             known = max(known, _peak(*_quantity(k, decay, a[at] + rate[at] * t, inner), float(tau[1])))
         first, count = first + count, min(2 * count, MOST_AT_ONCE)
@@ -275,7 +276,8 @@ def _bound(value: Vector, slope: Vector, h: float) -> Vector:
 
 def _peak(value: Vector, slope: Vector, h: float) -> float:
     """Max |f| of the cubic pieces through values and slopes (…, k) on a grid of step h."""
-    top, higher = np.abs(value).max(), _bound(value, slope, h) > np.abs(value).max()
+    top = np.abs(value).max()
+    higher = _bound(value, slope, h) > top
     parts = value[..., :-1], value[..., 1:], h * slope[..., :-1], h * slope[..., 1:]
     f0, f1, d0, d1 = (part[higher] for part in parts)
     # f' = d0 + 2 b s + 3 c s²: both roots, in the form without cancellation
