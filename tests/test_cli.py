@@ -4,6 +4,7 @@ import contextlib
 import csv
 import io
 import json
+import math
 import os
 import re
 import shutil
@@ -22,6 +23,7 @@ import reduction
 from fembeam import support
 from fembeam.cli import main
 from fembeam.results import html_page as html
+from fembeam.results.compare import compare
 from fembeam.scene import Source
 from fembeam.scene_file import built, kinds, read, template
 
@@ -442,6 +444,25 @@ def test_a_run_repeats_from_its_file_alone(tmp_path, capsys):
     assert unlike["difference"] == (unlike["b"] - unlike["a"]) / unlike["a"] != 0
     printed(capsys, "compare", tmp_path / "a", tmp_path / "c", "--out", tmp_path / "figures")
     assert (tmp_path / "figures" / "compare.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_results_are_compared_in_standard_errors_of_their_own(tmp_path):
+    """Values of modes stood in units of the uncertainty of their relative error, those of [vary] had none."""
+    for name, factor in (("a", 1.0), ("b", 1.5)):
+        found = {
+            "mode_count": {"rows": [{"value": 1e-8 * factor, "error": 0.2 * factor, "uncertainty": 0.05}]},
+            "vary": {"values": [[3.0 * factor]], "standard_error": [[0.3]]},
+            "minimise": {"value": 2.0 * factor, "standard_error": 0.4},
+        }
+        (tmp_path / name).mkdir()
+        for file, content in found.items():
+            (tmp_path / name / f"{file}.json").write_text(json.dumps(content))
+    rows = {row.name: row for row in compare(tmp_path / "a", tmp_path / "b")}
+    plain = {f"mode_count rows 0 {key}" for key in ("value", "error", "uncertainty")}
+    assert {*rows} == {"vary values 0 0", "minimise value", *plain}
+    assert all(rows[name].deviations is None for name in plain)
+    assert rows["vary values 0 0"].deviations == pytest.approx(1.5 / (0.3 * math.sqrt(2.0)))
+    assert rows["minimise value"].deviations == pytest.approx(1.0 / (0.4 * math.sqrt(2.0)))
 
 
 def test_a_run_reads_no_file_outside_its_folder_unless_asked(tmp_path, capsys):

@@ -134,6 +134,8 @@ def test_refused_in_python(run):
         fb.study.floor_spectra(run, "valve", periods=PERIODS)
     with pytest.raises(ValueError, match="places must be a list of one or more"):
         fb.study.floor_spectra(run, [], periods=PERIODS)
+    with pytest.raises(ValueError, match=r"places must be a list of one or more, got 0\.1"):
+        fb.study.floor_spectra(run, 0.1, periods=PERIODS)
 
 
 def test_the_schema_knows_places():

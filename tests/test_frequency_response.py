@@ -97,6 +97,10 @@ def test_bad_input():
         model.frequency_response([1.0], output=1.0)
     with pytest.raises(ValueError, match="absolute is for"):
         model.frequency_response([1.0], L, L, absolute=True)
+    with pytest.raises(ValueError, match="absolute must be True or False, got 'no'"):
+        model.frequency_response([1.0], "base", L, absolute="no")
+    with pytest.raises(ValueError, match="input must be a place z in m"):
+        model.frequency_response([1.0], (L, "y"))
     free = fb.Scene(BEAM, damping=fb.ModalDamping(0.1)).reduce(3)
     with pytest.raises(ValueError, match="natural frequency"):
         free.frequency_response([0.0], 0.1, 0.2)

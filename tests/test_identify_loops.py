@@ -169,6 +169,15 @@ def test_a_first_loading_tells_the_sum_of_beta_and_gamma():
     assert found.law.beta + found.law.gamma == pytest.approx(2000.0, rel=0.05)  # of 12 draws 0.6 % apart
 
 
+@pytest.mark.filterwarnings("ignore:neighbouring residuals")
+def test_records_of_very_different_ranges_have_no_message_of_scipy():
+    """Starts beyond the bounds of least squares ended in "Initial guess is outside of provided bounds"."""
+    short, ends = 1e-3 * np.sin(np.linspace(0.0, 12.0, 200)), np.array([1.0, 2.0])
+    with pytest.warns(UserWarning, match="the records do not tell limits"):
+        found = identify_loop([short, ends], [DAMPER.along(short), ends], Iwan)
+    assert found.estimates["limits[0]"].high == np.inf
+
+
 @pytest.mark.drawn
 def test_no_more_sliders_than_there_are():
     for law in (DAMPER, Iwan([2e4, 1e4], [4.0, 9.0])):

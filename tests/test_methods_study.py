@@ -186,6 +186,7 @@ def test_command_line(tmp_path, capsys):
         ({"rounds": 0}, "rounds must be at least 1"),
         ({"duration": -1.0}, "duration must be finite and positive"),
         ({"methods": []}, "methods must hold one"),
+        ({"methods": Exponential()}, "methods must be a list of one or more, got Exponential"),
     ],
 )
 def test_bad_input_is_refused(change, message):

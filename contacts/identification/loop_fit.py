@@ -60,7 +60,8 @@ class Fit:
             np.append(ends, np.full(len(start) - model.main, sign * np.inf))
             for sign, ends in zip((-1, 1), model.ends, strict=True)
         )
-        done = least_squares(self.residual, start, self.jacobian, (low, high), x_scale="jac", max_nfev=most, **_TIGHT)
+        within = np.clip(start, low, high)  # of records of very different ranges starts may lie beyond
+        done = least_squares(self.residual, within, self.jacobian, (low, high), x_scale="jac", max_nfev=most, **_TIGHT)
         self.theta, self.slopes = done.x, done.jac
         self.squares = 2.0 * float(done.cost)
         self.exact = math.sqrt(self.squares / measured.count) < ROUNDING

@@ -48,7 +48,8 @@ def _between(t: Vector, u: Vector, v: Vector) -> tuple[Vector, Vector]:
     h, rise = np.diff(t), np.diff(u)
     a, b, c = v[:-1] * h, 3.0 * rise - (2.0 * v[:-1] + v[1:]) * h, -2.0 * rise + (v[:-1] + v[1:]) * h
     with np.errstate(divide="ignore", invalid="ignore"):
-        root = np.sqrt(b * b - 3.0 * a * c)
-        s = np.stack((-a / (b + root), -a / (b - root)))
+        # a + 2 b s + 3 c s² = 0, in the form without cancellation: one root where a = 0, as at rest, is not 0
+        large = -b - np.copysign(np.sqrt(b * b - 3.0 * a * c), b)
+        s = np.stack((a / large, large / (3.0 * c)))
         s = np.where((s > 0.0) & (s < 1.0), s, np.nan)
     return s, u[:-1] + s * (a + s * (b + s * c))

@@ -26,11 +26,13 @@ Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 UNIFORM = 1e-6  # of a step, that times may be off a uniform grid
 FINE = 0.05  # ω τ up to which the cubic through values and slopes keeps maxima to 1e-5, mostly (ω τ)⁴/384
+PARTS = 4  # of an interval, at least: what its two samples do may nearly cancel in between
 ENOUGH = 1e-6  # relative: bounds on a maximum that exceed it by less
 GONE = 40.0  # ζ ω τ after which free vibration is below rounding
 FIRST_LOOK, MOST_AT_ONCE = 16, 1 << 12  # intervals looked into at once
 BLOCK = 1 << 16  # steps of the record at once, so that memory stays small
 SERIES = 18  # terms of φ_2 for |x| < 1, right to rounding
+MOST_BEYOND = 4 / 27  # largest value of s (1 - s)²: a slope's part in a cubic
 FEW = 10  # samples in a contact, below which its acceleration is not resolved
 
 
@@ -181,10 +183,12 @@ def _largest(step: float, record: Vector, omega: float, zeta: float) -> Vector:
     for a, z in _motion(step, record, decay):
         for k in range(3):
             value, slope = _quantity(k, decay, a, z)
+            known = max(largest[k], float(np.abs(value).max()))
             if omega * step <= FINE:
-                largest[k] = max(largest[k], _peak(value, slope, step))
+                at = np.flatnonzero(_bound(value, slope, step) > known)
+                largest[k] = _in_parts(k, decay, step, a, z, at, known) if len(at) else known
             else:
-                largest[k] = _between(k, decay, step, a, z, max(largest[k], float(np.abs(value).max())))
+                largest[k] = _between(k, decay, step, a, z, known)
     return largest
 
 
@@ -211,6 +215,22 @@ def _motion(step: float, record: Vector, decay: complex) -> Iterator[tuple[Vecto
         yield a, z
 
 
+def _in_parts(k: int, decay: complex, step: float, a: Vector, z: Complex, at: NDArray[np.intp], known: float) -> float:
+    """Max |f_k| in some intervals, too, at least ``known``, where ω step is small.
+
+    What is left of a record that alternates from sample to sample may lie between samples alone, and be the small
+    difference of what its two samples do: intervals are cut into `PARTS`, by the exact step.
+    """
+    tau, early, later = step / PARTS * np.arange(PARTS + 1), a[at], a[at + 1] - a[at]
+    record, inner = early + np.outer(tau / step, later), np.empty((PARTS + 1, len(at)), dtype=complex)
+    inner[0], inner[-1] = z[at], z[at + 1]
+    for j in range(1, PARTS):
+        x = decay * tau[j]
+        first, second = np.expm1(x) / x, _phi2(x)
+        inner[j] = np.exp(x) * z[at] - tau[j] * ((first - second) * early + second * record[j])
+    return max(known, _peak(*_quantity(k, decay, record.T, inner.T), float(tau[1])))
+
+
 def _between(k: int, decay: complex, step: float, a: Vector, z: Complex, known: float) -> float:
     """Max |f_k| between samples, too, at least ``known``: z = c + d τ + (z_0 - c) exp(λτ), d = a'/λ, c = (a_0 + d)/λ.
 
@@ -226,11 +246,11 @@ def _between(k: int, decay: complex, step: float, a: Vector, z: Complex, known: 
     bound = np.maximum(*(np.abs(np.imag(power * end)) for end in (c, c + step * d))) + np.abs(power * free)
     omega = abs(decay)
     lead = min(step, 2 * np.pi / decay.imag, GONE / max(-decay.real, 1e-300))
-    tau = np.linspace(0.0, lead, int(np.ceil(lead * omega / FINE)) + 1)
+    tau = np.linspace(0.0, lead, max(PARTS, int(np.ceil(lead * omega / FINE))) + 1)
     order, first, count = np.argsort(-bound), 0, FIRST_LOOK
     while first < len(order) and bound[order[first]] > (1 + ENOUGH) * known:
         at = order[first : first + count, None]
-        for t in (tau, tau + (step - lead)):
+        for t in (tau, tau + (step - lead))[: 1 + (lead < step)]:
             inner = c[at] + d[at] * t + free[at] * np.exp(decay * t)
             known = max(known, _peak(*_quantity(k, decay, a[at] + rate[at] * t, inner), float(tau[1])))
         first, count = first + count, min(2 * count, MOST_AT_ONCE)
@@ -248,15 +268,23 @@ def _phi2(x: complex) -> complex:
     return total
 
 
+def _bound(value: Vector, slope: Vector, h: float) -> Vector:
+    """Bounds (…, k - 1) on the |f| of cubic pieces: their ends, and 4/27 of each slope's change in a step h."""
+    size, change = np.abs(value), h * np.abs(slope)
+    return np.maximum(size[..., :-1], size[..., 1:]) + MOST_BEYOND * (change[..., :-1] + change[..., 1:])
+
+
 def _peak(value: Vector, slope: Vector, h: float) -> float:
     """Max |f| of the cubic pieces through values and slopes (…, k) on a grid of step h."""
-    size = np.abs(value)
-    f0, f1, d0, d1 = value[..., :-1], value[..., 1:], h * slope[..., :-1], h * slope[..., 1:]
-    turning = (d0 * d1 < 0) & (np.maximum(np.abs(f0), np.abs(f1)) > 0.5 * size.max())
-    f0, f1, d0, d1 = (column[turning] for column in (f0, f1, d0, d1))
-    # f' = d0 + 2 b s + 3 c s²: the root between 0 and 1, where d0 and d1 differ in sign
+    top = np.abs(value).max()
+    higher = _bound(value, slope, h) > top
+    parts = value[..., :-1], value[..., 1:], h * slope[..., :-1], h * slope[..., 1:]
+    f0, f1, d0, d1 = (part[higher] for part in parts)
+    # f' = d0 + 2 b s + 3 c s²: both roots, in the form without cancellation
     b, c = 3 * (f1 - f0) - 2 * d0 - d1, d0 + d1 - 2 * (f1 - f0)
-    root = np.sqrt(np.maximum(b**2 - 3 * c * d0, 0.0))
-    s = np.clip(-d0 / (b + np.where(d0 < 0, root, -root)), 0.0, 1.0)
+    large = -b - np.copysign(np.sqrt(np.maximum(b**2 - 3 * c * d0, 0.0)), b)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        roots = np.stack((d0 / large, large / (3 * c)))
+    s = np.where((roots > 0.0) & (roots < 1.0), roots, 0.0)
     inside = np.abs(f0 + s * (d0 + s * (b + s * c)))
-    return float(max(size.max(), inside.max(initial=0.0)))
+    return float(max(top, inside.max(initial=0.0)))

@@ -76,6 +76,8 @@ def frequency_response(
     """The response of a model without its contacts; `Model.frequency_response` explains it."""
     shapes = model.body_shapes(body, WHERE)
     output, driven = shapes.place(output), _named_input(model, driven)
+    for name, told in (("absolute", absolute), ("slipping", slipping)):
+        require(isinstance(told, (bool, np.bool_)), f"{name} must be True or False", told, WHERE, "leave it out")
     moved = isinstance(driven, str) and driven.split(".")[0] == "base"
     require(not absolute or moved, "absolute is for the input 'base'", driven, WHERE, "leave it out")
     if model.scene.named and isinstance(output, np.ndarray):
@@ -149,7 +151,7 @@ def _driving(model: Model, driven: Any) -> tuple[Vector, int, str, str]:
     if isinstance(driven, str) and driven.startswith("base."):
         direction = driven.removeprefix("base.")
         return model.participation_along(direction), 2, f"displacement of the frame along {direction}", "m/m"
-    if isinstance(driven, tuple):
+    if isinstance(driven, tuple) and model.scene.named:
         turned = turns(split(driven, model.scene.beam.components)[1])
         said, unit = ("moment at {} about {}", "m/(N m)") if turned else ("force at {} along {}", "m/N")
         return model.phi(driven), 0, said.format(*driven), unit

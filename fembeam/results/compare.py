@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from fembeam.model import Run
 
 SKIPPED = ("versions", "units", "scene", "cost", "wall_seconds", "warnings", "measured")
-ERRORS = {"mean": "standard_error", "std": "std_error", "rate": "rate_error", "value": "uncertainty"}
+# of a number, and of one in a table of them; "uncertainty" of studies of modes is that of their relative error
+ERRORS = {"mean": "standard_error", "value": "standard_error", "std": "std_error", "rate": "rate_error"}
+TABLES = {" values ": " standard_error "}
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,8 @@ def compare(a: Path, b: Path) -> list[Row]:
     """
     first, second = numbers(a), numbers(b)
     names = [*first, *(name for name in second if name not in first)]
-    rows = [_row(name, first, second) for name in names if not name.endswith(tuple(ERRORS.values()))]
+    errors = {*map(_error_of, names)}
+    rows = [_row(name, first, second) for name in names if name not in errors]
     return [row for row in rows if (row.a, row.b) != (None, None)]
 
 
@@ -81,14 +84,21 @@ def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
             yield from _flat(f"{name} {key}", entry)
 
 
+def _error_of(name: str) -> str:
+    """The path at which a number's standard error stands, if it has one; "" for numbers that never have."""
+    stem, _, last = name.rpartition(" ")
+    if last in ERRORS:
+        return f"{stem} {ERRORS[last]}"
+    return next((name.replace(*pair, 1) for pair in TABLES.items() if pair[0] in name), "")
+
+
 def _row(name: str, first: dict[str, Any], second: dict[str, Any]) -> Row:
     """One number, and how far apart."""
     a, b = first.get(name), second.get(name)
     difference = deviations = None
     if a is not None and b is not None:
         difference = (b - a) / abs(a) if a else (0.0 if b == a else math.inf)
-        stem, _, last = name.rpartition(" ")
-        error = f"{stem} {ERRORS.get(last, '')}"
+        error = _error_of(name)
         both = math.hypot(first.get(error) or 0.0, second.get(error) or 0.0)
         deviations = (b - a) / both if both > 0 else None
     return Row(name, a, b, difference, deviations)

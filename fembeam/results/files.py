@@ -183,7 +183,11 @@ def _confidence(run: Run, discard: float) -> str:
     if not parts:
         return "No standard errors: too short for independent parts, or the structure has no damping."
     span = (float(run.t[-1]) - discard) / parts
-    return f"Standard errors (s.e.) come from {parts} parts of {span:.3g} s each; 95 % lies within two of them."
+    return (
+        f"Standard errors (s.e.) come from {parts} parts of {span:.3g} s each; 95 % lies within two of them. "
+        "Under noise they are upper bounds, as one realisation has the same power for every seed; [ensemble] tells the "
+        "scatter of seeds."
+    )
 
 
 def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:

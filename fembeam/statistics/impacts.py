@@ -7,12 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.statistics.batches import Batches, Estimate
+from fembeam.statistics.scales import RATE
 
 if TYPE_CHECKING:
     import solvers
@@ -78,12 +80,18 @@ class Impacts:
     @property
     def rate(self) -> Estimate:
         """Contacts that begin per second."""
-        return self.batches.estimate(lambda s: s[ENTRIES] / s[TIME])
+        return self._share(ENTRIES)
 
     @property
     def probability(self) -> Estimate:
         """Share of the time spent in contact."""
-        return self.batches.estimate(lambda s: s[TOUCHING] / s[TIME])
+        return self._share(TOUCHING)
+
+    def _share(self, place: int) -> Estimate:
+        """A sum by time. A run that meets no contact does not tell how rare they are: then its error is not known."""
+        found = self.batches.estimate(lambda s: s[place] / s[TIME], RATE)
+        met = self.batches.total[TOUCHING] > 0.0
+        return found if met else replace(found, standard_error=math.nan, without=None)
 
     def mean(self, quantity: str) -> Estimate:
         """Mean per contact of duration (s), peak_force (N), entry_speed (m/s) or energy_loss (J)."""

@@ -3,11 +3,13 @@
 A transform g is such a scale when g' is proportional to 1/(standard error as a function of the value):
 
     level S (variance, density)    error ∝ S             g = ln S
+    rate r of events               error ∝ √r            g = √r
     skewness s                     error ∝ 1 + s²        g = arctan s
     kurtosis k >= 1                error ∝ (k - 1)⁴      g = -1/(k - 1)³
 
 Without it a low estimate comes with a low error, and the truth lies above the interval several times as often as below.
-The first is exact for means of squares; the others are fits to linear and impacting responses under noise.
+The first is exact for means of squares, the second for independent events; the others are fits to linear and impacting
+responses under noise.
 
 References
 ----------
@@ -36,6 +38,16 @@ def _same(value: Any) -> Any:
     return value
 
 
+def _root(rate: Any) -> Any:
+    """√r."""
+    return np.sqrt(np.maximum(rate, 0.0))
+
+
+def _square(root: Any) -> Any:
+    """Inverse of `_root`; below 0 no rate is possible."""
+    return np.maximum(root, 0.0) ** 2
+
+
 def _tangent(angle: Any) -> Any:
     """Inverse of arctan; beyond ±π/2 every skewness is possible."""
     quarter = np.pi / 2
@@ -55,5 +67,6 @@ def _kurtosis(value: Any) -> Any:
 
 LINEAR = Scale(_same, _same)
 LEVEL = Scale(np.log, np.exp)
+RATE = Scale(_root, _square)
 SKEWNESS = Scale(np.arctan, _tangent)
 KURTOSIS = Scale(_of_kurtosis, _kurtosis)

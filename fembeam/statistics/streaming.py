@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.statistics.batches import Batches, Estimate
 from fembeam.statistics.densities import Density
-from fembeam.statistics.scales import KURTOSIS, LEVEL, LINEAR, SKEWNESS, Scale
+from fembeam.statistics.scales import KURTOSIS, LEVEL, LINEAR, RATE, SKEWNESS, Scale
 from fembeam.statistics.spectra import Spectrum, Welch
 
 Vector = NDArray[np.float64]
@@ -131,7 +131,7 @@ class Signal:
     @property
     def crossing_rate(self) -> Estimate:
         """Up-crossings of `level` per second."""
-        return self._of(lambda s: s[CROSSINGS] / s[TIME])
+        return self._of(lambda s: s[CROSSINGS] / s[TIME], RATE)
 
     @property
     def outside(self) -> float:

@@ -103,8 +103,8 @@ def floor_spectra(
     >>> floor_spectra(run, ["valve", 0.2], periods=[0.05, 0.1])
     <floor spectra of valve; 0.2 m>
     """
-    require(not isinstance(places, str) and len(places) > 0, "places must be a list of one or more", places,
-            "floor_spectra", "put it in brackets")  # fmt: skip
+    several = hasattr(places, "__len__") and not isinstance(places, str) and len(places) > 0
+    require(several, "places must be a list of one or more", places, "floor_spectra", "put it in brackets")
     asked = {name: at for place in places for name, at in _along(run, place).items()}
     return FloorSpectra({name: run.floor_spectrum(at, omega, zeta, periods=periods) for name, at in asked.items()})
 

@@ -295,7 +295,9 @@ def check_comparable(measured: Mapping[str, Measured], reference: Measured) -> N
 def kinds_of(scene: Scene, residual: bool | None) -> tuple[bool, ...]:
     """With static shapes or without; both if neither is asked for and the scene has any."""
     if residual is not None:
-        return (residual,)
+        known = isinstance(residual, (bool, np.bool_))
+        require(known, "residual must be True, False or None", residual, "study", "None takes both")
+        return (bool(residual),)
     return (False, True) if scene.acting or scene.forces else (False,)
 
 

@@ -29,6 +29,7 @@ Vector = NDArray[np.float64]
 Quantity = Callable[[Run], Any]
 
 PROBABILITIES = np.arange(1, 20) / 20
+STRETCHES = 4  # of the run without overlap, each a segment of the spectrum
 FEWEST_IN_CONTACT = 4  # samples: of 4.4 the mean energy of a beam on its stop is right to 1e-4, of 1.4 to 4e-3
 
 
@@ -171,7 +172,8 @@ class Psd:
         fewest = 8 * segment <= len(run.t)
         require(fewest, f"the run must last {8 * segment * dt:.3g} s for parts of {width:g} rad/s", float(run.t[-1]),
                 "Psd", "run longer, or use fewer parts")  # fmt: skip
-        spectrum = psd(signal(run, self.stop, self.z)[0], dt, max(8, segment))
+        # as fine as the run allows: of a peak near a border coarse lines carry most into the part beside it
+        spectrum = psd(signal(run, self.stop, self.z)[0], dt, max(8, len(run.t) // STRETCHES))
         # a line stands for half a step to both sides: whole lines would make parts of four now and then five
         step = spectrum.omega[1]
         borders = np.concatenate(([0.0], spectrum.omega + step / 2))

@@ -186,9 +186,11 @@ def smallest_model(
 
     Notes
     -----
-    Errors of random responses and of chaotic ones are bounded with 97.5 % at each comparison: they count with their
-    uncertainty. Rungs between 8 and 64 are not all tried unless they border on the answer, so a quantity that
-    converges unevenly may have a smaller model than the one found; the one found is checked.
+    Modes may use up 0.7 of the tolerance, and the model found is the smallest that keeps within it with all finer ones
+    of its kind, so that no chance hit counts. Errors of random responses and of chaotic ones are bounded with 97.5 % at
+    each comparison: they count with their uncertainty. Rungs between 8 and 64 are not all tried unless they border on
+    the answer, so a quantity that converges unevenly may have a smaller model than the one found; the one found is
+    checked.
 
     Examples
     --------
@@ -350,9 +352,17 @@ class Search:
         errors = self._errors()
         offered = [line for line in errors if line.choice.modes <= self.most and not line.remark]
         best = min(offered, key=lambda line: line.bound)
+        finer = [one for one in errors if one.choice.residual == best.choice.residual and one.choice > best.choice]
+        worst = max(finer, key=lambda line: line.bound)
         off = f"the best of up to {self.most} modes is off by {best.error:.2e}"
         if rejected:
             verdict = "it does not settle as rtol goes to 0 (chaos?); use an average over seeds, or a shorter run"
+        elif best.bound <= self.tolerance < worst.bound:
+            verdict = (
+                f"it does not settle with modes (a contact that grazes?), {_words(best.choice)} are off by "
+                f"{best.error:.2e} and {_words(worst.choice)} by {worst.error:.2e}; use a mean over "
+                "more, or a quantity that does not jump"
+            )
         elif best.uncertainty > best.error:
             verdict = f"scatter hides it, {off} ± {best.uncertainty:.1e}; use more seeds or longer runs"
         else:

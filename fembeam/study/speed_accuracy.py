@@ -203,6 +203,8 @@ def speed_accuracy(
     >>> tight.error < 1e-7 and tight.error < loose.error < 1e-3
     True
     """
+    require(hasattr(methods, "__iter__"), "methods must be a list of one or more", methods, "speed_accuracy",
+            "put it in brackets")  # fmt: skip
     models = [model] if isinstance(model, Model) else sorted(model, key=lambda m: len(m.omega))
     _check(models, list(methods), rounds)
     duration = 10 * math.pi / float(models[0].omega[0]) if duration is None else duration

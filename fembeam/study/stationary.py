@@ -56,7 +56,8 @@ class Response(Result):
     ----------
     signals : name -> `statistics.Signal`: mean, variance, std, skewness, kurtosis, crossing_rate, pdf, psd; also
         ``response["δ"]``.
-    impacts : one `statistics.Impacts` per stop: rate, probability, mean(quantity).
+    impacts : one `statistics.Impacts` per stop of the scene itself, not of its bodies: rate, probability,
+        mean(quantity).
     duration : s the statistics use. discarded : s left out, lead-ins included.
     settling : end of the transient; None when `discard` was given.
     enough : whether the standard error asked for by `until` was reached; None when none was.
@@ -100,7 +101,7 @@ class Response(Result):
         return plot.random_densities(self.signals)
 
     def power(self, contact: int | str | None = None) -> Estimate:
-        """Mean power (W) that a stop or element takes, numbered or named as in a `Run`; None: all of them together.
+        """Mean power (W) that a stop or element takes, numbered or named as in `names`; None: all of them together.
 
         From the work done on it, and its loss by friction; the change of the energy stored averages to zero.
         """
@@ -188,9 +189,11 @@ def stationary(
     Notes
     -----
     Standard errors are those between realisations of the noise: at least 16 in a run, of 8 to 100 correlation times
-    each; fewer where the duration allows no more. Intervals of 95 % hold 93 to 97 % from two realisations on. Records
-    and other signals that cannot be continued are run as one segment of eight batches, a sum of tones in batches of
-    about 50 correlation times. A response that switches between two regimes less often than that needs an `ensemble`.
+    each; fewer where the duration allows no more. Intervals of 95 % hold 93 to 97 % from two realisations on; of the
+    kurtosis of a tip whose slider slips, 3.9, they hold 88 % in 80 and in 320 correlation times; of the rate of rare
+    contacts, five expected in a run, 72 %, as a quarter of such runs meets none. Records and other signals that cannot
+    be continued are run as one segment of eight batches, a sum of tones in batches of about 50 correlation times. A
+    response that switches between two regimes less often than that needs an `ensemble`.
 
     A structure that only elements damp will do. Correlation times are then those with their dashpots, or with dashpots
     that lose as much in a cycle as sliders do at the rms of a pilot run: a mode whose sliders stick at this level is
