@@ -100,12 +100,11 @@ class Arc:
             if self.known:
                 places, off = [place for place, _ in self.known], np.array([rest for _, rest in self.known])
                 guess += bend * np.array([np.interp(s, places, column) for column in off.T])
-            chain, error, iterations = corrected(self.a, guess, self.straight, not self.straight)
+            chain = corrected(self.a, guess, self.straight, not self.straight)
             rest = np.append(chain.x.ravel(), chain.parameter) - cubic(self.a, self.b, self.length, s)
             if bend > 0.0:
                 self.known = sorted([*self.known, (s, rest / bend)], key=lambda pair: pair[0])
-            orbit = orbit_of(self.a.problem, chain, error, iterations, parameter=chain.parameter)
-            self.trials[s] = chain, orbit
+            self.trials[s] = chain, orbit_of(self.a.problem, chain)
         return self.trials[s]
 
     def orbit(self, s: float) -> Orbit:

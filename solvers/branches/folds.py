@@ -186,10 +186,9 @@ def fold_curve(
     (ahead, end), (behind, begin) = walks
     found = [*reversed(behind), (first, "fold"), *ahead]
     orbits = [
-        orbit_of(one.problem, one.chain, float(np.abs(one.chain.residual).max()), 0, parameter=one.chain.parameter,
-                 mark=mark)
+        orbit_of(one.problem, replace(one.chain, error=float(np.abs(one.chain.residual).max())), mark)
         for one, mark in found
-    ]  # fmt: skip
+    ]
     return FoldCurve(orbits, np.array([one.y[-1] * (high - low) for one, _ in found]), (begin, end))
 
 

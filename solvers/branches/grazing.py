@@ -215,11 +215,10 @@ def unknowns_at(point: Point, grazing: Grazing) -> Array:
     return np.append(np.concatenate(x), grazing.parameter)
 
 
-def orbit_at(point: Point, grazing: Grazing, **more: Any) -> Orbit:
-    """A grazing orbit as an orbit of the branch; raises OrbitError."""
-    y, problem = unknowns_at(point, grazing), point.problem
-    chain, error, iterations = newton(problem, y[:-1].reshape(point.chain.x.shape), grazing.parameter)
-    return orbit_of(problem, chain, error, iterations, parameter=grazing.parameter, **more)
+def orbit_at(point: Point, grazing: Grazing) -> Orbit:
+    """A grazing orbit as an orbit of the branch, marked; raises OrbitError."""
+    chain = newton(point.problem, unknowns_at(point, grazing)[:-1].reshape(point.chain.x.shape), grazing.parameter)
+    return orbit_of(point.problem, chain, "grazing")
 
 
 def signature(orbit: Orbit) -> tuple[int, int]:

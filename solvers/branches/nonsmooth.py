@@ -170,7 +170,7 @@ def behind(point: Point, nonsmooth: NonsmoothPoint, grazing: Grazing) -> Point:
 def marked(last: Point, first: Point, nonsmooth: NonsmoothPoint, grazing: Grazing) -> list[Orbit]:
     """The orbits at a nonsmooth point with its mark."""
     if nonsmooth.kind == "grazing":
-        return [orbit_at(last, grazing, mark="grazing"), first.orbit]
+        return [orbit_at(last, grazing), first.orbit]
     if nonsmooth.kind == "merging":
         return [replace(orbit, mark="merging") for orbit in (last.orbit, first.orbit)]
     return [replace(last.orbit, mark="floor"), first.orbit]

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from solvers.orbits import ArclengthCondition, Chain, Orbit, PeriodicProblem, extended, newton, orbit_of, weights
+from solvers.orbits import Chain, Orbit, PeriodicProblem, extended, newton, orbit_of, weights
 from solvers.problem import Array
 
 _STEEP = 0.02  # parameter's share of the tangent below which the parameter is not held fixed
@@ -76,13 +76,10 @@ def tangent_of(chain: Chain, metric: Array, along: Array) -> Array:
     return unit
 
 
-def point_of(
-    problem: PeriodicProblem, chain: Chain, error: float, iterations: int, metric: Array, along: Array
-) -> Point:
+def point_of(problem: PeriodicProblem, chain: Chain, metric: Array, along: Array) -> Point:
     """The point of a solved chain."""
     tangent = tangent_of(chain, metric, along)
-    orbit = orbit_of(problem, chain, error, iterations, parameter=chain.parameter)
-    return Point(orbit, problem, chain, tangent, metric)
+    return Point(orbit_of(problem, chain), problem, chain, tangent, metric)
 
 
 def cubic(a: Point, b: Point, length: float, s: float) -> Array:
@@ -93,18 +90,18 @@ def cubic(a: Point, b: Point, length: float, s: float) -> Array:
     return whole + slopes
 
 
-def corrected(a: Point, guess: Array, straight: bool, slope: bool = False) -> tuple[Chain, float, int]:
+def corrected(a: Point, guess: Array, straight: bool, slope: bool = False) -> Chain:
     """The branch near a guess: at its parameter if ``straight``, else at right angles to a's tangent.
 
     Raises OrbitError.
     """
-    condition = None if straight else ArclengthCondition(a.metric, a.tangent)
-    return newton(a.problem, guess[:-1].reshape(a.chain.x.shape), float(guess[-1]), condition, slope, _MOST_ITERATIONS)
+    row = None if straight else a.metric @ a.tangent
+    return newton(a.problem, guess[:-1].reshape(a.chain.x.shape), float(guess[-1]), row, slope, _MOST_ITERATIONS)
 
 
 def moved(a: Point, guess: Array, straight: bool) -> Point:
     """The point of the branch near a guess; raises OrbitError."""
-    return point_of(a.problem, *corrected(a, guess, straight, True), a.metric, a.tangent)
+    return point_of(a.problem, corrected(a, guess, straight, True), a.metric, a.tangent)
 
 
 def is_straight(*shares: float) -> bool:

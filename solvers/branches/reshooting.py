@@ -50,10 +50,10 @@ def reshot(point: Point) -> Point:
     turns = math.floor(fractions[0])
     problem = replace(point.problem, fractions=tuple(f - turns for f in fractions))
     try:
-        chain, error, iterations = newton(problem, x, point.chain.parameter, slope=True)
+        chain = newton(problem, x, point.chain.parameter, slope=True)
     except OrbitError:
         return point
-    found = point_of(problem, chain, error, iterations, point.metric, _carried(point, chain, begins))
+    found = point_of(problem, chain, point.metric, _carried(point, chain, begins))
     leads_back = bool(orbit.memory) and found.share * point.share < 0.0  # one of a family, its border just not reached
     return point if leads_back else found
 

@@ -59,13 +59,12 @@ def _flip(a: Point, fold: Orbit) -> Orbit | None:
     x = (fold.whole + 0.5 * _half_apart(fold))[None, :]
 
     def indicator(parameter: float) -> float:
-        chain, error, iterations = newton(half, x, parameter)
-        return indicators(orbit_of(half, chain, error, iterations), a.tangent)["flip"]
+        return indicators(orbit_of(half, newton(half, x, parameter)), a.tangent)["flip"]
 
     step = 0.01 * (a.chain.parameter - fold.parameter) or 1e-6 * a.chain.parameter
     place = float(secant(indicator, fold.parameter, x1=fold.parameter + step, tol=_SHARP * abs(fold.parameter)))
     if not abs(place - fold.parameter) <= 1e-3 * abs(a.chain.parameter - fold.parameter) + 1e-6 * abs(fold.parameter):
         return None
-    chain, error, iterations = newton(half, x, place)
-    whole = replace(a.problem, fractions=(begin,))
-    return orbit_of(whole, whole.evaluate(chain.x, place), error, iterations, parameter=place, mark="flip")
+    found, whole = newton(half, x, place), replace(a.problem, fractions=(begin,))
+    chain = replace(whole.evaluate(found.x, place), error=found.error, iterations=found.iterations)
+    return orbit_of(whole, chain, "flip")

@@ -326,7 +326,7 @@ def _is_passed(known: Point, a: Point, b: Point) -> bool:
         return False
     guess = np.append(cubic(a, b, distance, share * distance)[:-1], known.chain.parameter)
     try:
-        chain, *_ = corrected(a, guess, True)
+        chain = corrected(a, guess, True)
     except (OrbitError, np.linalg.LinAlgError):
         return False
     off = np.append(chain.x.ravel(), chain.parameter) - known.unknowns

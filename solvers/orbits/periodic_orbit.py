@@ -152,13 +152,14 @@ def at_zero(orbit: Orbit) -> Array:
     return state_after(delayed(orbit.system, orbit.phase), orbit.whole, orbit.period - orbit.phase, orbit.method)
 
 
-def orbit_of(problem: PeriodicProblem, chain: Chain, residual: float, iterations: int, **more: Any) -> Orbit:
+def orbit_of(problem: PeriodicProblem, chain: Chain, mark: str = "") -> Orbit:
     """The orbit a solved chain describes."""
     system, period = problem.make(chain.parameter)
     phase = problem.fractions[0] * period
     logs = [solution.contacts for solution in chain.solutions]
     starts = [fraction * period - phase for fraction in problem.fractions]
     state, matrix = chain.x[0].copy(), chain.monodromy()
+    more: dict[str, Any] = {"parameter": chain.parameter if problem.step else math.nan, "mark": mark}
     if chain.coordinates < len(state):
         places = [(contact, place) for contact, count in enumerate(counts(system)) for place in range(count)]
         more["family"] = tuple(places[i - chain.coordinates] for i in chain.frozen)
@@ -167,7 +168,7 @@ def orbit_of(problem: PeriodicProblem, chain: Chain, residual: float, iterations
         real = np.flatnonzero(~problem.codes(chain))
         state, matrix = state[: chain.coordinates], matrix[np.ix_(real, real)]
     return Orbit(
-        *(state, period, phase, matrix, residual, iterations),
+        *(state, period, phase, matrix, chain.error, chain.iterations),
         *(ContactLog.of_period(logs, starts, period), system, problem.method),
         shots=(problem.fractions, chain.x),
         **more,

@@ -86,9 +86,9 @@ def _near(system: System, period: float, x: Array, method: Any, shots: int | Non
     tried: list[str] = []
     for count in [shots] if shots else range(1, _MOST_SHOTS + 1):
         try:
-            problem, chain, residual, iterations = solved_chain(system, period, x, method, count)
+            problem, chain = solved_chain(system, period, x, method, count)
             _check_isolated(problem, chain)
-            return with_doubts(_from_zero(orbit_of(problem, chain, residual, iterations)))
+            return with_doubts(_from_zero(orbit_of(problem, chain)))
         except OrbitError as error:
             tried.append(f"{count} shot(s): {error}")
     raise OrbitError("no orbit found near the start; tried " + "; ".join(tried) + _round_and_unforced(system))
@@ -111,10 +111,10 @@ def _from_zero(orbit: Orbit) -> Orbit:
         return orbit
     problem = PeriodicProblem(_Constant(orbit.system, orbit.period), orbit.method)
     try:
-        chain, residual, iterations = newton(problem, x[None, :], 0.0)
+        chain = newton(problem, x[None, :], 0.0)
     except OrbitError:
         return orbit
-    return orbit_of(problem, chain, residual, orbit.iterations + iterations)
+    return orbit_of(problem, replace(chain, iterations=orbit.iterations + chain.iterations))
 
 
 def _check_isolated(problem: PeriodicProblem, chain: Chain) -> None:
@@ -190,20 +190,18 @@ def periods_of_decay(system: System, period: float) -> int:
     return math.ceil(7.0 / (float(rates.min(initial=math.inf)) * period))
 
 
-def solved_chain(
-    system: System, period: float, x: Array, method: Any, count: int
-) -> tuple[PeriodicProblem, Chain, float, int]:
-    """The chain of an orbit near a state, with its relative residual and the iterations.
+def solved_chain(system: System, period: float, x: Array, method: Any, count: int) -> tuple[PeriodicProblem, Chain]:
+    """The chain of an orbit near a state.
 
     The orbit's contacts may lie elsewhere than the guess's. A shot that starts in a contact lacks its entry rate; if
     the law depends on it, the shots start anew in open intervals.
     """
     for _ in range(_MOST_CHOICES):
         problem, guess = _start_chain(system, period, x, method, count)
-        chain, residual, iterations = newton(problem, guess, 0.0)
+        chain = newton(problem, guess, 0.0)
         if not is_cut(chain, system):
-            return problem, chain, residual, iterations
-        x = at_zero(orbit_of(problem, chain, residual, iterations))
+            return problem, chain
+        x = at_zero(orbit_of(problem, chain))
     raise OrbitError("wherever shots begin, a contact of the orbit whose law latches the entry rate is under way")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -122,6 +123,8 @@ class Chain:
     by_parameter: Array
     solutions: list[Solution]
     has_slope: bool = True  # whether ``by_parameter`` is known
+    error: float = math.nan  # size of the residuals relative to the motion's, once judged by `newton`
+    iterations: int = 0  # of Newton's method
 
     def jacobian(self) -> Array:
         """Derivative (m N, m N) of the residuals by all states; latched numbers never renewed are held constant."""
