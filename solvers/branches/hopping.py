@@ -58,4 +58,4 @@ def _point_at(a: Point, parameter: float) -> tuple[Point, float]:
     chain = corrected(a, guess, True, True)
     off = np.append(chain.x.ravel(), parameter) - a.unknowns
     ahead = np.append(np.zeros(len(off) - 1), off[-1])  # latched numbers must not reverse the branch
-    return point_of(a.problem, chain, a.metric, ahead), math.sqrt(off @ a.metric @ off)
+    return point_of(a.problem, chain, a.metric, ahead), a.length(off)

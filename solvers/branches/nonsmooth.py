@@ -116,10 +116,7 @@ def _new_grazings(orbit: Orbit, stop: int) -> Iterator[tuple[float, NonsmoothPoi
         yield -delta[k] / scale, _nonsmooth("grazing", stop, (float(at[k]),), 1, (1, int(latches)))
     for k in inner[(rising < 0.0) & (falling >= 0.0) & (delta[inner] > 0.0) & (delta[inner] < scale) & latches]:
         i = int(np.searchsorted(log.t_in[mine], times[k])) - 1
-        yield (
-            delta[k] / scale,
-            _nonsmooth("merging", stop, (float(at[k]), *_after(orbit, mine, i)), -1, (1, 1)),
-        )
+        yield delta[k] / scale, _nonsmooth("merging", stop, (float(at[k]), *_after(orbit, mine, i)), -1, (1, 1))
 
 
 def _in_order(log: ContactLog, stop: int) -> Any:

@@ -45,8 +45,15 @@ class Point:
     @property
     def size(self) -> float:
         """The orbit's size in units of the first one's."""
-        y = np.append(self.chain.x.ravel(), 0.0)
-        return math.sqrt(y @ self.metric @ y)
+        return self.length(np.append(self.chain.x.ravel(), 0.0))
+
+    def length(self, change: Array) -> float:
+        """Arclength of a change of the unknowns."""
+        return math.sqrt(change @ self.metric @ change)
+
+    def along(self, change: Array) -> float:
+        """Share of the tangent in a change of the unknowns, an arclength."""
+        return float(self.tangent @ self.metric @ change)
 
 
 def metric_of(problem: PeriodicProblem, chain: Chain, width: float) -> Array:

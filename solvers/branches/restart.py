@@ -89,7 +89,6 @@ def _restarted(make: Make, record: dict[str, Any]) -> Walk:
     walk.point, walk.orbits, walk.status = points[record["point"]], orbits, BranchStatus[record["status"]]
     walk.step, walk.hop, walk.at_jump = record["step"], record["hop"], record["at_jump"]
     walk.passed = [points[i] for i in record["passed"]]
-    walk.values = [point.chain.parameter for point in walk.passed]
     walk.before = None if record["before"] is None else (points[record["before"][0]], record["before"][1])
     return walk
 
