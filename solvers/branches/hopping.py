@@ -12,9 +12,8 @@ import math
 
 import numpy as np
 
-from solvers.branches.point import Point, corrected, point_of
+from solvers.branches.point import NO_ORBIT, Point, corrected, point_of
 from solvers.orbits import OrbitError, state_after
-from solvers.problem import SolverError
 
 _SHARES = 1e-5, 1e-4, 1e-3, 1e-2  # of the span, changes of the parameter that are tried
 _PERIODS = 30  # periods of that run
@@ -31,7 +30,7 @@ def hopped(a: Point, span: tuple[float, float], last: float) -> Point | None:
     for share in shares if a.orbit.memory else ():
         try:
             return _behind(a, share, span)
-        except (SolverError, np.linalg.LinAlgError, ValueError, ArithmeticError):
+        except NO_ORBIT:
             continue
     return None
 

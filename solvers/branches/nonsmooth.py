@@ -19,16 +19,16 @@ import numpy as np
 
 from solvers.branches.grazing import Grazing, beside, first_grazing, orbit_at, signature
 from solvers.branches.merging import led
-from solvers.branches.point import Point
+from solvers.branches.point import NO_ORBIT, Point
 from solvers.orbits import Orbit, delayed, latching_stops, run
 from solvers.orbits.open_times import open_intervals
-from solvers.problem import ContactLog, SolverError
+from solvers.problem import ContactLog
 
 _SLOW = 4.0  # entry rate, in units of the floor, below which a contact may be about to pass it
 _SHALLOW = 0.1  # indentation, or distance, in units of the deepest peak, below which a contact may vanish or appear
 _AS_NEAR = 1e-3  # relative difference of distances up to which points may come at once; absolute: its square
 _SAMPLES = 600  # of a period
-ERRORS = SolverError, np.linalg.LinAlgError, ValueError, ArithmeticError, IndexError
+ERRORS = *NO_ORBIT, IndexError
 
 
 @dataclass(frozen=True)

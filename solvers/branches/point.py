@@ -12,13 +12,15 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from solvers.orbits import Chain, Orbit, PeriodicProblem, extended, newton, orbit_of, weights
-from solvers.problem import Array
+from solvers.orbits import Chain, Orbit, PeriodicProblem, newton, orbit_of, weights
+from solvers.problem import Array, SolverError
 
 _STEEP = 0.02  # parameter's share of the tangent below which the parameter is not held fixed
 _LATCHED = 1e-10  # arclength of latched numbers, in units of their own size: only keeps the metric regular
 _MOST_ITERATIONS = 9  # of Newton's method for a point
+NO_ORBIT = SolverError, np.linalg.LinAlgError, ValueError, ArithmeticError  # what a search for an orbit may raise
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +67,7 @@ def metric_of(problem: PeriodicProblem, chain: Chain, width: float) -> Array:
     size = float(np.linalg.norm(x @ W.T, axis=1).max()) or 1.0  # an orbit at rest has none
     each = W.T @ W / (m * size**2)
     if chain.coordinates < whole:
-        each = extended(each, (_LATCHED / problem.units(chain)) ** 2 / m)
+        each = block_diag(each, np.diag((_LATCHED / problem.units(chain)) ** 2 / m))
     metric: Array = np.zeros((m * whole + 1, m * whole + 1))
     metric[:-1, :-1] = np.kron(np.eye(m), each)
     metric[-1, -1] = 1.0 / width**2

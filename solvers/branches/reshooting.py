@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from solvers.branches.point import Point, point_of
-from solvers.orbits import Chain, OrbitError, delayed, latching_stops, newton, open_starts, state_after
+from solvers.orbits import Chain, OrbitError, delayed, latching_stops, newton, open_starts, states_at
 from solvers.problem import Array, ContactLog, System
 
 _MARGIN = 0.1  # part of the longest open interval that must lie on both sides of a shot's start
@@ -44,8 +44,7 @@ def reshot(point: Point) -> Point:
     begins = open_starts(orbit.system, log, period, m, False, passed if orbit.memory else None)
     if len(begins) < m or not away(begins) > away(offsets):
         return point
-    later = delayed(orbit.system, orbit.phase)
-    x = np.array([state_after(later, orbit.whole, t, orbit.method) for t in begins])
+    x = np.array(states_at(orbit, begins))
     fractions = [(orbit.phase + t) / period for t in begins]
     turns = math.floor(fractions[0])
     problem = replace(point.problem, fractions=tuple(f - turns for f in fractions))

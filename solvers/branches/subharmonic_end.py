@@ -13,7 +13,7 @@ import numpy as np
 
 from solvers.branches.bifurcations import indicators
 from solvers.branches.point import Point
-from solvers.orbits import Orbit, OrbitError, delayed, newton, orbit_of, state_after, why_not_periodic
+from solvers.orbits import Orbit, OrbitError, newton, orbit_of, states_at, why_not_periodic
 from solvers.problem import Array, System
 
 _SHARP = 1e-10  # of the parameter
@@ -47,7 +47,7 @@ def subharmonic_end(a: Point, b: Point, fold: Orbit) -> Orbit | None:
 
 def _half_apart(orbit: Orbit) -> Array:
     """d(x) of an orbit, its change over half a period."""
-    return state_after(delayed(orbit.system, orbit.phase), orbit.whole, 0.5 * orbit.period, orbit.method) - orbit.whole
+    return states_at(orbit, [0.5 * orbit.period])[0] - orbit.whole
 
 
 def _flip(a: Point, fold: Orbit) -> Orbit | None:

@@ -34,14 +34,6 @@ def weights(system: System, period: float) -> Array:
     return matrix
 
 
-def extended(matrix: Array, more: Array) -> Array:
-    """A matrix with further diagonal entries."""
-    size = len(matrix)
-    whole = np.diag(np.concatenate((np.zeros(size), more)))
-    whole[:size, :size] = matrix
-    return whole
-
-
 def newton(
     problem: PeriodicProblem,
     x: Array,

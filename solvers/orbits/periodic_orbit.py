@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -145,11 +145,15 @@ def _eigenvalues(matrix: Array) -> Any:
     return np.concatenate((np.linalg.eigvals(matrix), np.zeros(whole - len(matrix))))
 
 
+def states_at(orbit: Orbit, times: Sequence[float]) -> list[Array]:
+    """States of an orbit, with the latched numbers, at times counted from its phase."""
+    later = delayed(orbit.system, orbit.phase)
+    return [state_after(later, orbit.whole, t, orbit.method) for t in times]
+
+
 def at_zero(orbit: Orbit) -> Array:
     """State of an orbit at t = 0, with the latched numbers."""
-    if orbit.phase == 0.0:
-        return orbit.whole
-    return state_after(delayed(orbit.system, orbit.phase), orbit.whole, orbit.period - orbit.phase, orbit.method)
+    return orbit.whole if orbit.phase == 0.0 else states_at(orbit, [orbit.period - orbit.phase])[0]
 
 
 def orbit_of(problem: PeriodicProblem, chain: Chain, mark: str = "") -> Orbit:

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.exponential.method import Exponential
-from solvers.orbits.newton import extended, newton, weights
+from solvers.orbits.newton import newton, weights
 from solvers.orbits.open_times import closed, is_cut, latching_stops, open_starts
 from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, orbit_of, with_doubts
 from solvers.orbits.shots import Chain, PeriodicProblem
@@ -119,10 +119,12 @@ def _from_zero(orbit: Orbit) -> Orbit:
 
 def _check_isolated(problem: PeriodicProblem, chain: Chain) -> None:
     """Refuse an orbit whose neighbours are orbits, too, apart from those with other latched numbers."""
+    from scipy.linalg import block_diag
+
     W, matrix = weights(*problem.make(chain.parameter)), chain.monodromy()
     if chain.coordinates < len(matrix):
         size = float(np.linalg.norm(chain.x[0, : chain.coordinates] @ W.T)) or 1.0  # at rest it has none
-        W = extended(W, size / problem.units(chain))
+        W = block_diag(W, np.diag(size / problem.units(chain)))
         kept = np.delete(np.arange(len(matrix)), chain.frozen)
         W, matrix = W[np.ix_(kept, kept)], matrix[np.ix_(kept, kept)]
     away = W @ (matrix - np.eye(len(W))) @ np.linalg.inv(W)
