@@ -16,18 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.compiled.sliding import slider_force
-from solvers.compiled.state import (
-    EVENTS,
-    LOG_FULL,
-    LOGGED,
-    RUNNING,
-    SAMPLED,
-    STATUSES,
-    State,
-    T,
-    event_row,
-    slider_row,
-)
+from solvers.compiled.state import EVENTS, LOG_FULL, LOGGED, RUNNING, SAMPLED, STATUSES, State, T, event_row, slider_row
 from solvers.exponential.energy.check import unbalanced
 from solvers.problem import (
     Array,
