@@ -115,9 +115,10 @@ def _solve_contact(problem, s, h, entry_rate, x_new, rate_new, work):
 
 
 @shared
-def _add_contacts(reply, problem, h, segment, entry_rate, x_new, rate_new, work):
+def _add_contacts(reply, problem, h, move):
     """Find the forces of all stops in contact at the end of a step by Gauss–Seidel sweeps; returns the law calls."""
-    active, force, calls = count_in_contact(segment), work[0], 0
+    segment, work, calls = move.segment, move.work, 0
+    active, force = count_in_contact(segment), work[0]
     if active == 0:
         return 0
     for s in range(problem.law.size):
@@ -128,7 +129,7 @@ def _add_contacts(reply, problem, h, segment, entry_rate, x_new, rate_new, work)
             if segment[s] > 0:
                 before = force[s]
                 reply(problem, h, s, work)
-                calls += _solve_contact(problem, s, h, entry_rate[s], x_new, rate_new, work)
+                calls += _solve_contact(problem, s, h, move.entry_rate[s], move.x_new, move.rate_new, work)
                 largest, change = max(largest, abs(force[s])), max(change, abs(force[s] - before))
         if active == 1 or change <= 1e-12 * largest:
             break
@@ -154,15 +155,14 @@ def _finish(n, h, constants, x, rate, x_new, rate_new, change, dense):
 
 
 @shared
-def newmark(
-    balance, flight, solve, reply, problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol
-):
-    """One step; the last row of ``work`` holds (α_m, α_f, β, γ).
+def newmark(balance, flight, solve, reply, problem, t, h, move):
+    """One step; the last row of ``move.work`` holds (α_m, α_f, β, γ).
 
     ``balance`` writes r and the rates of the energy balance and returns the law calls, ``flight`` writes r without
     contact, ``solve`` puts S⁻¹ r in place of r, all of them behind n entries; ``reply`` writes (1-α_f) S⁻¹ w of a stop
-    to ``work[3]``. Returns (error estimate 0, law calls). ``dense`` gets the cubic Hermite interpolant.
+    to ``work[3]``. Returns (error estimate 0, law calls). ``move.dense`` gets the cubic Hermite interpolant.
     """
+    x, rate, segment, entry_rate, x_new, rate_new, dense, work, _ = move
     n, constants, calls = problem.k.size, work[4], 0
     if constants[1] != 0.0:
         calls += balance(problem, t, x, segment, entry_rate, dense[0], work[2])
@@ -171,7 +171,7 @@ def newmark(
     _blend(n, constants, dense[0], rate_new)
     solve(problem, h, work, rate_new)
     _accelerate(n, h, constants, rate_new, x_new)
-    calls += _add_contacts(reply, problem, h, segment, entry_rate, x_new, rate_new, work)
+    calls += _add_contacts(reply, problem, h, move)
     _store_accelerations(n, rate_new, work[1])
     calls += balance(problem, t + h, x_new, segment, entry_rate, rate_new, work[2])
     _finish(n, h, constants, x, rate, x_new, rate_new, work[1], dense)
@@ -210,27 +210,9 @@ def _reply(problem, h, s, work):
 
 
 @kernel
-def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
+def step(problem, t, h, move):
     """`newmark` on decoupled modes."""
-    return newmark(
-        rhs,
-        _flight,
-        _solve,
-        _reply,
-        problem,
-        t,
-        h,
-        x,
-        rate,
-        segment,
-        entry_rate,
-        x_new,
-        rate_new,
-        dense,
-        work,
-        rtol,
-        atol,
-    )
+    return newmark(rhs, _flight, _solve, _reply, problem, t, h, move)
 
 
 class _Family(ConstantStep):
