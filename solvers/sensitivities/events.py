@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.problem import Array, System
+from solvers.problem import Array, System, renewal_slopes
 from solvers.problem import event_list as at
 from solvers.problem.friction import CODE, FREE, MU, STIFFNESS
 from solvers.sensitivities import laws
@@ -174,7 +174,7 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
         shift = last
     else:
         shift = -d_margin / margin_rate if margin_rate < 0.0 and t > 0.0 else np.zeros(flow.columns)
-    maps = laws.renewal_slopes(law, acting.rows[s], *place, acting.entry_rate[s])
+    maps = renewal_slopes(law, acting.rows[s], *place, acting.entry_rate[s])
     latched = np.outer(maps[:, 0], d_delta + rate * shift) + np.outer(maps[:, 1], d_rate + acceleration * shift)
     latched += maps[:, 2:] @ known
     places = list(law.memory)

@@ -29,7 +29,6 @@ from solvers.compiled.kernels import inner, merged, row_of, rubs, slider_of
 from solvers.compiled.state import PEAK_FORCE, T
 from solvers.problem import Array, Energy, Record, System, dense
 from solvers.problem.friction import ARM, MU, SPIN, may_pull
-from solvers.problem.system import stored_energy
 
 MULTIPLE, ROUNDING = 20.0, 1e-9  # see the module; relative to the energy handled
 CANCELLED = 1e-6  # the most that may cancel in the energies of coupled blocks, relative to the energy handled
@@ -124,7 +123,7 @@ def unbalanced(record: Record, rtol: float) -> bool:
     """Whether the energy balance at the samples of a run has a residual above the tolerated one."""
     rows, system, rubbed = _checked_places(len(record.motion)), record.system, record.works_of_friction
     motion = np.concatenate(((record.back @ record.begin)[None], record.motion[rows]))
-    stored = stored_energy(system.M, system.K, motion[:, : system.size], motion[:, system.size :])
+    stored = system.energy(motion[:, : system.size], motion[:, system.size :])
     works, sampled = record.works[rows], (part[rows] if np.ndim(part) else part for part in rubbed)
     balance = Energy(works[:, 0], works[:, 1], works[:, 2::2].sum(axis=1), stored[1:], stored[0], *sampled)
     handled = balance.initial + np.abs((balance.stored, balance.input, balance.damping)).max(axis=1).sum()
