@@ -235,7 +235,7 @@ class _Run:
         if tangent:
             from solvers.exponential.tangent import Tangent
 
-            self.tangent = Tangent(system, engine, self.parameter, True)
+            self.tangent = Tangent(system, engine, self.parameter)
         state = self.state
         self.size = 2 * engine.problem.k.size
         self.initial, self.latched = state.x[: self.size].copy(), self.memory
