@@ -72,14 +72,14 @@ class Tangent:
         self.packed.append(Packed.of(self.change.variation, VARIATION))
         here, ahead, behind, variation = (packed.address for packed in self.packed)
         derivatives, past = (words + start for start in layout.starts)
-        self.addresses = here, ahead, behind, *engine.addresses[1:], past, derivatives, variation, system.size
+        self.addresses = here, ahead, behind, *engine.addresses[1:], past, derivatives, variation
         self.log_scale = 0.0  # the derivatives are exp(log_scale) times the arrays
         self.history: list[tuple[float, float]] = []  # (time, ln of their size)
 
     def follow(self) -> None:
         """Move the derivatives to the time the engine has reached, and empty its event record."""
         engine = self.engine
-        linearise_run(*self.addresses, not self.history)
+        linearise_run(self.addresses, self.blocks.k.size, not self.history)
         self.y[:, self.tones] = 0.0  # rounding there would not decay
         if not np.all(np.isfinite(self.y)):
             raise SolverError(f"the tangent is not finite any more at t = {engine.state.now[T]:g} s: a contact grazes")
