@@ -71,7 +71,7 @@ class ConstantStep(ABC):
         """
         return limit(self, system, indentation, duration)
 
-    def critical(self, M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Array]:
+    def critical(self, M: Any, C: Any, K: Any, G: Any) -> tuple[Array, Array]:
         """Stiffness k and damping c (j,) of the oscillators that decide on matrices."""
         return eigen_oscillators(M, C, K, G)
 

@@ -230,7 +230,7 @@ class _Family(ConstantStep):
         """Sparse matrices, and damping or gyroscopic terms that couple the modes, are stepped on as they are."""
         return system.sparse or system.blocks.loss.size > 0
 
-    def critical(self, M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Array]:
+    def critical(self, M: Any, C: Any, K: Any, G: Any) -> tuple[Array, Array]:
         """The oscillator that limits a step on matrices, since contacts couple the modes."""
         _, _, beta, gamma = self.constants
         return newmark_oscillator(beta, gamma, M, C, K, G)

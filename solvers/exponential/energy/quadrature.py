@@ -82,11 +82,8 @@ def _panel_points(tables, scratch, node_set, h, begin, width):
     for q in range(S):
         sigma = begin + width * tables.gauss[0, q]
         pace = h * raised(sigma, time_exponent - 1.0)
-        scratch.trial[q], scratch.clipped[q], between[_DT, q] = (
-            sigma,
-            pace * sigma - start,
-            width * time_exponent * pace,
-        )
+        scratch.trial[q], scratch.clipped[q] = sigma, pace * sigma - start
+        between[_DT, q] = width * time_exponent * pace
     sigma = load8(scratch.trial, 0)
     for j in range(S):
         product = splat8(1.0)
