@@ -86,10 +86,10 @@ def state_after(system: System, x: Array, duration: float, method: Any) -> Array
 def derivatives(system: System, x: Array, duration: float, method: Any, tangent: Any) -> tuple[Solution, Array]:
     """A run, and the derivative of its end state by its start, then by a parameter."""
     solution = run(system, x, duration, method=method, tangent=tangent)
-    matrix = solution.tangent if solution.memory_tangent is None else solution.memory_tangent
-    assert matrix is not None
     if solution.memory_tangent is None:
-        return solution, matrix
+        assert solution.tangent is not None
+        return solution, solution.tangent
+    matrix = solution.memory_tangent
     if isinstance(tangent, Parameter) and matrix.shape[1] == len(x):
         behind, ahead = (state_after(side, x, duration, method) for side in (tangent.behind, tangent.ahead))
         matrix = np.column_stack((matrix, (ahead - behind) / (2.0 * tangent.step)))
@@ -105,12 +105,11 @@ def units(system: System, x: Array, log: Transitions) -> Array:
         law: Any = system.contacts[number].law
         row, places, size = np.array(law.parameters, dtype=float), list(getattr(law, "memory", ())), np.abs(latched)
         row[places] = latched
-        mine = np.flatnonzero(log.contact == number) if places else ()
-        if len(mine) and system.contacts[number].friction is not None:
-            size = np.maximum(
-                size, np.abs(log.delta[mine]).max() + np.abs(log.force[mine]).max() / law.friction.stiffness
-            )
-        for i in mine if system.contacts[number].friction is None else ():
+        mine = np.flatnonzero(log.contact == number)
+        if system.contacts[number].friction is not None:
+            drawn = np.abs(log.force[mine]).max(initial=0.0) / law.friction.stiffness
+            size, mine = np.maximum(size, np.abs(log.delta[mine]).max(initial=0.0) + drawn), mine[:0]
+        for i in mine:
             at = int(log.border[i]), float(log.delta[i]), float(log.delta_dot[i])
             taken = np.abs(renewal_slopes(law, row, *at)[:, :2] * at[1:]).max(axis=1)
             renew(law, row, *at)
