@@ -34,7 +34,7 @@ from solvers.compiled.kernels import (
     kernel,
     rhs,
 )
-from solvers.problem import Array, System, require_step
+from solvers.problem import Array, System
 from solvers.stepping.constant_step import ConstantStep
 from solvers.stepping.critical_step import newmark_oscillator
 from solvers.stepping.events import count_in_contact
@@ -267,9 +267,6 @@ class CentralDifference(_Family):
 
     constants: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.5)
 
-    def __post_init__(self) -> None:
-        require_step("dt", self.dt)
-
 
 @dataclass(frozen=True)
 class Newmark(_Family):
@@ -300,7 +297,7 @@ class Newmark(_Family):
     force_unstable: bool = False
 
     def __post_init__(self) -> None:
-        require_step("dt", self.dt)
+        super().__post_init__()
         if not 0.0 <= self.beta < math.inf:
             raise ValueError(f"beta must be >= 0 and finite, got {self.beta!r}")
         if not 0.5 <= self.gamma < math.inf:
@@ -340,7 +337,7 @@ class GeneralizedAlpha(_Family):
     force_unstable: bool = False
 
     def __post_init__(self) -> None:
-        require_step("dt", self.dt)
+        super().__post_init__()
         if not 0.0 <= self.rho_inf <= 1.0:
             raise ValueError(f"rho_inf must lie in [0, 1], got {self.rho_inf!r}")
 

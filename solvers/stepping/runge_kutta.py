@@ -15,7 +15,7 @@ from functools import partial
 from typing import Any, ClassVar
 
 from solvers.compiled.kernels import kernel, rhs
-from solvers.problem import System, require_step
+from solvers.problem import System
 from solvers.stepping.constant_step import ConstantStep
 from solvers.stepping.henon import hermite
 from solvers.stepping.shared import shared
@@ -84,9 +84,6 @@ class RK4(ConstantStep):
 
     work_rows: ClassVar[int] = 3
     step: ClassVar[Any] = staticmethod(step)
-
-    def __post_init__(self) -> None:
-        require_step("dt", self.dt)
 
     @property
     def radius(self) -> Radius:
