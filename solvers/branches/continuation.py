@@ -29,6 +29,7 @@ from solvers.orbits import (
     checked,
     checked_start,
     codes,
+    constant,
     newton,
     orbit_of,
     solved_chain,
@@ -162,7 +163,7 @@ def branch(
     system, period = make_system(parameter)
     method = checked(system, period, method, shots)
     first = at_zero(start) if isinstance(start, Orbit) else checked_start(system, start, period, method)
-    problem, chain = solved_chain(system, period, first, method, shots)
+    problem, chain = solved_chain(constant(system, period, method), first, shots)
     problem = replace(problem, make=make_system, step=1e-6 * (high - low))
     chain = newton(problem, chain.x, parameter, slope=True)
     metric = metric_of(problem, chain, high - low)

@@ -109,6 +109,11 @@ class PeriodicProblem:
         return codes(self.make(chain.parameter)[0])
 
 
+def constant(system: System, period: float, method: Any) -> PeriodicProblem:
+    """A family of one member, whatever the parameter."""
+    return PeriodicProblem(lambda _: (system, period), method)
+
+
 @dataclass(frozen=True, eq=False)
 class Chain:
     """Results of the shots from x (m, N): residuals (m, N), their derivatives (m, N, N) and by the parameter.
