@@ -254,14 +254,15 @@ def _stage_rates(run, w, factor, out):
         batch[0], batch[1] = _inside_segment(run, s, w), indentation_rate(problem, s, w)
         _gradient(run, s, batch)
         by_latched(run, s, 1, batch[0:1], batch[1:2])
-        if variation.law_step > 0.0:
+        by_law, laws_change = 0.0, variation.law_step > 0.0
+        if laws_change:
             _force_of_side(run, run.ahead, variation.uncut[0, s], s, batch, batch[5:6])
             _force_of_side(run, run.behind, variation.uncut[1, s], s, batch, batch[6:7])
+            by_law = (batch[5] - batch[6]) / (2.0 * variation.law_step)
         if rubs(problem, s):
             add_rubbing_change(run, s, w, t, _inside_segment(run, s, w), factor, out)
             continue
         if is_circle(problem, s):
-            by_law = (batch[5] - batch[6]) / (2.0 * variation.law_step) if variation.law_step > 0.0 else 0.0
             add_radial_change(run, s, w, t, factor, force, by_law, out)
             continue
         for c in range(derivatives.y.shape[0]):
@@ -269,8 +270,8 @@ def _stage_rates(run, w, factor, out):
             change = batch[4] * derivatives.entry[c, s] + change_by_latched(run, c, s, 1, 0)
             for d in range(2):
                 change += batch[2 + d] * row_change(run, y, c, problem.first[s], d, t)
-            if variation.law_step > 0.0 and is_parameter(run, c):
-                change += (batch[5] - batch[6]) / (2.0 * variation.law_step)
+            if laws_change and is_parameter(run, c):
+                change += by_law
             add_push(problem, s, factor * change, w, out[c])
 
 

@@ -139,6 +139,28 @@ def _signal_slopes(run, node_set, level, t):
 
 
 @merged
+def _line_residual(run, node_set, level, c, s, shift, place):
+    """Right-hand sides for the changes of the force of a stop on a line, in column c, into ``scratch.residual``.
+
+    ``scratch.motion`` holds the change of motion without that of the forces.
+    """
+    scratch, tables, derivatives, r = run.scratch, run.tables, run.derivatives, run.problem.first[s]
+    for i in range(S):
+        t = run.past.now[T] + tables.contact_step[level] * tables.times[node_set, i]
+        change = derivatives.entry[c, s] * scratch.slope[s, 2, i] + change_by_latched(run, c, s, S, i)
+        if is_parameter(run, c):
+            change += derivatives.by_parameter[s, i]
+        for d in range(2):
+            value = scratch.motion[r, d, i]
+            if shift != 0.0:
+                value += shift * derivatives.response[r, d, i]
+            if is_parameter(run, c):
+                value += explicit_change(run.variation, r, d, t)
+            change += scratch.slope[s, d, i] * value
+        scratch.residual[place + i] = change
+
+
+@merged
 def _solve(run, node_set, level, column, shift):
     """Changes of all forces at the nodes in one column and, in a moving frame, of the signals."""
     problem, tables, past, scratch, derivatives = run.problem, run.tables, run.past, run.scratch, run.derivatives
@@ -156,28 +178,11 @@ def _solve(run, node_set, level, column, shift):
         if rubs(problem, s):
             if r == problem.first[s + 1] - 1:  # all rows have moved
                 rubbing_residual(run, node_set, level, column, s, shift, place - S * (r - problem.first[s]))
-            place += S
-            continue
-        if is_circle(problem, s):
+        elif is_circle(problem, s):
             if r > problem.first[s]:  # both rows have moved
                 radial_residual(run, node_set, level, column, s, shift, place - S)
-            place += S
-            continue
-        for i in range(S):
-            change, t = 0.0, past.now[T] + tables.contact_step[level] * tables.times[node_set, i]
-            if r == problem.first[s]:
-                change = derivatives.entry[column, s] * scratch.slope[s, 2, i]
-                change += change_by_latched(run, column, s, S, i)
-                if is_parameter(run, column):
-                    change += derivatives.by_parameter[s, i]
-                for d in range(2):
-                    value = motion[d, i]
-                    if shift != 0.0:
-                        value += shift * derivatives.response[r, d, i]
-                    if is_parameter(run, column):
-                        value += explicit_change(run.variation, r, d, t)
-                    change += scratch.slope[s, d, i] * value
-            scratch.residual[place + i] = change
+        else:
+            _line_residual(run, node_set, level, column, s, shift, place)
         place += S
     substitute(scratch.jacobian, scratch.pivots, place, scratch.residual)
     place = 0

@@ -259,17 +259,8 @@ def rubbing_residual(run, node_set, level, c, s, shift, place):
 
 @inner
 def _friction_in_state(side, s, t, w, normal):
-    """F_t at another value of the parameter, in the state w of a landing."""
+    """F_t by the slider of one ``side`` of the parameter, or of the run itself, in the state w of a landing."""
     return friction_force(radius_of(side, s), slider_of(side, s), xi_and_rate_at(side, s, t, w)[0], normal)
-
-
-@inner
-def _forces_in_state(problem, s, entry_rate, t, w, delta, rate, batch):
-    """N and F_t in the state w of a landing, where δ and δ̇ are given."""
-    normal = force_at(problem, s, delta, rate, entry_rate, batch)
-    return normal, friction_force(
-        radius_of(problem, s), slider_of(problem, s), xi_and_rate_at(problem, s, t, w)[0], normal
-    )
 
 
 @inner
@@ -288,7 +279,8 @@ def add_rubbing_change(run, s, w, t, delta, factor, out):
         normal_by_parameter = (batch[5] - batch[6]) / width
         friction_by_parameter = _friction_in_state(run.ahead, s, t, w, batch[5]) / width
         friction_by_parameter -= _friction_in_state(run.behind, s, t, w, batch[6]) / width
-    normal, tangential = _forces_in_state(problem, s, run.past.entry_rate[s], t, w, delta, rate, batch[5:8])
+    normal = force_at(problem, s, delta, rate, run.past.entry_rate[s], batch[5:8])
+    tangential = _friction_in_state(problem, s, t, w, normal)
     for a in range(m):
         motion[a, 0, 0] = dot(problem.read[first + a], w, size) - problem.gap[first + a]
         motion[a, 1, 0] = dot(problem.read_rate[first + a], w, size)

@@ -103,17 +103,8 @@ def _fill_basis(kind, points, begin, width, basis):
 
 
 @inner
-def _propagated(k, c, x, p, v):
-    """State of a block a time x later, or earlier if x < 0, by the inverse of α I + β A with the determinant
-    e^{-cx}.
-    """
-    alpha, beta = _propagator_of(k, c, x)
-    return alpha * p + beta * v, alpha * v - beta * (k * p + c * v)
-
-
-@inner
 def _propagator_of(k, c, x):
-    """α, β of a time x of any sign."""
+    """α, β of a time x; for x < 0 by the inverse of α I + β A, whose determinant is e^{-cx}."""
     alpha, beta = propagate(k, c, abs(x))
     if x < 0.0:
         grown = math.exp(-c * x)
@@ -128,9 +119,9 @@ def _unit_impulses(block, points, begin, width, basis, pushed):
     start = h * begin**time_exponent
     for q in range(points.shape[1]):
         sigma = begin + width * points[0, q]
-        p, v = _propagated(
-            k, c, start - h * sigma**time_exponent, 0.0, width * h * time_exponent * sigma ** (time_exponent - 1.0)
-        )
+        alpha, beta = _propagator_of(k, c, start - h * sigma**time_exponent)
+        push = width * h * time_exponent * sigma ** (time_exponent - 1.0)
+        p, v = beta * push, alpha * push - beta * (c * push)
         for kind in range(2):
             for j in range(S):
                 pushed[q, 0, S * kind + j] = basis[kind, q, j] * p

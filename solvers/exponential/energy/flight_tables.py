@@ -123,7 +123,8 @@ def _flight_part(energy_tables: EnergyTables, problem: Problem, tables: Tables, 
     h = tables.flight_step[0] * 2.0 ** (-np.arange(levels) / _OCTAVE)
     signal = tables.signal[..., :n].reshape(*tables.signal.shape[:3], size)
     spacing = energy_tables.spacing
-    last, Y = _last(_doubled_forms(problem, powers, *_halved_steps(problem, spacing))), powers.shape[-1]
+    *_, last = _doubled_forms(problem, powers, *_halved_steps(problem, spacing))
+    Y = powers.shape[-1]
     kept = np.append(np.arange(size, Y), driver)
     b = np.arange(0 if _coupled(tables) else int(tables.own_blocks))
 
@@ -230,12 +231,6 @@ def _halved_steps(problem: Problem, h: float) -> tuple[Any, int, Any, Any]:
     fastest = float((np.sqrt(problem.k) + problem.c).max())
     steps = h * 2.0 ** -np.arange(1 + max(0, math.ceil(math.log2(max(h * fastest, 1e-300) / _BRIEF))))
     return steps, 1, *_moves(problem, steps)
-
-
-def _last(forms: Iterator[Forms]) -> Forms:
-    """The last forms, of the longest step."""
-    *_, last = forms
-    return last
 
 
 def _flow(problem: Problem, h: Any, propagator: Any, signal: Any) -> Forms:

@@ -173,18 +173,14 @@ def _add_works(problem, tables, state, scratch, row):
                 )
                 row[account], row[account + 1] = row[account] + friction_work, row[account + 1] + friction_impulse
                 row[account + 2] += slip_distance
-                row[size + 2 + 2 * s] += work
-                row[size + 3 + 2 * s] += impulse
-                continue
-            if is_circle(problem, s):
+            elif is_circle(problem, s):
                 work, impulse = work_within_circle(problem, tables, scratch, s, _DT + 1)
-                row[size + 2 + 2 * s] += work
-                row[size + 3 + 2 * s] += impulse
-                continue
-            combine(scratch.along, problem.read_rate[r], size, None, scratch.trial)
-            impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_DT + 1 + r], 0)
-            row[size + 2 + 2 * s] += sum8(impulses * load8(scratch.trial, 0))
-            row[size + 3 + 2 * s] += sum8(impulses)
+            else:
+                combine(scratch.along, problem.read_rate[r], size, None, scratch.trial)
+                impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_DT + 1 + r], 0)
+                work, impulse = sum8(impulses * load8(scratch.trial, 0)), sum8(impulses)
+            row[size + 2 + 2 * s] += work
+            row[size + 3 + 2 * s] += impulse
 
 
 @merged
