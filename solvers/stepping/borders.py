@@ -24,15 +24,7 @@ from solvers.compiled.kernels import (
     surface_tolerance,
 )
 from solvers.compiled.renewals import count_event, margins, margins_before, margins_in, renew
-from solvers.compiled.sliding import (
-    POINT,
-    XI,
-    XI_RATE,
-    move_point,
-    point_of,
-    slider_margins,
-    xi_tolerances,
-)
+from solvers.compiled.sliding import POINT, XI, XI_RATE, move_point, point_of, slider_margins, xi_tolerances
 from solvers.compiled.state import LAST_EVENT, T, rate_tolerance
 from solvers.problem.friction import CODE
 from solvers.stepping.events import NONE, bisection, golden_section, motion_of, point_at, polynomial

@@ -13,6 +13,7 @@ from solvers.compiled.kernels import (
     indentation_rate,
     inner,
     kernel,
+    merged,
     off_knots,
     radius_of,
     rubs,
@@ -77,29 +78,30 @@ def _peaks(problem, state, space, h):
         motion_of(problem, s, state.x, space.dense, space.coefficients)
         for column in (PEAK_DELTA, PEAK_FORCE):
             known = (problem, state, s, column, space.coefficients, space.work[0])
-            best, place = -np.inf, 0
-            for i in range(_PEAK_NODES.size):
-                value = _peak_value(known, _PEAK_NODES[i])
-                if value > best:
-                    best, place = value, i
+            best, a, b = _largest_node(_peak_value, known)
             if best > 0.9 * state.active[s, column]:
-                a, b = _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
                 best = max(best, golden_section(_peak_value, known, a, b)[1])
                 state.active[s, column] = max(state.active[s, column], best)
         if rubs(problem, s):
             _peak_of_friction(problem, state, space, h, s)
 
 
+@merged
+def _largest_node(value, known):
+    """(largest ``value(known, θ)`` at some θ of the step, and the θ before and after)."""
+    best, place = -np.inf, 0
+    for i in range(_PEAK_NODES.size):
+        found = value(known, _PEAK_NODES[i])
+        if found > best:
+            best, place = found, i
+    return best, _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
+
+
 @inner
 def _peak_of_friction(problem, state, space, h, s):
     """Raise the largest |F_t| by the step just accepted; the coefficients are those of `motion_of`."""
-    known, best, place = (problem, state, space, h, s), -1.0, 0
-    for i in range(_PEAK_NODES.size):
-        value = _friction_at(known, _PEAK_NODES[i])
-        if value > best:
-            best, place = value, i
-    a, b = _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
-    slider = slider_of(problem, s)
+    known, slider = (problem, state, space, h, s), slider_of(problem, s)
+    best, a, b = _largest_node(_friction_at, known)
     slider[PEAK] = max(slider[PEAK], best, golden_section(_friction_at, known, a, b)[1])
 
 
