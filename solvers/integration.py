@@ -16,18 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.compiled.sliding import slider_force
-from solvers.compiled.state import (
-    EVENTS,
-    LOG_FULL,
-    LOGGED,
-    RUNNING,
-    SAMPLED,
-    STATUSES,
-    State,
-    T,
-    event_row,
-    slider_row,
-)
+from solvers.compiled.state import EVENTS, LOG_FULL, LOGGED, RUNNING, SAMPLED, STATUSES, State, T, event_row, slider_row
 from solvers.exponential.energy.check import unbalanced
 from solvers.problem import (
     Array,
@@ -246,7 +235,7 @@ class _Run:
         if tangent:
             from solvers.exponential.tangent import Tangent
 
-            self.tangent = Tangent(system, engine, self.parameter, True)
+            self.tangent = Tangent(system, engine, self.parameter)
         state = self.state
         self.size = 2 * engine.problem.k.size
         self.initial, self.latched = state.x[: self.size].copy(), self.memory

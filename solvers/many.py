@@ -131,11 +131,8 @@ def integrate_many(
     for engine in engines:
         engine.release()
     motion, n = _products(engines[0].back, outcomes.x), system.size
-    t, contacts, peaks = (
-        outcomes.number[:, REACHED],
-        outcomes.count[:, CONTACTS],
-        (outcomes.peak[..., 0], outcomes.peak[..., 1]),
-    )
+    t, contacts = outcomes.number[:, REACHED], outcomes.count[:, CONTACTS]
+    peaks = outcomes.peak[..., 0], outcomes.peak[..., 1]
     found = ManySolutions(motion[:, :n], motion[:, n:], t, status, contacts, *peaks, time.perf_counter() - started)
     if check:
         _check_status(found, duration)
@@ -185,9 +182,9 @@ def _gaps(system: System, gaps: ArrayLike | None, count: int) -> Array:
 
 def _factors(system: System, factors: ArrayLike | None, count: int) -> Any:
     """(k, p) complex factors of the loads, None without."""
-    return (
-        None if factors is None else _rows("factors", factors, count, len(system.loads), "that of each load", complex)
-    )
+    if factors is None:
+        return None
+    return _rows("factors", factors, count, len(system.loads), "that of each load", complex)
 
 
 def _of_tones(factors: Any, engine: Engine) -> Any:

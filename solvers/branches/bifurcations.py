@@ -43,9 +43,9 @@ def indicators(orbit: Orbit, tangent: Array) -> dict[str, float]:
     first, second = _pairs(len(mu))
     return {
         "fold": float(tangent[-1]),
-        "flip": _product(mu, 1.0),
-        "neimark-sacker": _product(-mu[first] * mu[second], 1.0),
-        "branch point": _product(-mu, 1.0),
+        "flip": _product(mu),
+        "neimark-sacker": _product(-mu[first] * mu[second]),
+        "branch point": _product(-mu),
     }
 
 
@@ -62,9 +62,9 @@ def indicators_at(point: Point) -> dict[str, float]:
     return point.tests
 
 
-def _product(values: Any, shift: float) -> float:
-    """Π (value + shift) / (1 + |value|), of values that are real or come in conjugate pairs."""
-    return float(((values + shift) / (1.0 + np.abs(values))).prod().real)
+def _product(values: Any) -> float:
+    """Π (value + 1) / (1 + |value|), of values that are real or come in conjugate pairs."""
+    return float(((values + 1.0) / (1.0 + np.abs(values))).prod().real)
 
 
 def _is_at(orbit: Orbit, name: str) -> bool:
@@ -100,12 +100,11 @@ class Arc:
             if self.known:
                 places, off = [place for place, _ in self.known], np.array([rest for _, rest in self.known])
                 guess += bend * np.array([np.interp(s, places, column) for column in off.T])
-            chain, error, iterations = corrected(self.a, guess, self.straight, not self.straight)
+            chain = corrected(self.a, guess, self.straight, not self.straight)
             rest = np.append(chain.x.ravel(), chain.parameter) - cubic(self.a, self.b, self.length, s)
             if bend > 0.0:
                 self.known = sorted([*self.known, (s, rest / bend)], key=lambda pair: pair[0])
-            orbit = orbit_of(self.a.problem, chain, error, iterations, parameter=chain.parameter)
-            self.trials[s] = chain, orbit
+            self.trials[s] = chain, orbit_of(self.a.problem, chain)
         return self.trials[s]
 
     def orbit(self, s: float) -> Orbit:

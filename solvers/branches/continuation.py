@@ -29,6 +29,7 @@ from solvers.orbits import (
     checked,
     checked_start,
     codes,
+    constant,
     newton,
     orbit_of,
     solved_chain,
@@ -107,7 +108,7 @@ class Branch:
         turning[~codes(flip.system)] = v
         tangent = np.concatenate((turning, -turning, [0.0]))
         tangent /= math.sqrt(tangent @ metric @ tangent)
-        orbit = orbit_of(problem, chain, flip.residual, 0, parameter=flip.parameter, mark="flip")
+        orbit = orbit_of(problem, replace(chain, error=flip.residual), "flip")
         return Branch([Walk(Point(orbit, problem, chain, tangent, metric), walk.span, walk.largest)])
 
 
@@ -162,13 +163,13 @@ def branch(
     system, period = make_system(parameter)
     method = checked(system, period, method, shots)
     first = at_zero(start) if isinstance(start, Orbit) else checked_start(system, start, period, method)
-    problem, chain, *_ = solved_chain(system, period, first, method, shots)
+    problem, chain = solved_chain(constant(system, period, method), first, shots)
     problem = replace(problem, make=make_system, step=1e-6 * (high - low))
-    chain, error, iterations = newton(problem, chain.x, parameter, slope=True)
+    chain = newton(problem, chain.x, parameter, slope=True)
     metric = metric_of(problem, chain, high - low)
     ahead = np.zeros(len(metric))
     ahead[-1] = 1.0
-    point = reshot(point_of(problem, chain, error, iterations, metric, ahead))
+    point = reshot(point_of(problem, chain, metric, ahead))
     back = replace(point, tangent=-point.tangent)
     return Branch(
         [Walk(p, (low, high), step) for p, room in ((point, parameter < high), (back, parameter > low)) if room]

@@ -32,10 +32,7 @@ def zero(arc: Arc, begin: float, end: float, value: Callable[[float], float]) ->
         return value(found[s][0])
 
     try:
-        place, _ = brentq(
-            *(nearby, begin, end),
-            **{"xtol": arc.sharpness(), "maxiter": _MOST_TRIALS, "full_output": True, "disp": False},
-        )
+        place, _ = brentq(nearby, begin, end, xtol=arc.sharpness(), maxiter=_MOST_TRIALS, full_output=True, disp=False)
         return found[place]
     except (OrbitError, ValueError, IndexError, KeyError):  # ValueError: rounding has taken the change of sign away
         return None

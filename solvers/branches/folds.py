@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from solvers.branches.point import metric_of
+from solvers.branches.point import NO_ORBIT, metric_of
 from solvers.orbits import Chain, Orbit, OrbitError, PeriodicProblem, is_cut, orbit_of
-from solvers.problem import Array, SolverError, System
+from solvers.problem import Array, System
 
 Make = Callable[[float, float], tuple[System, float]]
 ALONG = 1e-4  # distance, in units of the motion, of the runs that give the derivative of g
@@ -186,10 +186,9 @@ def fold_curve(
     (ahead, end), (behind, begin) = walks
     found = [*reversed(behind), (first, "fold"), *ahead]
     orbits = [
-        orbit_of(one.problem, one.chain, float(np.abs(one.chain.residual).max()), 0, parameter=one.chain.parameter,
-                 mark=mark)
+        orbit_of(one.problem, replace(one.chain, error=float(np.abs(one.chain.residual).max())), mark)
         for one, mark in found
-    ]  # fmt: skip
+    ]
     return FoldCurve(orbits, np.array([one.y[-1] * (high - low) for one, _ in found]), (begin, end))
 
 
@@ -207,7 +206,7 @@ def _walk(
                 raise OrbitError("the curve turns too fast")
             if new.tangent[-1] * point.tangent[-1] < 0.0:
                 points.append((_cusp(equations, point, new), "cusp"))
-        except (SolverError, ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
+        except NO_ORBIT as error:
             step *= 0.5
             if step < SHORTEST * longest:
                 return points, f"stopped at {point.y[-1] * equations.widths[1]:.6g}: {error}"

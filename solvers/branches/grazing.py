@@ -25,12 +25,12 @@ from solvers.orbits import (
     Orbit,
     OrbitError,
     PeriodicProblem,
-    delayed,
     latching_stops,
     newton,
     orbit_of,
     rate_at_end,
     state_after,
+    states_at,
 )
 from solvers.problem import Array, System
 
@@ -60,6 +60,18 @@ class _Meeting(PeriodicProblem):
     stops: tuple[int | None, ...] = ()  # of every shot, None where it does not begin on a surface
     floor: float = 0.0
 
+    @property
+    def places(self) -> list[int]:
+        """Numbers of the shots that begin on a surface."""
+        return [i for i, stop in enumerate(self.stops) if stop is not None]
+
+    def at(self, unknowns: Array) -> _Meeting:
+        """The same with the meetings at the fractions of the period that end the unknowns."""
+        places, fractions = self.places, list(self.fractions)
+        for place, fraction in zip(places, unknowns[-len(places) :].tolist(), strict=True):
+            fractions[place] = fraction
+        return replace(self, fractions=tuple(fractions))
+
     def shots(self, parameter: float) -> list[tuple[System, float]]:
         """(system from the shot's start on, duration) of every shot."""
         known = parameter in self.kept
@@ -81,37 +93,26 @@ class _Meeting(PeriodicProblem):
 
 @dataclass(frozen=True, eq=False)
 class Grazing:
-    """An orbit that meets stops' surfaces at a rate, and continues with an entry rate of at least ``floor``."""
+    """An orbit that meets stops' surfaces at a rate."""
 
-    stops: tuple[int | None, ...]  # on whose surfaces the shots begin
+    meeting: _Meeting
     speed: float
-    floor: float
-    fractions: tuple[float, ...]  # of the period, at the shots' begins
     unknowns: Array  # [states of the shots, parameter, fractions of the meetings]
     chain: Chain
 
     @property
-    def places(self) -> list[int]:
-        """Numbers of the shots that begin on a surface."""
-        return _places(self.stops)
-
-    @property
     def parameter(self) -> float:
         """Where on the branch."""
-        return float(self.unknowns[-1 - len(self.places)])
+        return float(self.unknowns[self.chain.x.size])
 
     @property
     def rate_before(self) -> float:
         """Entry rate of the stop's last contact before the meeting; indentations of rounding's size do not count."""
-        first = self.places[0]
+        first = self.meeting.places[0]
         log = self.chain.solutions[first - 1].contacts
-        mine = (log.stop == self.stops[first]) & (log.peak_indentation > 1e-4 * log.peak_indentation.max(initial=0.0))
+        deep = log.peak_indentation > 1e-4 * log.peak_indentation.max(initial=0.0)
+        mine = (log.stop == self.meeting.stops[first]) & deep
         return float(log.speed_in[mine][-1])
-
-
-def _places(stops: Sequence[int | None]) -> list[int]:
-    """Numbers of the shots that begin on a surface."""
-    return [i for i, stop in enumerate(stops) if stop is not None]
 
 
 def first_grazing(
@@ -122,56 +123,38 @@ def first_grazing(
     ``begins`` are the later shots' (time, stop met or None) in their order; ``within`` is an arclength. Raises
     OrbitError.
     """
-    orbit = point.orbit
-    later = delayed(orbit.system, orbit.phase)
+    orbit, problem = point.orbit, point.problem
     times, stops = [t for t, _ in begins], (None, *(stop for _, stop in begins))
-    states = [orbit.whole, *(state_after(later, orbit.whole, t, orbit.method) for t in times)]
-    rest = tuple((orbit.phase + t) / orbit.period for t in (0.0, *times))
-    guess = np.concatenate((*states, [point.chain.parameter], [rest[i] for i in _places(stops)]))
-    return solved(point, stops, rest, guess, speed, floor, within)
+    fractions = tuple((orbit.phase + t) / orbit.period for t in (0.0, *times))
+    meeting = _Meeting(problem.make, problem.method, fractions, problem.step, stops, floor)
+    states, met = [orbit.whole, *states_at(orbit, times)], [fractions[i] for i in meeting.places]
+    return solved(point, meeting, np.concatenate((*states, [point.chain.parameter], met)), speed, within)
 
 
-def solved(
-    point: Point,
-    stops: tuple[int | None, ...],
-    fractions: tuple[float, ...],
-    unknowns: Array,
-    speed: float,
-    floor: float,
-    within: float = math.inf,
-) -> Grazing:
+def solved(point: Point, meeting: _Meeting, unknowns: Array, speed: float, within: float = math.inf) -> Grazing:
     """The grazing orbit near a guess, by Newton's method with steps of at most ``within``; raises OrbitError."""
-    problem, size = point.problem, len(point.orbit.whole)
+    m, size = len(meeting.stops), len(point.orbit.whole)
     for _ in range(_MOST_ITERATIONS):
-        fractions = _with_meetings(fractions, stops, unknowns)
-        states, parameter = np.split(unknowns, [len(stops) * size])[0], float(unknowns[len(stops) * size])
-        if not np.all(np.diff((*fractions, fractions[0] + 1.0)) > 0.0):
+        meeting = meeting.at(unknowns)
+        states, parameter = unknowns[: m * size], float(unknowns[m * size])
+        if not np.all(np.diff((*meeting.fractions, meeting.fractions[0] + 1.0)) > 0.0):
             break
-        meeting = _Meeting(problem.make, problem.method, fractions, problem.step, stops, floor)
-        chain = meeting.evaluate(states.reshape(len(stops), size), parameter)
+        chain = meeting.evaluate(states.reshape(m, size), parameter)
         matrix, right = _linear(meeting, chain, speed)
         step: Array = np.linalg.lstsq(matrix, right, rcond=None)[0].astype(float)
-        unknowns, distance = unknowns + step, _length(point, step[:size], step[len(stops) * size])
+        unknowns, distance = unknowns + step, _length(point, step[:size], step[m * size])
         at_once = np.abs(matrix @ step - right).max() < _AT_ONCE * np.abs(states).max()
         if not distance < within:
             break
         if distance < _CLOSE and at_once:
-            return Grazing(stops, speed, floor, _with_meetings(fractions, stops, unknowns), unknowns, chain)
-    met = ", ".join(str(stop) for stop in stops if stop is not None)
+            return Grazing(meeting.at(unknowns), speed, unknowns, chain)
+    met = ", ".join(str(meeting.stops[i]) for i in meeting.places)
     raise OrbitError(f"no orbit that meets stop {met} at {speed:g} m/s was found in {_MOST_ITERATIONS} iterations")
-
-
-def _with_meetings(fractions: tuple[float, ...], stops: Sequence[int | None], unknowns: Array) -> tuple[float, ...]:
-    """The fractions of the period at which shots begin, with those of the meetings from the unknowns."""
-    places, changed = _places(stops), list(fractions)
-    for place, fraction in zip(places, unknowns[-len(places) :].tolist(), strict=True):
-        changed[place] = fraction
-    return tuple(changed)
 
 
 def _linear(problem: _Meeting, chain: Chain, speed: float) -> tuple[Array, Array]:
     """Matrix and right side of Newton's step."""
-    (m, size), places = chain.residual.shape, _places(problem.stops)
+    (m, size), places = chain.residual.shape, problem.places
     system, period = problem.make(chain.parameter)
     later, rows, misses = np.zeros((len(places), m, size)), np.zeros((len(places), 2, m * size + 1 + len(places))), []
     for k, place in enumerate(places):
@@ -206,20 +189,18 @@ def _length(point: Point, state: Array, parameter: float) -> float:
 def unknowns_at(point: Point, grazing: Grazing) -> Array:
     """A grazing orbit as unknowns of the branch: states of its shots, integrated with its own floor; the parameter."""
     problem, known = point.problem, grazing.unknowns[: grazing.chain.x.size].reshape(grazing.chain.x.shape)
-    meeting = _Meeting(problem.make, problem.method, grazing.fractions, problem.step, grazing.stops, grazing.floor)
-    shots, period = meeting.shots(grazing.parameter), problem.make(grazing.parameter)[1]
-    x = [known[0]]
+    shots, period = grazing.meeting.shots(grazing.parameter), problem.make(grazing.parameter)[1]
+    begins, x = grazing.meeting.fractions, [known[0]]
     for fraction in problem.fractions[1:]:
-        i = max(i for i, begin in enumerate(grazing.fractions) if begin < fraction)
-        x.append(state_after(shots[i][0], known[i], (fraction - grazing.fractions[i]) * period, problem.method))
+        i = max(i for i, begin in enumerate(begins) if begin < fraction)
+        x.append(state_after(shots[i][0], known[i], (fraction - begins[i]) * period, problem.method))
     return np.append(np.concatenate(x), grazing.parameter)
 
 
-def orbit_at(point: Point, grazing: Grazing, **more: Any) -> Orbit:
-    """A grazing orbit as an orbit of the branch; raises OrbitError."""
-    y, problem = unknowns_at(point, grazing), point.problem
-    chain, error, iterations = newton(problem, y[:-1].reshape(point.chain.x.shape), grazing.parameter)
-    return orbit_of(problem, chain, error, iterations, parameter=grazing.parameter, **more)
+def orbit_at(point: Point, grazing: Grazing) -> Orbit:
+    """A grazing orbit as an orbit of the branch, marked; raises OrbitError."""
+    chain = newton(point.problem, unknowns_at(point, grazing)[:-1].reshape(point.chain.x.shape), grazing.parameter)
+    return orbit_of(point.problem, chain, "grazing")
 
 
 def signature(orbit: Orbit) -> tuple[int, int]:
@@ -260,12 +241,10 @@ def _indicators(point: Point, grazing: Grazing) -> tuple[Array, Array, float]:
     """Derivatives, by first state and parameter, of the numbers that change sign at a grazing orbit; their offset."""
     rows, aside = [], _OFFSETS[0] * float(point.orbit.contacts.peak_indentation.max(initial=0.0))
     chain, n = grazing.chain, point.orbit.system.size
-    size = chain.x.shape[1]
-    columns = np.eye(size, size + 1)
-    for place in range(1, len(grazing.stops)):
+    columns = np.eye(chain.x.shape[1], chain.x.shape[1] + 1)
+    for place, stop in enumerate(grazing.meeting.stops[1:], 1):
         columns = chain.tangents[place - 1] @ columns
         columns[:, -1] += chain.by_parameter[place - 1]
-        stop = grazing.stops[place]
         if stop is not None:
             rate = rate_at_end(point.orbit.system, chain.solutions[place - 1])
             state = np.split(chain.x[place, : 2 * n], 2)

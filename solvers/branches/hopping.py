@@ -12,9 +12,8 @@ import math
 
 import numpy as np
 
-from solvers.branches.point import Point, corrected, point_of
+from solvers.branches.point import NO_ORBIT, Point, corrected, point_of
 from solvers.orbits import OrbitError, state_after
-from solvers.problem import SolverError
 
 _SHARES = 1e-5, 1e-4, 1e-3, 1e-2  # of the span, changes of the parameter that are tried
 _PERIODS = 30  # periods of that run
@@ -31,7 +30,7 @@ def hopped(a: Point, span: tuple[float, float], last: float) -> Point | None:
     for share in shares if a.orbit.memory else ():
         try:
             return _behind(a, share, span)
-        except (SolverError, np.linalg.LinAlgError, ValueError, ArithmeticError):
+        except NO_ORBIT:
             continue
     return None
 
@@ -55,7 +54,7 @@ def _point_at(a: Point, parameter: float) -> tuple[Point, float]:
         states.append(x)
         x = state_after(shots[number % len(shots)][0], x, shots[number % len(shots)][1], a.problem.method)
     guess = np.append(np.concatenate(states[-len(shots) :]), parameter)
-    chain, error, iterations = corrected(a, guess, True, True)
+    chain = corrected(a, guess, True, True)
     off = np.append(chain.x.ravel(), parameter) - a.unknowns
     ahead = np.append(np.zeros(len(off) - 1), off[-1])  # latched numbers must not reverse the branch
-    return point_of(a.problem, chain, error, iterations, a.metric, ahead), math.sqrt(off @ a.metric @ off)
+    return point_of(a.problem, chain, a.metric, ahead), a.length(off)

@@ -10,13 +10,14 @@ the system itself; the rate is varied from the floor (end of one branch) to the 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from solvers.branches.grazing import Grazing, solved
-from solvers.branches.point import Point
+from solvers.branches.point import NO_ORBIT, Point
 from solvers.orbits import OrbitError
-from solvers.problem import Array, SolverError
+from solvers.problem import Array
 
 _MOST_STEPS = 60  # of the rate
 _FACTORS = 1.02, 1.5, 4.0  # least, first and largest ratio of successive rates
@@ -28,15 +29,15 @@ def led(point: Point, grazing: Grazing, floor: float | None) -> Grazing:
     known, factor = [grazing], _FACTORS[1]
     for _ in range(_MOST_STEPS):
         last = known[-1]
-        ratio = (floor or last.rate_before) / last.floor
+        ratio = (floor or last.rate_before) / last.meeting.floor
         if abs(ratio - 1.0) < _SAME:
             return last
-        following = last.floor * min(max(ratio, 1.0 / factor), factor)
+        following = last.meeting.floor * min(max(ratio, 1.0 / factor), factor)
         try:
             guess = _ahead(known[-3:], following)
-            known.append(solved(point, last.stops, last.fractions, guess, 0.0, following))
+            known.append(solved(point, replace(last.meeting, floor=following), guess, 0.0))
             factor = min(factor**1.5, _FACTORS[2])
-        except (SolverError, np.linalg.LinAlgError, ValueError, ArithmeticError):
+        except NO_ORBIT:
             factor = math.sqrt(factor)
             if factor < _FACTORS[0]:
                 break
@@ -45,7 +46,7 @@ def led(point: Point, grazing: Grazing, floor: float | None) -> Grazing:
 
 def _ahead(known: list[Grazing], rate: float) -> Array:
     """Guess of the unknowns at a rate: Lagrange's polynomial in its logarithm through the known ones."""
-    places = np.log([grazing.floor for grazing in known])
+    places = np.log([grazing.meeting.floor for grazing in known])
     weights = [np.prod([(math.log(rate) - b) / (a - b) for b in places if b != a]) for a in places]
     guess: Array = sum(w * grazing.unknowns for w, grazing in zip(weights, known, strict=True))
     return guess

@@ -19,16 +19,16 @@ import numpy as np
 
 from solvers.branches.grazing import Grazing, beside, first_grazing, orbit_at, signature
 from solvers.branches.merging import led
-from solvers.branches.point import Point
+from solvers.branches.point import NO_ORBIT, Point
 from solvers.orbits import Orbit, delayed, latching_stops, run
 from solvers.orbits.open_times import open_intervals
-from solvers.problem import ContactLog, SolverError
+from solvers.problem import ContactLog
 
 _SLOW = 4.0  # entry rate, in units of the floor, below which a contact may be about to pass it
 _SHALLOW = 0.1  # indentation, or distance, in units of the deepest peak, below which a contact may vanish or appear
 _AS_NEAR = 1e-3  # relative difference of distances up to which points may come at once; absolute: its square
 _SAMPLES = 600  # of a period
-ERRORS = SolverError, np.linalg.LinAlgError, ValueError, ArithmeticError, IndexError
+ERRORS = *NO_ORBIT, IndexError
 
 
 @dataclass(frozen=True)
@@ -116,10 +116,7 @@ def _new_grazings(orbit: Orbit, stop: int) -> Iterator[tuple[float, NonsmoothPoi
         yield -delta[k] / scale, _nonsmooth("grazing", stop, (float(at[k]),), 1, (1, int(latches)))
     for k in inner[(rising < 0.0) & (falling >= 0.0) & (delta[inner] > 0.0) & (delta[inner] < scale) & latches]:
         i = int(np.searchsorted(log.t_in[mine], times[k])) - 1
-        yield (
-            delta[k] / scale,
-            _nonsmooth("merging", stop, (float(at[k]), *_after(orbit, mine, i)), -1, (1, 1)),
-        )
+        yield delta[k] / scale, _nonsmooth("merging", stop, (float(at[k]), *_after(orbit, mine, i)), -1, (1, 1))
 
 
 def _in_order(log: ContactLog, stop: int) -> Any:
@@ -170,7 +167,7 @@ def behind(point: Point, nonsmooth: NonsmoothPoint, grazing: Grazing) -> Point:
 def marked(last: Point, first: Point, nonsmooth: NonsmoothPoint, grazing: Grazing) -> list[Orbit]:
     """The orbits at a nonsmooth point with its mark."""
     if nonsmooth.kind == "grazing":
-        return [orbit_at(last, grazing, mark="grazing"), first.orbit]
+        return [orbit_at(last, grazing), first.orbit]
     if nonsmooth.kind == "merging":
         return [replace(orbit, mark="merging") for orbit in (last.orbit, first.orbit)]
     return [replace(last.orbit, mark="floor"), first.orbit]

@@ -12,13 +12,15 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from solvers.orbits import ArclengthCondition, Chain, Orbit, PeriodicProblem, extended, newton, orbit_of, weights
-from solvers.problem import Array
+from solvers.orbits import Chain, Orbit, PeriodicProblem, newton, orbit_of, weights
+from solvers.problem import Array, SolverError
 
 _STEEP = 0.02  # parameter's share of the tangent below which the parameter is not held fixed
 _LATCHED = 1e-10  # arclength of latched numbers, in units of their own size: only keeps the metric regular
 _MOST_ITERATIONS = 9  # of Newton's method for a point
+NO_ORBIT = SolverError, np.linalg.LinAlgError, ValueError, ArithmeticError  # what a search for an orbit may raise
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +47,15 @@ class Point:
     @property
     def size(self) -> float:
         """The orbit's size in units of the first one's."""
-        y = np.append(self.chain.x.ravel(), 0.0)
-        return math.sqrt(y @ self.metric @ y)
+        return self.length(np.append(self.chain.x.ravel(), 0.0))
+
+    def length(self, change: Array) -> float:
+        """Arclength of a change of the unknowns."""
+        return math.sqrt(change @ self.metric @ change)
+
+    def along(self, change: Array) -> float:
+        """Share of the tangent in a change of the unknowns, an arclength."""
+        return float(self.tangent @ self.metric @ change)
 
 
 def metric_of(problem: PeriodicProblem, chain: Chain, width: float) -> Array:
@@ -58,7 +67,7 @@ def metric_of(problem: PeriodicProblem, chain: Chain, width: float) -> Array:
     size = float(np.linalg.norm(x @ W.T, axis=1).max()) or 1.0  # an orbit at rest has none
     each = W.T @ W / (m * size**2)
     if chain.coordinates < whole:
-        each = extended(each, (_LATCHED / problem.units(chain)) ** 2 / m)
+        each = block_diag(each, np.diag((_LATCHED / problem.units(chain)) ** 2 / m))
     metric: Array = np.zeros((m * whole + 1, m * whole + 1))
     metric[:-1, :-1] = np.kron(np.eye(m), each)
     metric[-1, -1] = 1.0 / width**2
@@ -76,13 +85,10 @@ def tangent_of(chain: Chain, metric: Array, along: Array) -> Array:
     return unit
 
 
-def point_of(
-    problem: PeriodicProblem, chain: Chain, error: float, iterations: int, metric: Array, along: Array
-) -> Point:
+def point_of(problem: PeriodicProblem, chain: Chain, metric: Array, along: Array) -> Point:
     """The point of a solved chain."""
     tangent = tangent_of(chain, metric, along)
-    orbit = orbit_of(problem, chain, error, iterations, parameter=chain.parameter)
-    return Point(orbit, problem, chain, tangent, metric)
+    return Point(orbit_of(problem, chain), problem, chain, tangent, metric)
 
 
 def cubic(a: Point, b: Point, length: float, s: float) -> Array:
@@ -93,18 +99,18 @@ def cubic(a: Point, b: Point, length: float, s: float) -> Array:
     return whole + slopes
 
 
-def corrected(a: Point, guess: Array, straight: bool, slope: bool = False) -> tuple[Chain, float, int]:
+def corrected(a: Point, guess: Array, straight: bool, slope: bool = False) -> Chain:
     """The branch near a guess: at its parameter if ``straight``, else at right angles to a's tangent.
 
     Raises OrbitError.
     """
-    condition = None if straight else ArclengthCondition(a.metric, a.tangent)
-    return newton(a.problem, guess[:-1].reshape(a.chain.x.shape), float(guess[-1]), condition, slope, _MOST_ITERATIONS)
+    row = None if straight else a.metric @ a.tangent
+    return newton(a.problem, guess[:-1].reshape(a.chain.x.shape), float(guess[-1]), row, slope, _MOST_ITERATIONS)
 
 
 def moved(a: Point, guess: Array, straight: bool) -> Point:
     """The point of the branch near a guess; raises OrbitError."""
-    return point_of(a.problem, *corrected(a, guess, straight, True), a.metric, a.tangent)
+    return point_of(a.problem, corrected(a, guess, straight, True), a.metric, a.tangent)
 
 
 def is_straight(*shares: float) -> bool:

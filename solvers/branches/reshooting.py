@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from solvers.branches.point import Point, point_of
-from solvers.orbits import Chain, OrbitError, delayed, latching_stops, newton, open_starts, state_after
+from solvers.orbits import Chain, OrbitError, delayed, latching_stops, newton, open_starts, states_at
 from solvers.problem import Array, ContactLog, System
 
 _MARGIN = 0.1  # part of the longest open interval that must lie on both sides of a shot's start
@@ -44,16 +44,15 @@ def reshot(point: Point) -> Point:
     begins = open_starts(orbit.system, log, period, m, False, passed if orbit.memory else None)
     if len(begins) < m or not away(begins) > away(offsets):
         return point
-    later = delayed(orbit.system, orbit.phase)
-    x = np.array([state_after(later, orbit.whole, t, orbit.method) for t in begins])
+    x = np.array(states_at(orbit, begins))
     fractions = [(orbit.phase + t) / period for t in begins]
     turns = math.floor(fractions[0])
     problem = replace(point.problem, fractions=tuple(f - turns for f in fractions))
     try:
-        chain, error, iterations = newton(problem, x, point.chain.parameter, slope=True)
+        chain = newton(problem, x, point.chain.parameter, slope=True)
     except OrbitError:
         return point
-    found = point_of(problem, chain, error, iterations, point.metric, _carried(point, chain, begins))
+    found = point_of(problem, chain, point.metric, _carried(point, chain, begins))
     leads_back = bool(orbit.memory) and found.share * point.share < 0.0  # one of a family, its border just not reached
     return point if leads_back else found
 

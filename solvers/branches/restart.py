@@ -6,7 +6,7 @@ Shots are integrated again from their states, which gives the same bits: a branc
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from solvers.branches.continuation import Branch
 from solvers.branches.point import Point
 from solvers.branches.walk import BranchStatus, Walk
 from solvers.exponential.method import Exponential
-from solvers.orbits import Orbit, PeriodicProblem, orbit_of
+from solvers.orbits import Chain, Orbit, PeriodicProblem, orbit_of
 from solvers.problem import System
 
 Make = Callable[[float], tuple[System, float]]
@@ -84,29 +84,28 @@ def _restarted(make: Make, record: dict[str, Any]) -> Walk:
     metrics = [np.array(metric) for metric in record["metrics"]]
     points = [_point(one, problems[one["problem"]], metrics[one["metric"]]) for one in record["points"]]
     known = {one["listed"]: point.orbit for one, point in zip(record["points"], points, strict=True)}
-    orbits = [known.get(i) or _orbit(one, make, method) for i, one in enumerate(record["orbits"])]
+    orbits = [known.get(i) or _orbit(one, problems[0]) for i, one in enumerate(record["orbits"])]
     walk = Walk(points[record["first"]], tuple(record["span"]), record["largest"])
     walk.point, walk.orbits, walk.status = points[record["point"]], orbits, BranchStatus[record["status"]]
     walk.step, walk.hop, walk.at_jump = record["step"], record["hop"], record["at_jump"]
     walk.passed = [points[i] for i in record["passed"]]
-    walk.values = [point.chain.parameter for point in walk.passed]
     walk.before = None if record["before"] is None else (points[record["before"][0]], record["before"][1])
     return walk
 
 
 def _point(record: dict[str, Any], problem: PeriodicProblem, metric: Any) -> Point:
     """A point passed."""
-    chain = problem.evaluate(np.array(record["x"]), record["parameter"])
-    return Point(_named(record, problem, chain), problem, chain, np.array(record["tangent"]), metric)
+    chain = _chain(record, problem, record["x"], True)
+    return Point(orbit_of(problem, chain, record["mark"]), problem, chain, np.array(record["tangent"]), metric)
 
 
-def _orbit(record: dict[str, Any], make: Make, method: Exponential) -> Orbit:
+def _orbit(record: dict[str, Any], problem: PeriodicProblem) -> Orbit:
     """An orbit between two points."""
-    problem = PeriodicProblem(make, method, tuple(record["shots"]["fractions"]))
-    return _named(record, problem, problem.evaluate(np.array(record["shots"]["x"]), record["parameter"]))
+    problem = replace(problem, fractions=tuple(record["shots"]["fractions"]))
+    return orbit_of(problem, _chain(record, problem, record["shots"]["x"], False), record["mark"])
 
 
-def _named(record: dict[str, Any], problem: PeriodicProblem, chain: Any) -> Orbit:
-    """The orbit of a chain, with its mark."""
-    known = {name: record[name] for name in ("parameter", "mark")}
-    return orbit_of(problem, chain, record["residual"], record["iterations"], **known)
+def _chain(record: dict[str, Any], problem: PeriodicProblem, x: Any, slope: bool) -> Chain:
+    """The solved chain of an orbit."""
+    chain = problem.evaluate(np.array(x), record["parameter"], slope)
+    return replace(chain, error=record["residual"], iterations=record["iterations"])

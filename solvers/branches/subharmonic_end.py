@@ -13,7 +13,7 @@ import numpy as np
 
 from solvers.branches.bifurcations import indicators
 from solvers.branches.point import Point
-from solvers.orbits import Orbit, OrbitError, delayed, newton, orbit_of, state_after, why_not_periodic
+from solvers.orbits import Orbit, OrbitError, newton, orbit_of, states_at, why_not_periodic
 from solvers.problem import Array, System
 
 _SHARP = 1e-10  # of the parameter
@@ -47,7 +47,7 @@ def subharmonic_end(a: Point, b: Point, fold: Orbit) -> Orbit | None:
 
 def _half_apart(orbit: Orbit) -> Array:
     """d(x) of an orbit, its change over half a period."""
-    return state_after(delayed(orbit.system, orbit.phase), orbit.whole, 0.5 * orbit.period, orbit.method) - orbit.whole
+    return states_at(orbit, [0.5 * orbit.period])[0] - orbit.whole
 
 
 def _flip(a: Point, fold: Orbit) -> Orbit | None:
@@ -59,13 +59,12 @@ def _flip(a: Point, fold: Orbit) -> Orbit | None:
     x = (fold.whole + 0.5 * _half_apart(fold))[None, :]
 
     def indicator(parameter: float) -> float:
-        chain, error, iterations = newton(half, x, parameter)
-        return indicators(orbit_of(half, chain, error, iterations), a.tangent)["flip"]
+        return indicators(orbit_of(half, newton(half, x, parameter)), a.tangent)["flip"]
 
     step = 0.01 * (a.chain.parameter - fold.parameter) or 1e-6 * a.chain.parameter
     place = float(secant(indicator, fold.parameter, x1=fold.parameter + step, tol=_SHARP * abs(fold.parameter)))
     if not abs(place - fold.parameter) <= 1e-3 * abs(a.chain.parameter - fold.parameter) + 1e-6 * abs(fold.parameter):
         return None
-    chain, error, iterations = newton(half, x, place)
-    whole = replace(a.problem, fractions=(begin,))
-    return orbit_of(whole, whole.evaluate(chain.x, place), error, iterations, parameter=place, mark="flip")
+    found, whole = newton(half, x, place), replace(a.problem, fractions=(begin,))
+    chain = replace(whole.evaluate(found.x, place), error=found.error, iterations=found.iterations)
+    return orbit_of(whole, chain, "flip")

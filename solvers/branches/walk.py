@@ -59,19 +59,16 @@ class Walk:
     status: BranchStatus = BranchStatus.RUNNING
     step: float = 0.0
     before: tuple[Point, float] | None = None  # the point before and the arclength from it
-    tried: float = math.inf  # step at whose failure nonsmooth points were last looked for
     hop: float = 0.0  # share of the span of the last hop, 0 after a longer step
     at_jump: bool = False  # whether a jump ahead could not be crossed
     passed: list[Point] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)  # of the parameter there
 
     def __repr__(self) -> str:
         return f"<one direction of a branch, {len(self.orbits)} orbits: {self.status.value}>"
 
     def __post_init__(self) -> None:
         self.first, self.step = self.point, self.step or 0.2 * self.largest
-        self.orbits = [self.point.orbit]
-        self._pass(self.point)
+        self.orbits, self.passed = [self.point.orbit], [self.point]
 
     def extend(self) -> None:
         """Find the next orbit and the special points before it, or an end of the branch; all or nothing."""
@@ -85,7 +82,7 @@ class Walk:
 
     def _extend(self) -> None:
         """The same in place."""
-        following, self.tried, first = None, math.inf, True
+        following, first, tried = None, True, math.inf  # step at whose failure nonsmooth points were last looked for
         while following is None:
             h = self.step
             following = self._next() if h >= _SMALLEST else None
@@ -93,8 +90,8 @@ class Walk:
                 first, point = False, hopped(self.point, self.span, self.hop)
                 if point is not None:
                     return self._hop(point)
-            if following is None and (self.step < _SMALLEST or h < _RETRY * self.tried):
-                nonsmooth, self.tried = self._nonsmooth_ahead(h), h
+            if following is None and (self.step < _SMALLEST or h < _RETRY * tried):
+                nonsmooth, tried = self._nonsmooth_ahead(h), h
                 if nonsmooth is not None and (nonsmooth[0] is None or self._taken(nonsmooth[0])):
                     return self._cross(*nonsmooth)
                 if self.step < _SMALLEST and self.status is BranchStatus.RUNNING:
@@ -108,7 +105,7 @@ class Walk:
     def _taken(self, following: Point) -> bool:
         """Whether the next orbit is accepted; it is kept with the special points before it, up to a subharmonic end."""
         a = self.point
-        distance = float(a.tangent @ a.metric @ (following.unknowns - a.unknowns))
+        distance = a.along(following.unknowns - a.unknowns)
         special = between(a, following, distance, self.before)
         marks = [orbit.mark for orbit in special]
         if distance > _COINCIDENT and _jumped(a, following, marks):
@@ -145,14 +142,14 @@ class Walk:
         """The last point before a nonsmooth point if it lies on the way within reach; raises one of ERRORS."""
         a = self.point
         off = unknowns_at(a, grazing) - a.unknowns
-        distance, whole = float(a.tangent @ a.metric @ off), math.sqrt(off @ a.metric @ off)
+        distance, whole = a.along(off), a.length(off)
         if not -_COINCIDENT < distance < reach or whole > 2.0 * abs(distance) + _COINCIDENT:
             return None
         try:
             last = before(a, nonsmooth, grazing)
         except ERRORS:
             return a if 0.0 < distance <= _LAST_STEP else None  # a itself is near enough
-        if not a.tangent @ a.metric @ last.tangent > 0.0:
+        if not a.along(last.tangent) > 0.0:
             return None
         return last if distance > _SMALLEST else a
 
@@ -161,8 +158,7 @@ class Walk:
         a = last or self.point
         inside = self._inside(point.unknowns)  # a jump may lead out of the span
         self.orbits[len(self.orbits) - (last is not None) :] = found if inside else found[:-1]
-        self._pass(a)
-        self._pass(point)
+        self.passed += [a, point]
         self.point, self.before, self.step = reshot(point), None, _FIRST_STEP * self.largest
         if not inside:
             self.status = BranchStatus.END
@@ -189,7 +185,7 @@ class Walk:
             self.step *= 0.3
             return None
         off, miss = b.unknowns - a.unknowns, b.unknowns - guess
-        distance, aligned = float(a.tangent @ a.metric @ off), float(a.tangent @ a.metric @ b.tangent)
+        distance, aligned = a.along(off), a.along(b.tangent)
         strayed = math.sqrt(max(float(off @ a.metric @ off) - distance**2, 0.0))
         sharp = aligned < _SHARPEST or strayed > 0.5 * distance
         across = signature(a.orbit) != signature(b.orbit) or len(a.orbit.transitions) != len(b.orbit.transitions)
@@ -200,7 +196,7 @@ class Walk:
         if b.chain.parameter in self.span:
             self.status = BranchStatus.END
             return b
-        good = _GOOD[self.before is None] * h / max(math.sqrt(miss @ a.metric @ miss), 1e-9 * h)
+        good = _GOOD[self.before is None] * h / max(a.length(miss), 1e-9 * h)
         longer = min(good if self.before is None else good ** (1.0 / 3.0), 3.0)
         largest = self.largest * max(1.0, b.size)
         self.step = min(h * (max(longer, 0.5) if b.orbit.iterations < _MANY else 0.5), largest)
@@ -248,11 +244,6 @@ class Walk:
         guess[-1] = edge
         return moved(a, guess, True)
 
-    def _pass(self, point: Point) -> None:
-        """Remember a point as passed."""
-        self.passed.append(point)
-        self.values.append(point.chain.parameter)
-
     def _finish_or_go_on(self, point: Point) -> None:
         """End at an orbit passed before or at the limit, else move on to the point."""
         met = self._met(point)
@@ -265,20 +256,18 @@ class Walk:
             if abs(point.chain.parameter - self.point.chain.parameter) > self.hop * (self.span[1] - self.span[0]):
                 self.hop = 0.0
             held = len(point.chain.frozen) > len(self.point.chain.frozen)
-            if (
-                held and self.point.share * point.share < 0.0
-            ):  # along a family of latched numbers the branch has no direction of its own
+            if held and self.point.share * point.share < 0.0:  # a family of latched numbers has no direction of its own
                 point, self.before = replace(point, tangent=-point.tangent), None
             self.point = reshot(point)
 
     def _met(self, point: Point) -> int | None:
         """Index of an orbit passed before that lies on the arc just computed; 0 is the first; None if there is none."""
         a = self.point
-        self._pass(point)
+        self.passed.append(point)
         if point.problem.fractions != a.problem.fractions:
             return None
         low, high = sorted((a.chain.parameter, point.chain.parameter))
-        among = [i for i, value in enumerate(self.values[:-4]) if low <= value <= high]
+        among = [i for i, one in enumerate(self.passed[:-4]) if low <= one.chain.parameter <= high]
         known = [i for i in among if self.passed[i].problem.fractions == a.problem.fractions]
         if not known:
             return None
@@ -319,14 +308,14 @@ def _same_contacts(a: Orbit, b: Orbit) -> bool:
 
 def _is_passed(known: Point, a: Point, b: Point) -> bool:
     """Whether a known orbit lies on the branch between two points, by correcting a guess at its parameter."""
-    distance = float(a.tangent @ a.metric @ (b.unknowns - a.unknowns))
+    distance = a.along(b.unknowns - a.unknowns)
     share = (known.chain.parameter - a.chain.parameter) / (b.chain.parameter - a.chain.parameter)
     alike = _same_contacts(known.orbit, a.orbit) or _same_contacts(known.orbit, b.orbit)
     if not (alike and distance > 0.0 and 0.0 <= share <= 1.0):
         return False
     guess = np.append(cubic(a, b, distance, share * distance)[:-1], known.chain.parameter)
     try:
-        chain, *_ = corrected(a, guess, True)
+        chain = corrected(a, guess, True)
     except (OrbitError, np.linalg.LinAlgError):
         return False
     off = np.append(chain.x.ravel(), chain.parameter) - known.unknowns

@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import Any, get_type_hints
 
+import numpy as np
 from numba import types
 
 _KINDS = {"int": types.int64, "complex": types.complex128}
@@ -44,6 +45,13 @@ def packed_type(tuple_class: type) -> types.NamedTuple:
 def shapes_of(tuple_class: type, sizes: Mapping[str, int]) -> list[tuple[int, ...]]:
     """Shapes of the arrays of a named tuple; ``sizes`` has the size of every name."""
     return [tuple(_size(part, sizes) for part in shape) for _, _, shape in _declared(tuple_class)]
+
+
+def zeros_of(tuple_class: type, sizes: Mapping[str, int]) -> Any:
+    """A named tuple of arrays of zeros; ``sizes`` has the size of every name."""
+    kinds = [str(kind) for _, kind, _ in _declared(tuple_class)]
+    arrays = [np.zeros(shape, kind) for shape, kind in zip(shapes_of(tuple_class, sizes), kinds, strict=True)]
+    return tuple_class(*arrays)
 
 
 def _size(dimension: str, sizes: Mapping[str, int]) -> int:

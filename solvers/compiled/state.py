@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from solvers.compiled.fields import packed_type, shapes_of
+from solvers.compiled.fields import packed_type, zeros_of
 from solvers.compiled.kernels import (
     PlanarProblem,
     Problem,
@@ -332,10 +332,8 @@ def begin_state(state: State, z: Any) -> None:
 
 def new_state(z: Any, stops: int, rubbing: int = 0) -> State:
     """State of a run at t = 0 from block coordinates, with so many stops, some of them with friction."""
-    kinds = [np.dtype(str(kind.dtype)) for kind in STATE.types]
-    shapes = shapes_of(State, {"X": len(z) + 2 + 2 * stops + ACCOUNTS * rubbing, "E": stops, **NO_ROWS})
-    state = State._make(np.zeros(shape, kind) for shape, kind in zip(shapes, kinds, strict=True))
-    state = state._replace(log=new_log(stops))
+    width = len(z) + 2 + 2 * stops + ACCOUNTS * rubbing
+    state: State = zeros_of(State, {"X": width, "E": stops, **NO_ROWS})._replace(log=new_log(stops))
     begin_state(state, z)
     return state
 

@@ -43,16 +43,8 @@ def blocks_of(problem: Problem, tones: int, h: Any, contact_h: Any, node_sets: N
     size = len(problem.k)
     own = size - tones
     rows = (row.reshape(-1, 2, size)[:, :, :own] for row in (problem.push, problem.read, problem.load))
-    arrays = (
-        problem.k[:own],
-        problem.c[:own],
-        *rows,
-        h,
-        contact_h,
-        node_sets.time_exponent,
-        node_sets.weight_exponent,
-        node_sets.nodes,
-    )
+    of_nodes = node_sets.time_exponent, node_sets.weight_exponent, node_sets.nodes
+    arrays = problem.k[:own], problem.c[:own], *rows, h, contact_h, *of_nodes
     key = b"|".join((b"%d %d" % (tones, FEW), *(array.tobytes() for array in arrays)))
 
     def make() -> Blocks:
@@ -128,17 +120,15 @@ def _fill_weightings(tables: Blocks, problem: Problem, contact_h: Any, node_sets
     own = tables.block_end_response.shape[3]
     response, ending = tables.block_response, tables.block_end_response
     if not response.size:
-        response, ending = (
-            np.empty((len(node_sets.weightings), 1, S, 2 * own, S)),
-            np.empty((len(node_sets.weightings), 1, 2, own, S)),
-        )
+        count = len(node_sets.weightings)
+        response, ending = np.empty((count, 1, S, 2 * own, S)), np.empty((count, 1, 2, own, S))
+    structure = problem.k, problem.c, problem.read, problem.read_rate
+    scratch = np.zeros((S + 1, S, 2)), np.zeros((S + 2, 12, S + 1)), np.zeros(2 * own)
     for i, (f, weighted) in enumerate(node_sets.weightings):
-        fill_weighting(
-            *(problem.k, problem.c, problem.read, problem.read_rate, contact_h),
-            *(node_sets.time_exponent[f], node_sets.weight_exponent[f] * weighted, node_sets.nodes[f]),
-            *(node_sets.lagrange[f, weighted], gauss(12), inputs, response[i], ending[i], tables.forced[i]),
-            *(tables.end_response[i], np.zeros((S + 1, S, 2)), np.zeros((S + 2, 12, S + 1)), np.zeros(2 * own)),
-        )
+        exponents = node_sets.time_exponent[f], node_sets.weight_exponent[f] * weighted
+        weighting = *exponents, node_sets.nodes[f], node_sets.lagrange[f, weighted]
+        of_one = response[i], ending[i], tables.forced[i], tables.end_response[i]
+        fill_weighting(structure, contact_h, weighting, gauss(12), inputs, of_one, scratch)
 
 
 def _fill_alias(out: Any, k: Any, blocks: tuple[int, int], h: Any, alias: Any) -> None:

@@ -6,14 +6,7 @@ import math
 
 import numpy as np
 
-from solvers.compiled.kernels import (
-    dot,
-    inlined,
-    inner,
-    is_circle,
-    row_of,
-    surface_tolerance,
-)
+from solvers.compiled.kernels import dot, inlined, inner, is_circle, row_of, surface_tolerance
 from solvers.compiled.state import rate_tolerance
 from solvers.exponential.circles.flight import radial_polynomial
 from solvers.exponential.flight import ORDER

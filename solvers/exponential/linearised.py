@@ -36,7 +36,6 @@ from solvers.compiled.kernels import (
     contact_forces,
     contact_gradient,
     copy,
-    dot,
     entry,
     force_at,
     indentation,
@@ -69,7 +68,7 @@ from solvers.compiled.state import (
     rate_tolerance,
 )
 from solvers.compiled.sums import combine
-from solvers.exponential.circles.derivative import add_radial_change, change_of, explicit_change, is_parameter
+from solvers.exponential.circles.derivative import add_radial_change, change_of, is_parameter, row_change
 from solvers.exponential.circles.friction import friction_by_normal
 from solvers.exponential.circles.friction_derivative import (
     add_rubbing_change,
@@ -85,6 +84,7 @@ from solvers.exponential.linearised_border import pass_border
 from solvers.exponential.linearised_step import (
     DERIVATIVES,
     VARIATION,
+    Linearised,
     by_latched,
     change_by_latched,
     linearise_step,
@@ -114,8 +114,9 @@ def _fly(problem, duration, y):
 
 
 @merged
-def _begin(problem, ahead, behind, past, scratch, derivatives, variation):
+def _begin(run):
     """Set the segments of the stops as at the start of the run, and the derivatives of the latched entry rates."""
+    problem, past, scratch, derivatives = run.problem, run.past, run.scratch, run.derivatives
     for s in range(problem.law.size):
         if rubs(problem, s):
             scratch.node_directions[6 * s, 0] = slider_of(problem, s)[CODE]
@@ -124,15 +125,16 @@ def _begin(problem, ahead, behind, past, scratch, derivatives, variation):
         if past.segment[s] > 0:
             rate = indentation_rate(problem, s, past.x)
             for c in range(derivatives.y.shape[0]):
-                change = change_of(problem, variation, derivatives, past.x, c, s, 1, 0.0)
+                change = change_of(run, past.x, c, s, 1, 0.0)
                 derivatives.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
             if rubs(problem, s) and scratch.node_directions[6 * s, 0] == FREE:
-                latch_begin(problem, ahead, behind, past, derivatives, variation, s)
+                latch_begin(run, s)
 
 
 @merged
-def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, direction):
+def _cross_knot(run, s, direction):
     """Take all columns across a border of the segment of stop s, upwards (direction 1) or downwards (-1)."""
+    problem, past, derivatives = run.problem, run.past, run.derivatives
     t = past.now[T]
     rate = indentation_rate(problem, s, past.x)
     segment = past.segment[s]
@@ -157,15 +159,15 @@ def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, directi
             normal = normal_force(problem, s, segment, entry_rate, knot, rate)
             friction_jump = friction_by_normal(slider_of(problem, s)) * max(jump, -max(normal, 0.0))
     for c in range(derivatives.y.shape[0]):
-        d_delta = change_of(problem, variation, derivatives, past.x, c, s, 0, t)
+        d_delta = change_of(run, past.x, c, s, 0, t)
         derivatives.shift[c, problem.law.size] = -d_delta / rate if abs(rate) > rate_rounding else 0.0
     if held:  # by the motion before the knot
-        pass_slider(problem, ahead, behind, past, derivatives, variation, s, np.int64(SLIDES))
+        pass_slider(run, s, np.int64(SLIDES))
     for c in range(derivatives.y.shape[0]):
         shift = derivatives.shift[c, problem.law.size]
         if entering:
             floored = abs(rate) < problem.floor[s]
-            change = change_of(problem, variation, derivatives, past.x, c, s, 1, t) + acceleration * shift
+            change = change_of(run, past.x, c, s, 1, t) + acceleration * shift
             derivatives.shift[c, s] = shift
             derivatives.entry[c, s] = 0.0 if floored else change
         add_push(problem, s, -jump * shift, past.x, derivatives.y[c])
@@ -173,26 +175,27 @@ def _cross_knot(problem, ahead, behind, past, derivatives, variation, s, directi
             add_tangential(problem, s, -friction_jump * shift, past.x, derivatives.y[c])
     past.segment[s] += direction
     if rubs(problem, s) and entering:
-        begin_rubbing(problem, ahead, behind, past, derivatives, variation, s)
+        begin_rubbing(run, s)
     elif rubs(problem, s) and past.segment[s] == 0:
-        end_rubbing(problem, ahead, behind, derivatives, variation, s)
+        end_rubbing(run, s)
 
 
 @merged
-def _inside_segment(problem, past, s, x):
+def _inside_segment(run, s, x):
     """Indentation, m, kept off the knots, where the slope of the law could be that of the next segment."""
+    problem, past = run.problem, run.past
     lower, upper = problem.knots[s, past.segment[s] - 1], problem.knots[s, past.segment[s]]
     return min(max(indentation(problem, s, x), lower * (1.0 + _OFF)), upper * (1.0 - _OFF))
 
 
 @inner
-def _update_sides(problem, tables, past, scratch, x):
+def _update_sides(run, x):
     """Force before its cut in a state of a landing, for laws cut at zero force, into ``scratch.unresolved``.
 
     Where a landing begins or ends the force may be zero, or rounding; so the force of larger size is kept. Returns
     whether the side of a law has changed by this.
     """
-    changed = False
+    problem, tables, past, scratch, changed = run.problem, run.tables, run.past, run.scratch, False
     for s in range(problem.law.size):
         if past.segment[s] > 0 and tables.bend[s] == FORCE:
             force, before = side_at(problem, tables, past, s, x, scratch.trial), scratch.unresolved[s]
@@ -203,12 +206,13 @@ def _update_sides(problem, tables, past, scratch, x):
 
 
 @merged
-def _gradient(problem, tables, past, scratch, s, batch):
+def _gradient(run, s, batch):
     """Derivatives of a law at one stage of a landing, on the side of its bend on which the landing began."""
-    d, v, rate = batch[0:1], batch[1:2], past.entry_rate[s]
+    problem, tables = run.problem, run.tables
+    d, v, rate = batch[0:1], batch[1:2], run.past.entry_rate[s]
     if tables.bend[s] != FORCE:
         contact_gradient(problem, s, d, v, rate, batch[2:3], batch[3:4], batch[4:5])
-    elif scratch.unresolved[s] > 0.0:
+    elif run.scratch.unresolved[s] > 0.0:
         batch[0] = max(batch[0], problem.knots[s, 0])
         results = batch[2:3], batch[3:4], batch[4:5]
         call_gradient(tables.uncut_gradient[s], 1, d, v, rate, tables.uncut_parameters[s], results)
@@ -217,23 +221,24 @@ def _gradient(problem, tables, past, scratch, s, batch):
 
 
 @merged
-def _force_of_side(side, uncut, tables, past, scratch, s, batch, force):
+def _force_of_side(run, side, uncut, s, batch, force):
     """Force of a law at another value of the parameter, cut at zero where the landing is beyond the law's bend.
 
     Where it lands on the bend either value of the parameter may be on either side.
     """
-    d, v, rate = batch[0:1], batch[1:2], past.entry_rate[s]
+    d, v, rate = batch[0:1], batch[1:2], run.past.entry_rate[s]
     force[0] = 0.0
-    if tables.bend[s] != FORCE:
+    if run.tables.bend[s] != FORCE:
         contact_forces(side, s, d, v, rate, force)
-    elif scratch.unresolved[s] > 0.0:
-        call_force(tables.uncut[s], 1, d, v, rate, uncut, (force,))
+    elif run.scratch.unresolved[s] > 0.0:
+        call_force(run.tables.uncut[s], 1, d, v, rate, uncut, (force,))
 
 
 @merged
-def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, variation, w, factor, out):
+def _stage_rates(run, w, factor, out):
     """Rates of all columns at one stage of a landing; ``w`` is its state and time, ``factor`` is dt along the step."""
-    n, size, t, batch = problem.k.size, 2 * problem.k.size, w[past.x.size], derivatives.batch
+    problem, past, derivatives, variation = run.problem, run.past, run.derivatives, run.variation
+    n, t, batch = problem.k.size, w[past.x.size], derivatives.batch
     for c in range(derivatives.y.shape[0]):
         y = derivatives.trial[c]
         for b in range(n):
@@ -244,51 +249,48 @@ def _stage_rates(problem, ahead, behind, tables, past, scratch, derivatives, var
             continue
         rate, force = past.entry_rate[s], 0.0
         if is_circle(problem, s):
-            delta = _inside_segment(problem, past, s, w)
+            delta = _inside_segment(run, s, w)
             force = force_at(problem, s, delta, indentation_rate(problem, s, w), rate, batch)
-        batch[0], batch[1] = _inside_segment(problem, past, s, w), indentation_rate(problem, s, w)
-        _gradient(problem, tables, past, scratch, s, batch)
-        by_latched(problem, past, derivatives, s, 1, batch[0:1], batch[1:2])
-        if variation.law_step > 0.0:
-            _force_of_side(ahead, variation.uncut[0, s], tables, past, scratch, s, batch, batch[5:6])
-            _force_of_side(behind, variation.uncut[1, s], tables, past, scratch, s, batch, batch[6:7])
+        batch[0], batch[1] = _inside_segment(run, s, w), indentation_rate(problem, s, w)
+        _gradient(run, s, batch)
+        by_latched(run, s, 1, batch[0:1], batch[1:2])
+        by_law, laws_change = 0.0, variation.law_step > 0.0
+        if laws_change:
+            _force_of_side(run, run.ahead, variation.uncut[0, s], s, batch, batch[5:6])
+            _force_of_side(run, run.behind, variation.uncut[1, s], s, batch, batch[6:7])
+            by_law = (batch[5] - batch[6]) / (2.0 * variation.law_step)
         if rubs(problem, s):
-            delta = _inside_segment(problem, past, s, w)
-            add_rubbing_change(problem, ahead, behind, derivatives, variation, s, rate, w, t, delta, factor, out)
+            add_rubbing_change(run, s, w, t, _inside_segment(run, s, w), factor, out)
             continue
         if is_circle(problem, s):
-            by_law = (batch[5] - batch[6]) / (2.0 * variation.law_step) if variation.law_step > 0.0 else 0.0
-            add_radial_change(problem, derivatives, variation, s, w, t, factor, force, by_law, out)
+            add_radial_change(run, s, w, t, factor, force, by_law, out)
             continue
         for c in range(derivatives.y.shape[0]):
             y = derivatives.trial[c]
-            change = batch[4] * derivatives.entry[c, s] + change_by_latched(problem, derivatives, c, s, 1, 0)
-            row = problem.first[s]
+            change = batch[4] * derivatives.entry[c, s] + change_by_latched(run, c, s, 1, 0)
             for d in range(2):
-                value = dot(problem.read[row] if d == 0 else problem.read_rate[row], y, size)
-                if is_parameter(variation, derivatives, c):
-                    value += explicit_change(variation, row, d, t)
-                change += batch[2 + d] * value
-            if variation.law_step > 0.0 and is_parameter(variation, derivatives, c):
-                change += (batch[5] - batch[6]) / (2.0 * variation.law_step)
+                change += batch[2 + d] * row_change(run, y, c, problem.first[s], d, t)
+            if laws_change and is_parameter(run, c):
+                change += by_law
             add_push(problem, s, factor * change, w, out[c])
 
 
 @merged
-def _land(problem, ahead, behind, tables, past, scratch, derivatives, variation, row):
+def _land(run, row):
     """Move all columns over a landing: the variational equation on the stages of its Runge–Kutta step."""
+    problem, tables, past, scratch, derivatives = run.problem, run.tables, run.past, run.scratch, run.derivatives
     variable, stop, size = int(row[FIRST]), int(row[SECOND]), 2 * problem.k.size
     w, width, span = scratch.stages[START], past.x.size, row[SPAN]
     start_landing(problem, tables, past, scratch, stop, variable)
     for s in range(problem.law.size):
         scratch.unresolved[s] = 0.0
-    _update_sides(problem, tables, past, scratch, past.x)
+    _update_sides(run, past.x)
     while True:
         landing_step(
             *(problem, tables, False, np.int64(STAGES), variable, stop, span, w, past.segment, past.entry_rate),
             *(scratch.unresolved, scratch.stages),
         )
-        if not _update_sides(problem, tables, past, scratch, scratch.stages[LANDED]):
+        if not _update_sides(run, scratch.stages[LANDED]):
             break
     trial = scratch.stages[STAGES + 1]
     for i in range(STAGES + 1):
@@ -300,62 +302,39 @@ def _land(problem, ahead, behind, tables, past, scratch, derivatives, variation,
                     total += A[i, j] * derivatives.stages[j, c, e]
                 derivatives.trial[c, e] = derivatives.y[c, e] + total
         if i < STAGES:
-            factor = scratch.stages[i, width]
-            _stage_rates(
-                problem,
-                ahead,
-                behind,
-                tables,
-                past,
-                scratch,
-                derivatives,
-                variation,
-                trial,
-                factor,
-                derivatives.stages[i],
-            )
+            _stage_rates(run, trial, scratch.stages[i, width], derivatives.stages[i])
     for c in range(derivatives.y.shape[0]):
         copy(derivatives.trial[c], derivatives.y[c], size)
 
 
-@entry(types.void(*[types.int64] * 10, types.boolean))
-def linearise_run(
-    problem_at,
-    ahead_at,
-    behind_at,
-    tables_at,
-    state_at,
-    scratch_at,
-    past_at,
-    derivatives_at,
-    variation_at,
-    modes,
-    begins,
-):
+@entry(types.void(types.UniTuple(types.int64, 9), types.int64, types.boolean))
+def linearise_run(addresses, modes, begins):
     """Move the derivatives along the event record of a run to the time it has reached, and empty the record.
 
-    ``ahead`` and ``behind`` are the problems whose laws have the other values of the parameter, ``past`` the state at
-    the time the derivatives have reached; blocks from ``modes`` on are tones.
+    ``addresses`` are those of the fields of `Linearised`, the state of the run behind its tables; blocks from ``modes``
+    on are tones.
     """
-    problem, ahead, behind, tables = _problem(problem_at), _problem(ahead_at), _problem(behind_at), _tables(tables_at)
-    state, scratch, past = _state(state_at), _scratch(scratch_at), _state(past_at)
-    derivatives, variation = _derivatives(derivatives_at), _variation(variation_at)
+    problem_at, ahead_at, behind_at, tables_at, state_at, scratch_at, past_at, derivatives_at, variation_at = addresses
+    run = Linearised(
+        *(_problem(problem_at), _problem(ahead_at), _problem(behind_at), _tables(tables_at), _state(past_at)),
+        *(_scratch(scratch_at), _derivatives(derivatives_at), _variation(variation_at)),
+    )
+    problem, state, past, derivatives = run.problem, _state(state_at), run.past, run.derivatives
     if begins:
-        _begin(problem, ahead, behind, past, scratch, derivatives, variation)
+        _begin(run)
     for r in range(state.count[RECORDED]):
         row = state.event_record[r]
         _fly(problem, row[BEGAN] - past.now[T], derivatives.y)
         past.now[T] = row[BEGAN]
         copy(row[HEAD:], past.x, past.x.size)
         if row[KIND] == EVENT:
-            stop, direction = int(row[FIRST]), int(row[SECOND])
-            _cross_knot(problem, ahead, behind, past, derivatives, variation, stop, direction)
+            _cross_knot(run, int(row[FIRST]), int(row[SECOND]))
         elif row[KIND] == RENEWAL:
-            pass_border(problem, ahead, behind, past, derivatives, variation, int(row[FIRST]), int(row[SECOND]))
+            pass_border(run, int(row[FIRST]), int(row[SECOND]))
         elif row[KIND] == LANDING:
-            _land(problem, ahead, behind, tables, past, scratch, derivatives, variation, row)
+            _land(run, row)
         else:
-            linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, variation, row, modes)
+            linearise_step(run, row, modes)
         past.now[T] = row[ENDED]
     state.count[RECORDED] = 0
     _fly(problem, state.now[T] - past.now[T], derivatives.y)

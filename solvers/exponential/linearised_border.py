@@ -33,12 +33,12 @@ _JUMP = 1e4  # ratio of the slopes of both sides from which one is that of a jum
 
 
 @inner
-def _margin(problem, past, s, j, delta, rate, row, derivatives):
-    """Margin of border j for a row of parameters."""
-    batch = derivatives.batch
+def _margin(run, side, s, j, delta, rate, row):
+    """Margin of border j for a row of parameters, by the law of one ``side`` of the parameter."""
+    batch, renewed = run.derivatives.batch, run.derivatives.renewed
     batch[3], batch[4] = delta, rate
-    values = derivatives.renewed[derivatives.renewed.size - problem.border_count[s] :]
-    call_force(problem.borders[s], 1, batch[3:4], batch[4:5], past.entry_rate[s], row, (values,))
+    values = renewed[renewed.size - side.border_count[s] :]
+    call_force(side.borders[s], 1, batch[3:4], batch[4:5], run.past.entry_rate[s], row, (values,))
     return values[j]
 
 
@@ -55,48 +55,51 @@ def _slope(behind, here, ahead, step):
 
 
 @merged
-def _slopes_of_margin(problem, past, s, j, delta, rate, derivatives, out):
+def _slopes_of_margin(run, s, j, delta, rate, out):
     """∂b/∂δ, ∂b/∂δ̇ and ∂b/∂L by differences."""
+    problem = run.problem
     width, most = problem.parameters.shape[1], problem.latched.shape[1]
-    row = derivatives.renewed[most * (2 + most) : most * (2 + most) + width]
+    row = run.derivatives.renewed[most * (2 + most) : most * (2 + most) + width]
     copy(problem.parameters[s], row, width)
-    here = _margin(problem, past, s, j, delta, rate, row, derivatives)
+    here = _margin(run, problem, s, j, delta, rate, row)
     step = max(_SHARE * abs(delta), _LEAST)
-    ahead = _margin(problem, past, s, j, delta + step, rate, row, derivatives)
-    out[0] = _slope(_margin(problem, past, s, j, delta - step, rate, row, derivatives), here, ahead, step)
+    ahead = _margin(run, problem, s, j, delta + step, rate, row)
+    out[0] = _slope(_margin(run, problem, s, j, delta - step, rate, row), here, ahead, step)
     step = max(_SHARE * abs(rate), _LEAST)
-    ahead = _margin(problem, past, s, j, delta, rate + step, row, derivatives)
-    out[1] = _slope(_margin(problem, past, s, j, delta, rate - step, row, derivatives), here, ahead, step)
+    ahead = _margin(run, problem, s, j, delta, rate + step, row)
+    out[1] = _slope(_margin(run, problem, s, j, delta, rate - step, row), here, ahead, step)
     for i in range(most):
         place, out[2 + i] = problem.latched[s, i], 0.0
         if place < 0:
             continue
         known, step = row[place], max(_SHARE * abs(row[place]), _LEAST)
         row[place] = known + step
-        ahead = _margin(problem, past, s, j, delta, rate, row, derivatives)
+        ahead = _margin(run, problem, s, j, delta, rate, row)
         row[place] = known - step
-        out[2 + i] = _slope(_margin(problem, past, s, j, delta, rate, row, derivatives), here, ahead, step)
+        out[2 + i] = _slope(_margin(run, problem, s, j, delta, rate, row), here, ahead, step)
         row[place] = known
 
 
 @merged
-def _is_left_behind(problem, past, s, j, delta, rate, derivatives, by):
+def _is_left_behind(run, s, j, delta, rate, by):
     """Whether the margin of border j is negative by more than a landing may leave; ``by`` are its derivatives."""
+    problem = run.problem
     size = abs(by[0] * delta) + abs(by[1] * rate)
     for i in range(problem.latched.shape[1]):
         if problem.latched[s, i] >= 0:
             size += abs(by[2 + i] * problem.parameters[s, problem.latched[s, i]])
-    return _margin(problem, past, s, j, delta, rate, problem.parameters[s], derivatives) < -_LEFT_BEHIND * size
+    return _margin(run, problem, s, j, delta, rate, problem.parameters[s]) < -_LEFT_BEHIND * size
 
 
 @merged
-def _explicit(problem, ahead, behind, past, s, j, delta, rate, derivatives, variation, out):
+def _explicit(run, s, j, delta, rate, out):
     """Changes of the margin and of the latched numbers per unit of a parameter of the laws, which latch them, too."""
-    most, width = problem.latched.shape[1], 2.0 * variation.law_step
-    change = _margin(ahead, past, s, j, delta, rate, ahead.parameters[s], derivatives)
-    change = (change - _margin(behind, past, s, j, delta, rate, behind.parameters[s], derivatives)) / width
-    call_renewal(ahead.renewal[s], j, delta, rate, past.entry_rate[s], ahead.parameters[s])
-    call_renewal(behind.renewal[s], j, delta, rate, past.entry_rate[s], behind.parameters[s])
+    problem, ahead, behind, entry = run.problem, run.ahead, run.behind, run.past.entry_rate[s]
+    most, width = problem.latched.shape[1], 2.0 * run.variation.law_step
+    change = _margin(run, ahead, s, j, delta, rate, ahead.parameters[s])
+    change = (change - _margin(run, behind, s, j, delta, rate, behind.parameters[s])) / width
+    call_renewal(ahead.renewal[s], j, delta, rate, entry, ahead.parameters[s])
+    call_renewal(behind.renewal[s], j, delta, rate, entry, behind.parameters[s])
     for i in range(most):
         place, out[i] = problem.latched[s, i], 0.0
         if place >= 0:
@@ -106,10 +109,11 @@ def _explicit(problem, ahead, behind, past, s, j, delta, rate, derivatives, vari
 
 
 @merged
-def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
+def pass_border(run, s, j):
     """Take all columns across border j of a law with memory: latched numbers, and the motion if the force jumps."""
+    problem, past, derivatives = run.problem, run.past, run.derivatives
     if rubs(problem, s):
-        pass_slider(problem, ahead, behind, past, derivatives, variation, s, j)
+        pass_slider(run, s, j)
         return
     t, most, width = past.now[T], problem.latched.shape[1], problem.parameters.shape[1]
     stops = problem.law.size
@@ -117,15 +121,12 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
     rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
     acceleration = acceleration_of(problem, s, past.x, derivatives.rate[0])
     first = most * (2 + most) + width
-    by, explicit = (
-        derivatives.renewed[first : first + 2 + most],
-        derivatives.renewed[first + 2 + most : first + 2 + 2 * most],
-    )
-    latched, maps = derivatives.renewed[first + 2 + 2 * most : first + 2 + 3 * most], derivatives.renewed
-    _slopes_of_margin(problem, past, s, j, delta, rate, derivatives, by)
+    maps, by = derivatives.renewed, derivatives.renewed[first : first + 2 + most]
+    explicit, latched = maps[first + 2 + most : first + 2 + 2 * most], maps[first + 2 + 2 * most : first + 2 + 3 * most]
+    _slopes_of_margin(run, s, j, delta, rate, by)
     margin_rate, own = by[0] * rate + by[1] * acceleration, 0
     together = past.now[LAST_EVENT] == t and t > 0.0  # what a start is beyond it passes by itself, at once
-    at_once = together and _is_left_behind(problem, past, s, j, delta, rate, derivatives, by)
+    at_once = together and _is_left_behind(run, s, j, delta, rate, by)
     past.now[LAST_EVENT] = t
     for i in range(most):
         own += 1 if problem.latched[s, i] >= 0 else 0
@@ -134,16 +135,15 @@ def pass_border(problem, ahead, behind, past, derivatives, variation, s, j):
     jump = force_at(problem, s, delta, rate, entry, derivatives.batch)
     call_renewal(problem.renewal[s], j, delta, rate, entry, row)
     jump = force_at(problem, s, delta, rate, entry, derivatives.batch) - jump
-    by_law_change = 0.0
-    if variation.law_step > 0.0:
-        by_law_change = _explicit(problem, ahead, behind, past, s, j, delta, rate, derivatives, variation, explicit)
+    by_law_change, laws_change = 0.0, run.variation.law_step > 0.0
+    if laws_change:
+        by_law_change = _explicit(run, s, j, delta, rate, explicit)
     for c in range(derivatives.y.shape[0]):
-        d_delta = change_of(problem, variation, derivatives, past.x, c, s, 0, t)
-        d_rate = change_of(problem, variation, derivatives, past.x, c, s, 1, t)
+        d_delta, d_rate = change_of(run, past.x, c, s, 0, t), change_of(run, past.x, c, s, 1, t)
         change, known = by[0] * d_delta + by[1] * d_rate, derivatives.latched[c, s * most : (s + 1) * most]
         for i in range(own):
             change += by[2 + i] * known[i]
-        by_law = variation.law_step > 0.0 and is_parameter(variation, derivatives, c)
+        by_law = laws_change and is_parameter(run, c)
         change += by_law_change if by_law else 0.0
         shift = -change / margin_rate if margin_rate < 0.0 and t > 0.0 else 0.0
         shift = derivatives.shift[c, stops] if at_once else shift

@@ -69,18 +69,33 @@ class Variation(NamedTuple):
 DERIVATIVES, VARIATION = packed_type(Derivatives), packed_type(Variation)
 
 
+class Linearised(NamedTuple):
+    """All that the functions of this derivative share, packed; called ``run`` there."""
+
+    problem: Any
+    ahead: Any  # the problem whose laws have the value of the parameter ahead
+    behind: Any
+    tables: Any
+    past: Any  # the state at the time the derivatives have reached
+    scratch: Any
+    derivatives: Any
+    variation: Any
+
+
 @inlined
-def by_latched(problem, past, derivatives, s, n, delta, rate):
+def by_latched(run, s, n, delta, rate):
     """∂F/∂(latched numbers) of a law with memory at n points."""
+    problem = run.problem
     if problem.by_latched[s] != 0:
-        address, out = problem.by_latched[s], derivatives.by_latched[s]
-        call_force(address, n, delta, rate, past.entry_rate[s], problem.parameters[s], (out,))
+        address, out = problem.by_latched[s], run.derivatives.by_latched[s]
+        call_force(address, n, delta, rate, run.past.entry_rate[s], problem.parameters[s], (out,))
 
 
 @inlined
-def change_by_latched(problem, derivatives, column, s, n, i):
+def change_by_latched(run, column, s, n, i):
     """Change of a force at point i of n due to the changes of latched numbers."""
-    total, most = 0.0, problem.latched.shape[1]
+    problem, derivatives, total = run.problem, run.derivatives, 0.0
+    most = problem.latched.shape[1]
     for place in range(most if problem.by_latched[s] != 0 else 0):
         if problem.latched[s, place] >= 0:
             total += derivatives.by_latched[s, place * n + i] * derivatives.latched[column, s * most + place]
@@ -88,25 +103,25 @@ def change_by_latched(problem, derivatives, column, s, n, i):
 
 
 @merged
-def _by_parameter(ahead, behind, past, scratch, variation, derivatives, s):
+def _by_parameter(run, s):
     """∂F/∂parameter of stop s at the nodes, by the difference of the laws at both parameters."""
+    scratch, entry_rate, out = run.scratch, run.past.entry_rate[s], run.derivatives.by_parameter[s]
     for i in range(S):
-        derivatives.by_parameter[s, i] = 0.0
-    if variation.law_step == 0.0:
+        out[i] = 0.0
+    if run.variation.law_step == 0.0:
         return
-    motion = motion_of(ahead, scratch, s)
+    motion = motion_of(run.ahead, scratch, s)
     copy(motion[0], scratch.clipped, S)
-    contact_forces(ahead, s, scratch.clipped, motion[1], past.entry_rate[s], derivatives.by_parameter[s])
-    contact_forces(behind, s, scratch.clipped, motion[1], past.entry_rate[s], scratch.trial)
+    contact_forces(run.ahead, s, scratch.clipped, motion[1], entry_rate, out)
+    contact_forces(run.behind, s, scratch.clipped, motion[1], entry_rate, scratch.trial)
     for i in range(S):
-        derivatives.by_parameter[s, i] = (derivatives.by_parameter[s, i] - scratch.trial[i]) / (
-            2.0 * variation.law_step
-        )
+        out[i] = (out[i] - scratch.trial[i]) / (2.0 * run.variation.law_step)
 
 
 @merged
-def _signal_slopes(problem, tables, past, scratch, derivatives, node_set, level, t):
+def _signal_slopes(run, node_set, level, t):
     """Slopes of the sampled signals at the nodes, and the response of the rows in contact to them."""
+    problem, tables, past, scratch, derivatives = run.problem, run.tables, run.past, run.scratch, run.derivatives
     rows, h = problem.gap.size, tables.contact_step[level]
     for j in range(problem.table_dt.size):
         for i in range(S):
@@ -124,8 +139,31 @@ def _signal_slopes(problem, tables, past, scratch, derivatives, node_set, level,
 
 
 @merged
-def _solve(problem, tables, past, scratch, derivatives, variation, node_set, level, column, shift):
+def _line_residual(run, node_set, level, c, s, shift, place):
+    """Right-hand sides for the changes of the force of a stop on a line, in column c, into ``scratch.residual``.
+
+    ``scratch.motion`` holds the change of motion without that of the forces.
+    """
+    scratch, tables, derivatives, r = run.scratch, run.tables, run.derivatives, run.problem.first[s]
+    for i in range(S):
+        t = run.past.now[T] + tables.contact_step[level] * tables.times[node_set, i]
+        change = derivatives.entry[c, s] * scratch.slope[s, 2, i] + change_by_latched(run, c, s, S, i)
+        if is_parameter(run, c):
+            change += derivatives.by_parameter[s, i]
+        for d in range(2):
+            value = scratch.motion[r, d, i]
+            if shift != 0.0:
+                value += shift * derivatives.response[r, d, i]
+            if is_parameter(run, c):
+                value += explicit_change(run.variation, r, d, t)
+            change += scratch.slope[s, d, i] * value
+        scratch.residual[place + i] = change
+
+
+@merged
+def _solve(run, node_set, level, column, shift):
     """Changes of all forces at the nodes in one column and, in a moving frame, of the signals."""
+    problem, tables, past, scratch, derivatives = run.problem, run.tables, run.past, run.scratch, run.derivatives
     place, size, rows, through = 0, 2 * problem.k.size, problem.gap.size, uses_blocks(tables)
     if through:
         free_block_motion(problem, tables, scratch, node_set, level, derivatives.y[column])
@@ -139,37 +177,12 @@ def _solve(problem, tables, past, scratch, derivatives, variation, node_set, lev
             combine(tables.free[tables.kind[node_set], level, r], derivatives.y[column], size, None, motion)
         if rubs(problem, s):
             if r == problem.first[s + 1] - 1:  # all rows have moved
-                begin, all_rows = past.now[T], place - S * (r - problem.first[s])
-                rubbing_residual(
-                    *(problem, tables, scratch, derivatives, variation),
-                    *(node_set, level, begin, column, s, shift, all_rows, problem.own[s]),
-                )
-            place += S
-            continue
-        if is_circle(problem, s):
+                rubbing_residual(run, node_set, level, column, s, shift, place - S * (r - problem.first[s]))
+        elif is_circle(problem, s):
             if r > problem.first[s]:  # both rows have moved
-                begin, both = past.now[T], place - S
-                radial_residual(
-                    *(problem, tables, scratch, derivatives, variation),
-                    *(node_set, level, begin, column, s, shift, both),
-                )
-            place += S
-            continue
-        for i in range(S):
-            change, t = 0.0, past.now[T] + tables.contact_step[level] * tables.times[node_set, i]
-            if r == problem.first[s]:
-                change = derivatives.entry[column, s] * scratch.slope[s, 2, i]
-                change += change_by_latched(problem, derivatives, column, s, S, i)
-                if is_parameter(variation, derivatives, column):
-                    change += derivatives.by_parameter[s, i]
-                for d in range(2):
-                    value = motion[d, i]
-                    if shift != 0.0:
-                        value += shift * derivatives.response[r, d, i]
-                    if is_parameter(variation, derivatives, column):
-                        value += explicit_change(variation, r, d, t)
-                    change += scratch.slope[s, d, i] * value
-            scratch.residual[place + i] = change
+                radial_residual(run, node_set, level, column, s, shift, place - S)
+        else:
+            _line_residual(run, node_set, level, column, s, shift, place)
         place += S
     substitute(scratch.jacobian, scratch.pivots, place, scratch.residual)
     place = 0
@@ -183,8 +196,9 @@ def _solve(problem, tables, past, scratch, derivatives, variation, node_set, lev
 
 
 @merged
-def _move_column(problem, tables, past, scratch, derivatives, node_set, level, y, part):
+def _move_column(run, node_set, level, y, part):
     """Move one column to the end of the step, or over the ``part`` of it that lies within the run, s."""
+    problem, tables, past, scratch, derivatives = run.problem, run.tables, run.past, run.scratch, run.derivatives
     if part < np.inf:
         for u in range(scratch.force.shape[0]):
             copy(derivatives.force[u], scratch.force[u], S)
@@ -203,8 +217,9 @@ def _move_column(problem, tables, past, scratch, derivatives, node_set, level, y
 
 
 @merged
-def linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, variation, row, modes):
+def linearise_step(run, row, modes):
     """Move all columns over a collocated step, linearised as it was taken."""
+    problem, tables, past, scratch, derivatives = run.problem, run.tables, run.past, run.scratch, run.derivatives
     node_set, level, t = int(row[FIRST]), int(row[SECOND]), row[BEGAN]
     size = 2 * problem.k.size
     free_response(problem, tables, past, scratch, node_set, level)
@@ -217,13 +232,13 @@ def linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, v
     for s in range(problem.law.size):
         if past.segment[s] > 0:
             if rubs(problem, s):
-                rubbing_by_parameter(problem, ahead, behind, tables, past, scratch, derivatives, variation, s)
+                rubbing_by_parameter(run, s)
                 continue
             if is_circle(problem, s):
                 radial_forces(problem, tables, past, scratch, s)
             motion = motion_of(problem, scratch, s)
-            _by_parameter(ahead, behind, past, scratch, variation, derivatives, s)
-            by_latched(problem, past, derivatives, s, S, motion[0], motion[1])
+            _by_parameter(run, s)
+            by_latched(run, s, S, motion[0], motion[1])
     factorise(scratch.jacobian, scratch.pivots, linearise(problem, tables, past, scratch, node_set, level))
     moving = tables.time_exponent[node_set] > 1.0
     part = row[SPAN] if row[KIND] == PART else np.inf
@@ -236,18 +251,16 @@ def linearise_step(problem, ahead, behind, tables, past, scratch, derivatives, v
         else:
             end_state(problem, tables, past, scratch, node_set, level)
         rhs(problem, row[ENDED], end, past.segment, past.entry_rate, derivatives.rate[1], derivatives.batch)
-        _signal_slopes(problem, tables, past, scratch, derivatives, node_set, level, t)
+        _signal_slopes(run, node_set, level, t)
     for c in range(derivatives.y.shape[0]):
         y = derivatives.y[c]
         shift = derivatives.shift[c, node_set - 1] if moving else 0.0
         for e in range(size if moving else 0):
             y[e] += derivatives.rate[0, e] * shift
-        _solve(problem, tables, past, scratch, derivatives, variation, node_set, level, c, shift)
-        _move_column(problem, tables, past, scratch, derivatives, node_set, level, y, part)
+        _solve(run, node_set, level, c, shift)
+        _move_column(run, node_set, level, y, part)
         if moving:
             for e in range(size):
                 y[e] -= derivatives.rate[1, e] * shift
-            for b in range(
-                modes, problem.k.size
-            ):  # tones do not change; their rounding would stay, as they are undamped
+            for b in range(modes, problem.k.size):  # tones do not change; undamped, their rounding would stay
                 y[b], y[problem.k.size + b] = 0.0, 0.0

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import INTEGERS, MATRIX, PLANAR_PROBLEM, REAL, VECTOR, copy, entry, inner, is_circle
+from solvers.compiled.fields import packed_type
+from solvers.compiled.kernels import INTEGERS, PLANAR_PROBLEM, copy, entry, inner, is_circle
 from solvers.compiled.packed import unpacker
 from solvers.compiled.state import (
     DIVERGED,
@@ -42,7 +43,6 @@ from solvers.problem import event_list as at
 NEXT, BEYOND, BEGUN = range(3)  # places in a cursor: present start, end of the group, whether the start has begun
 CODE, CONTACTS = range(2)  # columns of Outcomes.count
 REACHED, EXCHANGED, ENERGY = range(3)  # columns of Outcomes.number; three of energy, as in Scratch.energy
-_CUBE = types.Array(REAL, 3, "C")
 _RUN = types.FunctionType(ADVANCE)
 _state, _scratch = unpacker(STATE), unpacker(SCRATCH)
 _problem = unpacker(PLANAR_PROBLEM)  # of either type: both have the same fields
@@ -51,10 +51,10 @@ _problem = unpacker(PLANAR_PROBLEM)  # of either type: both have the same fields
 class Outcomes(NamedTuple):
     """Outcomes of k starts."""
 
-    x: Any  # (k, 2N) states of all blocks
-    count: Any  # (k, 2) code of the status, number of contacts
-    number: Any  # (k, 5) time reached, Σ peak force × peak indentation, energies
-    peak: Any  # (k, m, 2) largest indentation and force
+    x: Annotated[Any, "k, 2*N"]  # states of all blocks
+    count: Annotated[Any, "int k, 2"]  # code of the status, number of contacts
+    number: Annotated[Any, "k, 5"]  # time reached, Σ peak force × peak indentation, energies
+    peak: Annotated[Any, "k, E, 2"]  # largest indentation and force
 
     @classmethod
     def of(cls, starts: int, width: int, stops: int) -> Outcomes:
@@ -65,77 +65,80 @@ class Outcomes(NamedTuple):
         return cls(x, count, number, np.zeros((starts, stops, 2)))
 
 
+class Starts(NamedTuple):
+    """Starts of k runs, and what a worker's memory holds before one of them begins."""
+
+    x: Annotated[Any, "k, 2*N"]  # states of all blocks
+    gaps: Annotated[Any, "k, E"]  # of each run; without rows all have those of the problem
+    numbers: Annotated[Any, "numbers"]  # the memory of the workspace
+    rest: Annotated[Any, "numbers"]  # what it holds before a start is added
+    parameters: Annotated[Any, "E, P"]  # what the laws have latched then
+
+
 @inner
-def _count_contact(stop, delta, force, count, number, peak):
+def _count_contact(outcomes, i, stop, delta, force):
     """Add a contact and its peaks to those of its start."""
-    count[CONTACTS] += 1
-    number[EXCHANGED] += abs(delta * force)
-    peak[stop, 0], peak[stop, 1] = max(peak[stop, 0], delta), max(peak[stop, 1], force)
+    peak = outcomes.peak[i, stop]
+    outcomes.count[i, CONTACTS] += 1
+    outcomes.number[i, EXCHANGED] += abs(delta * force)
+    peak[0], peak[1] = max(peak[0], delta), max(peak[1], force)
 
 
 @inner
-def _begin(problem, state, numbers, rest, parameters, start):
-    """Set the state of a run at t = 0, as `Workspace.begin` does, and the latched numbers."""
+def _begin(problem, state, starts, i):
+    """Set the state of a run at t = 0, as `Workspace.begin` does, the latched numbers, and the gaps."""
     for s in range(problem.law.size if problem.border_count.any() else 0):
-        copy(parameters[s], problem.parameters[s], parameters.shape[1])
-    copy(rest, numbers, rest.size)
-    copy(start, state.x, start.size)
+        copy(starts.parameters[s], problem.parameters[s], starts.parameters.shape[1])
+    copy(starts.rest, starts.numbers, starts.rest.size)
+    copy(starts.x[i], state.x, starts.x.shape[1])
+    for s in range(starts.gaps.shape[1] if starts.gaps.size else 0):
+        if is_circle(problem, s):
+            problem.radius[s] = math.copysign(starts.gaps[i, s], problem.radius[s])
+        else:
+            problem.gap[problem.first[s]] = starts.gaps[i, s]
 
 
 @inner
-def _end(problem, state, scratch, code, x, count, number, peak):
+def _end(problem, state, scratch, code, outcomes, i):
     """Write the outcome of a finished run."""
     finite = True
-    copy(state.x, x, x.size)
+    copy(state.x, outcomes.x[i], outcomes.x.shape[1])
     for value in state.x:
         finite &= np.isfinite(value)
     for s in range(problem.law.size):
         if acting_segment(problem, state, s) > 0 and begins_and_ends(problem, s):
-            _count_contact(s, state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE], count, number, peak)
-    count[CODE] = DIVERGED if code == DONE and not finite else code
-    number[REACHED] = state.now[T]
-    copy(scratch.energy, number[ENERGY:], 3)
+            _count_contact(outcomes, i, s, state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE])
+    outcomes.count[i, CODE] = DIVERGED if code == DONE and not finite else code
+    outcomes.number[i, REACHED] = state.now[T]
+    copy(scratch.energy, outcomes.number[i, ENERGY:], 3)
 
 
-@entry(
-    types.void(
-        *(_RUN, *[types.int64] * 5, VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, INTEGERS, types.int64),
-        *(MATRIX, types.Array(types.int64, 2, "C"), MATRIX, _CUBE),
-    )
-)
-def advance_many(
-    run, problem_at, tables_at, state_at, scratch_at, energy_tables_at, numbers, rest, parameters, starts, gaps, cursor,
-    budget, x, count, number, peak,
-):  # fmt: skip
+_ADDRESSES = types.UniTuple(types.int64, 5)
+
+
+@entry(types.void(_RUN, _ADDRESSES, packed_type(Starts), packed_type(Outcomes), INTEGERS, types.int64))
+def advance_many(run, addresses, starts, outcomes, cursor, budget):
     """Integrate a group of starts one after the other, for about ``budget`` steps altogether.
 
-    ``run`` is `method.advance`; ``numbers`` is a workspace's memory and ``rest`` what it holds before a start is added,
-    ``parameters`` what the laws have latched then, ``starts`` (k, 2N) and ``gaps`` (k, m) those of each run; without
-    rows in ``gaps`` all have those of the problem. The last four are the arrays of `Outcomes`.
+    ``run`` is `method.advance`, ``addresses`` are its own.
     """
+    problem_at, tables_at, state_at, scratch_at, energy_tables_at = addresses
     problem, state, scratch = _problem(problem_at), _state(state_at), _scratch(scratch_at)
     spent = 0
     while cursor[NEXT] < cursor[BEYOND] and spent < budget:
         i = cursor[NEXT]
         if not cursor[BEGUN]:
-            _begin(problem, state, numbers, rest, parameters, starts[i])
-            for s in range(gaps.shape[1] if gaps.size else 0):
-                if not is_circle(problem, s):
-                    problem.gap[problem.first[s]] = gaps[i, s]
-                else:
-                    problem.radius[s] = math.copysign(gaps[i, s], problem.radius[s])
+            _begin(problem, state, starts, i)
             cursor[BEGUN] = 1
         spent -= state.count[STEPS] + state.count[REJECTED]
         code = run(problem_at, tables_at, state_at, scratch_at, energy_tables_at, budget)
         spent += state.count[STEPS] + state.count[REJECTED] + 1
         for row in state.log[: state.count[LOGGED]]:
             if row[at.FROM] > 0.0 and row[at.TO] == 0.0:  # a contact ends
-                _count_contact(
-                    np.int64(row[at.ELEMENT]), row[at.DEEPEST], row[at.LARGEST], count[i], number[i], peak[i]
-                )
+                _count_contact(outcomes, i, np.int64(row[at.ELEMENT]), row[at.DEEPEST], row[at.LARGEST])
         state.count[LOGGED] = 0
         if code != RUNNING and code != LOG_FULL:
-            _end(problem, state, scratch, code, x[i], count[i], number[i], peak[i])
+            _end(problem, state, scratch, code, outcomes, i)
             cursor[NEXT], cursor[BEGUN] = i + 1, 0
 
 
@@ -165,11 +168,10 @@ class Worker:
             own = {name: getattr(engine.problem, name).copy() for name in ("gap", "radius")}
             self.own = engine.packed.replaced(PLANAR_PROBLEM, **own)
             problem_at = self.own.address
-        workspace, parameters = engine.workspace, engine.prepared.problem.value.parameters
-        self.arguments = (
-            *(engine.advance, problem_at, *engine.addresses[1:], NO_ENERGY_TABLES.address),
-            *(workspace.numbers, workspace.numbers.copy(), parameters, starts, gaps, self.cursor, budget, *outcomes),
-        )
+        numbers, parameters = engine.workspace.numbers, engine.prepared.problem.value.parameters
+        addresses = problem_at, *engine.addresses[1:], NO_ENERGY_TABLES.address
+        of_runs = Starts(starts, gaps, numbers, numbers.copy(), parameters)
+        self.arguments = engine.advance, addresses, of_runs, outcomes, self.cursor, budget
 
     def assign(self, first: int, beyond: int) -> None:
         """Set the group of starts to integrate."""

@@ -27,14 +27,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import (
-    PLANAR_PROBLEM,
-    PROBLEM,
-    PlanarProblem,
-    entry,
-    merged,
-    type_of,
-)
+from solvers.compiled.kernels import PLANAR_PROBLEM, PROBLEM, PlanarProblem, entry, merged, type_of
 from solvers.compiled.packed import unpacker
 from solvers.compiled.renewals import most_rows
 from solvers.compiled.state import (

@@ -44,8 +44,9 @@ def fill_propagators(k, c, blocks, h, out):
 
 
 @inner
-def _fill_basis(time_exponent, weight_exponent, nodes, weights, gauss, begin, width, out):
+def _fill_basis(weighting, gauss, begin, width, out):
     """Write dτ/h w(σ) L_j(σ)/w(σ_j) of every node at the points of a panel, and behind them τ/h = σ^κ."""
+    time_exponent, weight_exponent, nodes, weights = weighting
     for g in range(gauss.shape[1]):
         sigma, measure = begin + width * gauss[0, g], width * gauss[1, g]
         out[g, S] = sigma
@@ -61,12 +62,13 @@ def _fill_basis(time_exponent, weight_exponent, nodes, weights, gauss, begin, wi
 
 
 @inner
-def _block_response(k, c, h, time_exponent, weight_exponent, nodes, weights, gauss, out, basis):
+def _block_response(k, c, h, weighting, gauss, out, basis):
     """out[i, j] = (α, β) of ∫_0^{t_i} E(t_i - τ) w(σ) L_j(σ)/w(σ_j) dτ; i = S is the end of the step.
 
     ``basis`` holds the polynomials between neighbouring nodes, for blocks that need one panel there, and has room for
     those of another panel.
     """
+    time_exponent, _, nodes, _ = weighting
     count, rate = nodes.size, math.sqrt(k) + c
     for i in range(count + 1):
         a = nodes[i - 1] if i > 0 else 0.0
@@ -83,7 +85,7 @@ def _block_response(k, c, h, time_exponent, weight_exponent, nodes, weights, gau
             if panels > 1:
                 known, width = count + 1, (b - a) / panels
                 begin = a + (b - a) * panel / panels
-                _fill_basis(time_exponent, weight_exponent, nodes, weights, gauss, begin, width, basis[known])
+                _fill_basis(weighting, gauss, begin, width, basis[known])
             for g in range(gauss.shape[1]):
                 alpha, beta = propagate(k, c, tb - h * basis[known, g, S])
                 for j in range(count):
@@ -121,11 +123,11 @@ def _fill_end_response(k, c, push, ending, out):
 
 
 @inner
-def _fill_level(k, c, h, time_exponent, weight_exponent, nodes, weights, gauss, response, ending, work, basis):
+def _fill_level(k, c, h, weighting, gauss, response, ending, work, basis):
     """Responses of the blocks for one step length, at the nodes and at the end."""
     own = ending.shape[1]
     for b in range(own):
-        _block_response(k[b], c[b], h, time_exponent, weight_exponent, nodes, weights, gauss, work, basis)
+        _block_response(k[b], c[b], h, weighting, gauss, work, basis)
         for j in range(S):
             for i in range(S):
                 response[j, b, i], response[j, own + b, i] = work[i, j, 0], work[i, j, 1]
@@ -133,37 +135,22 @@ def _fill_level(k, c, h, time_exponent, weight_exponent, nodes, weights, gauss, 
 
 
 @kernel
-def fill_weighting(
-    k,
-    c,
-    read,
-    read_rate,
-    h,
-    time_exponent,
-    weight_exponent,
-    nodes,
-    weights,
-    gauss,
-    inputs,
-    response,
-    ending,
-    forced,
-    end_response,
-    work,
-    basis,
-    sums,
-):
+def fill_weighting(structure, h, weighting, gauss, inputs, tables, scratch):
     """Responses of one weighting for all step lengths: of the blocks and, for a few stops, of all pairs.
 
-    For a few stops (``forced`` is not empty) the blocks' responses are scratch for one length.
+    ``structure`` are k, c, read and read_rate of a problem, ``weighting`` κ, λ, the nodes, and the factors of their
+    polynomials, ``inputs`` the pushes of forces and loads, ``tables`` the responses to be filled. For a few stops
+    (``forced`` is not empty) those of the blocks are scratch for one length.
     """
+    (k, c, read, read_rate), (_, _, nodes, _) = structure, weighting
+    (response, ending, forced, end_response), (work, basis, sums) = tables, scratch
     pairs = forced.shape[0] > 0
     for i in range(S + 1):
         begin, end = nodes[i - 1] if i > 0 else 0.0, nodes[i] if i < S else 1.0
-        _fill_basis(time_exponent, weight_exponent, nodes, weights, gauss, begin, end - begin, basis[i])
+        _fill_basis(weighting, gauss, begin, end - begin, basis[i])
     for level in range(h.size):
         rows, ends = response[0 if pairs else level], ending[0 if pairs else level]
-        _fill_level(k, c, h[level], time_exponent, weight_exponent, nodes, weights, gauss, rows, ends, work, basis)
+        _fill_level(k, c, h[level], weighting, gauss, rows, ends, work, basis)
         for u in range(inputs.shape[0] if pairs else 0):
             _fill_end_response(k, c, inputs[u], ends, end_response[level, u])
             for s in range(read.shape[0]):

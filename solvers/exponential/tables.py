@@ -203,10 +203,8 @@ def fill_tones(tables: Tables, problem: Problem, tones: int, series: tuple[tuple
     own, k = size - tones, problem.k[size - tones :]
     p, v, omega = np.abs(problem.read[:, own:size]), np.abs(problem.read[:, size + own :]), np.sqrt(k)
     tables.acceleration_weight[:, own:size], tables.rate_weight[:, own:] = p * omega + v * k, p + v * omega
-    tables.block_k_c[0, own:size], tables.ripple_weight[:, own:] = (
-        k,
-        _ripple_weight(problem.read, np.sqrt(problem.k))[:, own:],
-    )
+    tables.block_k_c[0, own:size] = k
+    tables.ripple_weight[:, own:] = _ripple_weight(problem.read, np.sqrt(problem.k))[:, own:]
     for i, rows in enumerate((problem.read, problem.read_rate)):
         tables.stop_rows[:, 2 * i : 2 * i + 2, own:size] = rows.reshape(-1, 2, size)[:, :, own:]
     if problem.table_dt.size:

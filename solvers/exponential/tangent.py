@@ -41,7 +41,7 @@ _LARGE = 1e100  # size above which the derivatives are scaled down, or below its
 class Tangent:
     """Derivatives of one run of an engine, moved along as its event record grows."""
 
-    def __init__(self, system: System, engine: Any, parameter: Parameter | None, latched: bool = False) -> None:
+    def __init__(self, system: System, engine: Any, parameter: Parameter | None) -> None:
         self.engine, self.blocks = engine, system.blocks
         problem, state = engine.problem, engine.state
         stops, rows, size = len(problem.law), len(problem.gap), 2 * len(problem.k)
@@ -52,7 +52,7 @@ class Tangent:
         change = _Change.of(system, parameter, engine) if parameter else None
         self.exact = change is not None
         self.places_latched = np.flatnonzero(problem.latched.ravel() >= 0)  # among those of all contacts
-        own = len(self.places_latched) if latched else 0
+        own = len(self.places_latched)
         self.change, columns = change or _Change.none(problem, n, parameters), 2 * n + own + self.exact
         layout = _layout(
             **{"columns": columns, "X": width, "E": stops, "R": rows, "L": len(problem.load)},
@@ -66,20 +66,20 @@ class Tangent:
         self.y[: 2 * n, self.places] = system.blocks.inverse.T
         if self.exact:
             self.y[-1, self.places] = -self.change.steady(0.0)
-        self.latched[2 * n : 2 * n + own, self.places_latched[:own]] = np.eye(own)
+        self.latched[2 * n : 2 * n + own, self.places_latched] = np.eye(own)
         engine.record(event_record=np.empty((_ROWS, HEAD + width + rows * S)))
         self.packed = [_packed(engine, one) for one in (parameters, *self.change.parameters)]
         self.packed.append(Packed.of(self.change.variation, VARIATION))
         here, ahead, behind, variation = (packed.address for packed in self.packed)
         derivatives, past = (words + start for start in layout.starts)
-        self.addresses = here, ahead, behind, *engine.addresses[1:], past, derivatives, variation, system.size
+        self.addresses = here, ahead, behind, *engine.addresses[1:], past, derivatives, variation
         self.log_scale = 0.0  # the derivatives are exp(log_scale) times the arrays
         self.history: list[tuple[float, float]] = []  # (time, ln of their size)
 
     def follow(self) -> None:
         """Move the derivatives to the time the engine has reached, and empty its event record."""
         engine = self.engine
-        linearise_run(*self.addresses, not self.history)
+        linearise_run(self.addresses, self.blocks.k.size, not self.history)
         self.y[:, self.tones] = 0.0  # rounding there would not decay
         if not np.all(np.isfinite(self.y)):
             raise SolverError(f"the tangent is not finite any more at t = {engine.state.now[T]:g} s: a contact grazes")

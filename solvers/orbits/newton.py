@@ -6,7 +6,7 @@ r_i = Φ_i(x_i) - x_{i+1},   i = 0 ... m - 1,   x_m = x_0
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -34,50 +34,28 @@ def weights(system: System, period: float) -> Array:
     return matrix
 
 
-def extended(matrix: Array, more: Array) -> Array:
-    """A matrix with further diagonal entries."""
-    size = len(matrix)
-    whole = np.diag(np.concatenate((np.zeros(size), more)))
-    whole[:size, :size] = matrix
-    return whole
-
-
-@dataclass(frozen=True, eq=False)
-class ArclengthCondition:
-    """The arclength condition: in ``metric``, the unknowns move only at right angles to ``tangent`` from the guess.
-
-    Both are over [states (m 2n), parameter].
-    """
-
-    metric: Array
-    tangent: Array
-
-    def row(self) -> Array:
-        """The condition's derivative."""
-        return self.metric @ self.tangent
-
-
 def newton(
     problem: PeriodicProblem,
     x: Array,
     parameter: float,
-    condition: ArclengthCondition | None = None,
+    row: Array | None = None,
     slope: bool = False,
     most: int = 25,
-) -> tuple[Chain, float, int]:
-    """Solve the chain from a first guess; returns it with its relative residual and the iterations.
+) -> Chain:
+    """Solve the chain from a first guess.
 
-    x is (m, N), with the latched numbers. With a condition the parameter is an unknown, too. ``slope`` asks for
-    derivatives by the parameter; ``most`` is the number of iterations allowed. Raises OrbitError.
+    x is (m, N), with the latched numbers. With a ``row`` (m N + 1,) the parameter is an unknown, too: [states,
+    parameter] move at right angles to it from the guess. ``slope`` asks for derivatives by the parameter; ``most`` is
+    the number of iterations allowed. Raises OrbitError.
     """
     unknowns = guess = np.append(x.ravel(), parameter)
     measure = _Measure(problem)
-    chain, error = _fire(problem, unknowns, measure, condition is not None)
+    chain, error = _fire(problem, unknowns, measure, row is not None)
     history = [error]
     while not error <= TOLERANCE and len(history) <= most:
-        step = _step(chain, unknowns - guess, condition)
+        step = _step(chain, unknowns - guess, row)
         for halving in range(_MOST_HALVINGS if most > 10 else 2):
-            wanted = condition is not None or (slope and error < _NEARLY)
+            wanted = row is not None or (slope and error < _NEARLY)
             trial, trial_error = _fire(problem, unknowns + 0.5**halving * step, measure, wanted)
             if trial_error < error:
                 break
@@ -93,7 +71,7 @@ def newton(
             f"{len(history)} iterations of Newton's method reduced the residual from {history[0]:.3g} to {error:.3g} "
             "of the motion's size"
         )
-    return chain, error, len(history) - 1
+    return replace(chain, error=error, iterations=len(history) - 1)
 
 
 class _Measure:
@@ -165,16 +143,15 @@ def _with_ends(chain: Chain) -> Array:
     return x
 
 
-def _step(chain: Chain | None, moved: Array, condition: ArclengthCondition | None) -> Array:
+def _step(chain: Chain | None, moved: Array, row: Array | None) -> Array:
     """Newton's step of all unknowns."""
     if chain is None:
         raise OrbitError("the motion from the start cannot be integrated over one period")
     matrix: Any = chain.jacobian()
     right = -chain.residual.ravel()
     try:
-        if condition is None:
+        if row is None:
             return np.append(np.linalg.solve(matrix, right), 0.0)
-        row = condition.row()
         matrix = np.block([[matrix, chain.by_parameter.reshape(-1, 1)], [row[None, :]]])
         return np.linalg.solve(matrix, np.append(right, -row @ moved))
     except np.linalg.LinAlgError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -145,20 +145,25 @@ def _eigenvalues(matrix: Array) -> Any:
     return np.concatenate((np.linalg.eigvals(matrix), np.zeros(whole - len(matrix))))
 
 
+def states_at(orbit: Orbit, times: Sequence[float]) -> list[Array]:
+    """States of an orbit, with the latched numbers, at times counted from its phase."""
+    later = delayed(orbit.system, orbit.phase)
+    return [state_after(later, orbit.whole, t, orbit.method) for t in times]
+
+
 def at_zero(orbit: Orbit) -> Array:
     """State of an orbit at t = 0, with the latched numbers."""
-    if orbit.phase == 0.0:
-        return orbit.whole
-    return state_after(delayed(orbit.system, orbit.phase), orbit.whole, orbit.period - orbit.phase, orbit.method)
+    return orbit.whole if orbit.phase == 0.0 else states_at(orbit, [orbit.period - orbit.phase])[0]
 
 
-def orbit_of(problem: PeriodicProblem, chain: Chain, residual: float, iterations: int, **more: Any) -> Orbit:
+def orbit_of(problem: PeriodicProblem, chain: Chain, mark: str = "") -> Orbit:
     """The orbit a solved chain describes."""
     system, period = problem.make(chain.parameter)
     phase = problem.fractions[0] * period
     logs = [solution.contacts for solution in chain.solutions]
     starts = [fraction * period - phase for fraction in problem.fractions]
     state, matrix = chain.x[0].copy(), chain.monodromy()
+    more: dict[str, Any] = {"parameter": chain.parameter if problem.step else math.nan, "mark": mark}
     if chain.coordinates < len(state):
         places = [(contact, place) for contact, count in enumerate(counts(system)) for place in range(count)]
         more["family"] = tuple(places[i - chain.coordinates] for i in chain.frozen)
@@ -167,7 +172,7 @@ def orbit_of(problem: PeriodicProblem, chain: Chain, residual: float, iterations
         real = np.flatnonzero(~problem.codes(chain))
         state, matrix = state[: chain.coordinates], matrix[np.ix_(real, real)]
     return Orbit(
-        *(state, period, phase, matrix, residual, iterations),
+        *(state, period, phase, matrix, chain.error, chain.iterations),
         *(ContactLog.of_period(logs, starts, period), system, problem.method),
         shots=(problem.fractions, chain.x),
         **more,

@@ -18,17 +18,17 @@ that is not renewed within the period makes 1 - Φ' singular: it is held constan
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.exponential.method import Exponential
-from solvers.orbits.newton import extended, newton, weights
+from solvers.orbits.newton import newton, weights
 from solvers.orbits.open_times import closed, is_cut, latching_stops, open_starts
 from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, orbit_of, with_doubts
-from solvers.orbits.shots import Chain, PeriodicProblem
+from solvers.orbits.shots import Chain, PeriodicProblem, constant
 from solvers.orbits.whole_state import counts, run, state_after, with_initial_memory
 from solvers.problem import Array, System
 from solvers.problem.run_arguments import check_slopes, latched_at_start
@@ -70,28 +70,30 @@ def orbit(
     (True, True)
     """
     method = checked(system, period, method, shots)
+    problem = constant(system, period, method)
     if start is not None:
-        return _near(system, period, checked_start(system, start, period, method), method, shots)
+        return _near(problem, checked_start(system, start, period, method), shots)
     x = settled(system, period, method)
     for _ in range(_MOST_SETTLINGS - 1):
         try:
-            return _near(system, period, x, method, shots)
+            return _near(problem, x, shots)
         except OrbitError:
             x = state_after(system, x, 100.0 * period, replace(method, rtol=max(method.rtol, 1e-8)))
-    return _near(system, period, x, method, shots)
+    return _near(problem, x, shots)
 
 
-def _near(system: System, period: float, x: Array, method: Any, shots: int | None) -> Orbit:
-    """The orbit near a state, with as few shots as possible."""
+def _near(problem: PeriodicProblem, x: Array, shots: int | None) -> Orbit:
+    """The orbit of a constant family near a state, with as few shots as possible."""
     tried: list[str] = []
     for count in [shots] if shots else range(1, _MOST_SHOTS + 1):
         try:
-            problem, chain, residual, iterations = solved_chain(system, period, x, method, count)
-            _check_isolated(problem, chain)
-            return with_doubts(_from_zero(orbit_of(problem, chain, residual, iterations)))
+            found, chain = solved_chain(problem, x, count)
+            _check_isolated(found, chain)
+            return with_doubts(_from_zero(orbit_of(found, chain)))
         except OrbitError as error:
             tried.append(f"{count} shot(s): {error}")
-    raise OrbitError("no orbit found near the start; tried " + "; ".join(tried) + _round_and_unforced(system))
+    hint = _round_and_unforced(problem.make(0.0)[0])
+    raise OrbitError("no orbit found near the start; tried " + "; ".join(tried) + hint)
 
 
 def _round_and_unforced(system: System) -> str:
@@ -109,20 +111,22 @@ def _from_zero(orbit: Orbit) -> Orbit:
     x = at_zero(orbit)
     if orbit.phase == 0.0 or closed(orbit.system, x, latching_stops(orbit.system)):
         return orbit
-    problem = PeriodicProblem(_Constant(orbit.system, orbit.period), orbit.method)
+    problem = constant(orbit.system, orbit.period, orbit.method)
     try:
-        chain, residual, iterations = newton(problem, x[None, :], 0.0)
+        chain = newton(problem, x[None, :], 0.0)
     except OrbitError:
         return orbit
-    return orbit_of(problem, chain, residual, orbit.iterations + iterations)
+    return orbit_of(problem, replace(chain, iterations=orbit.iterations + chain.iterations))
 
 
 def _check_isolated(problem: PeriodicProblem, chain: Chain) -> None:
     """Refuse an orbit whose neighbours are orbits, too, apart from those with other latched numbers."""
+    from scipy.linalg import block_diag
+
     W, matrix = weights(*problem.make(chain.parameter)), chain.monodromy()
     if chain.coordinates < len(matrix):
         size = float(np.linalg.norm(chain.x[0, : chain.coordinates] @ W.T)) or 1.0  # at rest it has none
-        W = extended(W, size / problem.units(chain))
+        W = block_diag(W, np.diag(size / problem.units(chain)))
         kept = np.delete(np.arange(len(matrix)), chain.frozen)
         W, matrix = W[np.ix_(kept, kept)], matrix[np.ix_(kept, kept)]
     away = W @ (matrix - np.eye(len(W))) @ np.linalg.inv(W)
@@ -190,25 +194,24 @@ def periods_of_decay(system: System, period: float) -> int:
     return math.ceil(7.0 / (float(rates.min(initial=math.inf)) * period))
 
 
-def solved_chain(
-    system: System, period: float, x: Array, method: Any, count: int
-) -> tuple[PeriodicProblem, Chain, float, int]:
-    """The chain of an orbit near a state, with its relative residual and the iterations.
+def solved_chain(problem: PeriodicProblem, x: Array, count: int) -> tuple[PeriodicProblem, Chain]:
+    """The problem of a constant family with so many shots, and their chain for an orbit near a state.
 
     The orbit's contacts may lie elsewhere than the guess's. A shot that starts in a contact lacks its entry rate; if
     the law depends on it, the shots start anew in open intervals.
     """
     for _ in range(_MOST_CHOICES):
-        problem, guess = _start_chain(system, period, x, method, count)
-        chain, residual, iterations = newton(problem, guess, 0.0)
-        if not is_cut(chain, system):
-            return problem, chain, residual, iterations
-        x = at_zero(orbit_of(problem, chain, residual, iterations))
+        problem, guess = _start_chain(problem, x, count)
+        chain = newton(problem, guess, 0.0)
+        if not is_cut(chain, problem.make(0.0)[0]):
+            return problem, chain
+        x = at_zero(orbit_of(problem, chain))
     raise OrbitError("wherever shots begin, a contact of the orbit whose law latches the entry rate is under way")
 
 
-def _start_chain(system: System, period: float, x: Array, method: Any, count: int) -> tuple[PeriodicProblem, Array]:
+def _start_chain(problem: PeriodicProblem, x: Array, count: int) -> tuple[PeriodicProblem, Array]:
     """Shots that begin in open intervals, and a guess of their states from a run over one period."""
+    (system, period), method = problem.make(0.0), problem.method
     first = run(system, x, period, method=method)
     passed = first.transitions.t if any(counts(system)) else None
     zero = not closed(system, x, range(len(system.contacts)))
@@ -218,15 +221,4 @@ def _start_chain(system: System, period: float, x: Array, method: Any, count: in
     if len(starts) < count:
         raise OrbitError("at no time of the period are all stops open whose law latches the entry rate")
     states = [x if t == 0.0 else state_after(system, x, t, method) for t in starts]
-    return PeriodicProblem(_Constant(system, period), method, tuple(t / period for t in starts)), np.array(states)
-
-
-@dataclass(frozen=True)
-class _Constant:
-    """A family of one member."""
-
-    system: System
-    period: float
-
-    def __call__(self, parameter: float) -> tuple[System, float]:
-        return self.system, self.period
+    return replace(problem, fractions=tuple(t / period for t in starts)), np.array(states)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -108,6 +109,11 @@ class PeriodicProblem:
         return codes(self.make(chain.parameter)[0])
 
 
+def constant(system: System, period: float, method: Any) -> PeriodicProblem:
+    """A family of one member, whatever the parameter."""
+    return PeriodicProblem(lambda _: (system, period), method)
+
+
 @dataclass(frozen=True, eq=False)
 class Chain:
     """Results of the shots from x (m, N): residuals (m, N), their derivatives (m, N, N) and by the parameter.
@@ -122,6 +128,8 @@ class Chain:
     by_parameter: Array
     solutions: list[Solution]
     has_slope: bool = True  # whether ``by_parameter`` is known
+    error: float = math.nan  # size of the residuals relative to the motion's, once judged by `newton`
+    iterations: int = 0  # of Newton's method
 
     def jacobian(self) -> Array:
         """Derivative (m N, m N) of the residuals by all states; latched numbers never renewed are held constant."""

@@ -6,21 +6,17 @@ memory L is empty and x is [q, q̇].
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from solvers.integration import integrate
-from solvers.problem import Array, Parameter, Solution, System, Transitions, columns_of, renew
+from solvers.problem import Array, Parameter, Solution, System, Transitions, columns_of, renew, renewal_slopes
 from solvers.problem.friction import told_rates
 from solvers.problem.whole_runs import whole_runs
 
-_REALS = ctypes.c_void_p
-_AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS  # border, δ, δ̇, entry rate, parameters
 _OF_SLIDER = np.array([False, True])  # which numbers of friction are no codes: code of the segment, place of the slider
-_SLOPES = ctypes.CFUNCTYPE(None, *_AT, _REALS)
 
 
 def counts(system: System) -> list[int]:
@@ -90,10 +86,10 @@ def state_after(system: System, x: Array, duration: float, method: Any) -> Array
 def derivatives(system: System, x: Array, duration: float, method: Any, tangent: Any) -> tuple[Solution, Array]:
     """A run, and the derivative of its end state by its start, then by a parameter."""
     solution = run(system, x, duration, method=method, tangent=tangent)
-    matrix = solution.tangent if solution.memory_tangent is None else solution.memory_tangent
-    assert matrix is not None
     if solution.memory_tangent is None:
-        return solution, matrix
+        assert solution.tangent is not None
+        return solution, solution.tangent
+    matrix = solution.memory_tangent
     if isinstance(tangent, Parameter) and matrix.shape[1] == len(x):
         behind, ahead = (state_after(side, x, duration, method) for side in (tangent.behind, tangent.ahead))
         matrix = np.column_stack((matrix, (ahead - behind) / (2.0 * tangent.step)))
@@ -109,14 +105,13 @@ def units(system: System, x: Array, log: Transitions) -> Array:
         law: Any = system.contacts[number].law
         row, places, size = np.array(law.parameters, dtype=float), list(getattr(law, "memory", ())), np.abs(latched)
         row[places] = latched
-        mine = np.flatnonzero(log.contact == number) if places else ()
-        if len(mine) and system.contacts[number].friction is not None:
-            size = np.maximum(
-                size, np.abs(log.delta[mine]).max() + np.abs(log.force[mine]).max() / law.friction.stiffness
-            )
-        for i in mine if system.contacts[number].friction is None else ():
+        mine = np.flatnonzero(log.contact == number)
+        if system.contacts[number].friction is not None:
+            drawn = np.abs(log.force[mine]).max(initial=0.0) / law.friction.stiffness
+            size, mine = np.maximum(size, np.abs(log.delta[mine]).max(initial=0.0) + drawn), mine[:0]
+        for i in mine:
             at = int(log.border[i]), float(log.delta[i]), float(log.delta_dot[i])
-            taken = np.abs(_slopes(law, row, *at)[:, :2] * at[1:]).max(axis=1)
+            taken = np.abs(renewal_slopes(law, row, *at)[:, :2] * at[1:]).max(axis=1)
             renew(law, row, *at)
             size = np.maximum(size, np.maximum(taken, np.abs(row[places])))
         sizes.append(np.where(size > 0.0, size, 1.0))
@@ -125,18 +120,7 @@ def units(system: System, x: Array, log: Transitions) -> Array:
 
 def _reals(law: Any) -> Array:
     """Which latched numbers of a law are no codes."""
-    return np.asarray(np.diag(_slopes(law, np.array(law.parameters))[:, 2:]) != 0.0)
-
-
-def _slopes(law: Any, row: Array, border: int = -1, delta: float = 0.0, rate: float = 0.0) -> Array:
-    """Derivatives (l, 2 + l) of a renewal by δ, δ̇ and the latched numbers.
-
-    Border -1 is none: the identity, with zeros for codes.
-    """
-    count = len(law.memory)
-    out = np.zeros((count, 2 + count))
-    _SLOPES(law.renew_gradient_address)(border, delta, rate, 1.0, row.ctypes.data, out.ctypes.data)
-    return out
+    return np.asarray(np.diag(renewal_slopes(law, np.array(law.parameters))[:, 2:]) != 0.0)
 
 
 def transitions_of(solutions: Sequence[Solution], starts: Sequence[float]) -> Transitions:

@@ -26,7 +26,7 @@ class Blocks:
     loss: Array
 
 
-def decouple(M: Array, C: Array, K: Array, G: Array | None = None) -> Blocks:
+def decouple(M: Array, C: Array, K: Array, G: Array | None) -> Blocks:
     """Find the decoupled form of M q'' + (C + G) q' + K q = 0, where G is skew."""
     n = M.shape[0]
     if _is_diagonal(M) and _is_diagonal(K):
@@ -94,7 +94,7 @@ def _of_states(phi: Array, k: Array, damping: Array, size: Array, turning: Array
     return Blocks(unit**2 * found.k, unit * found.c, T, inverse, unit**3 * found.loss / np.outer(rates, rates))
 
 
-def _state_blocks(phi: Array, k: Array, damping: Array, size: Array, turning: Array | None = None) -> Blocks:
+def _state_blocks(phi: Array, k: Array, damping: Array, size: Array, turning: Array | None) -> Blocks:
     """Blocks of the state matrix [[0, I], [-diag(k), -damping - turning]], whose last part couples the modes.
 
     ``turning`` is the skew one; ``size`` (n, n) are |C| + |G| in the system's own coordinates.

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 
-def dataframe(columns: Mapping[str, Any] | Sequence[Mapping[str, Any]], index: Any = None) -> Any:
+def dataframe(columns: Mapping[str, Any] | Sequence[Mapping[str, Any]]) -> Any:
     """A pandas DataFrame of columns by name, or of rows; ImportError in words where pandas is missing."""
-    return optional("pandas", "a data frame").DataFrame(columns, index=index)
+    return optional("pandas", "a data frame").DataFrame(columns)
 
 
 def optional(package: str, wanted: str) -> Any:

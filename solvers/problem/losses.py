@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from solvers.problem.frames import dataframe, named
 from solvers.problem.matrices import Array
+from solvers.problem.renewals import renew
 from solvers.problem.result import Transitions, counted
 from solvers.problem.system import Contact
 
-_RENEW = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, *[ctypes.c_double] * 3, ctypes.c_void_p)
-
-Held = tuple[Array, Sequence[Array]]  # a method's state, at the end with its energy balance; what laws have latched
+if TYPE_CHECKING:
+    from solvers.problem.record import Record
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,32 +75,19 @@ class Losses:
         return dataframe({"name": named(self.names, np.arange(len(self)))} | self.arrays())
 
     @classmethod
-    def of_run(
-        cls,
-        contacts: Sequence[Contact],
-        back: Any,
-        begin: Held,
-        end: Held,
-        powers: Array,
-        transitions: Callable[[], Transitions],
-        rubbed: Array | None = None,
-    ) -> Losses:
-        """From the states at begin and end and the integrated powers at the samples (k, 2 + 2m).
-
-        ``back`` makes [q, q̇] of a state; its balance holds input, damping, and work and impulse of each contact.
-        ``rubbed`` are (m, 3) loss by friction, work of the spin and way of the slider, None without friction.
-        """
-        size, passed = begin[0].size, transitions()
-        deltas = [_indentations(contacts, back.dot(x[:size])) for x, _ in (begin, end)]
-        memories = _renewed_at_once(contacts, begin[1], passed), end[1]
+    def of_run(cls, record: Record) -> Losses:
+        """From what a run leaves."""
+        contacts, size, works, passed = record.system.contacts, record.begin.size, record.works, record.transitions()
+        deltas = [_indentations(contacts, record.back.dot(x[:size])) for x in (record.begin, record.last)]
+        memories = _renewed_at_once(contacts, record.latched, passed), record.memory
         first, last = (_stored(contacts, *one) for one in zip(deltas, memories, strict=True))
-        slip = _slipped(contacts, begin[1], passed, *deltas)
+        slip = _slipped(contacts, record.latched, passed, *deltas)
         more: dict[str, Any] = {"names": tuple(contact.name for contact in contacts)}
-        if rubbed is not None:
-            more |= {"friction": rubbed[:, 0], "spin": rubbed[:, 1]}
-            slip = slip + rubbed[:, 2]
-        work = end[0][size + 2 : size + 2 + 2 * len(contacts) : 2]
-        return cls(work, last - first, slip, powers[:, 2::2], powers[:, 3::2], **more)
+        if record.rubbed is not None:
+            more |= {"friction": record.rubbed[:, 0], "spin": record.rubbed[:, 1]}
+            slip = slip + record.rubbed[:, 2]
+        work = record.last[size + 2 : size + 2 + 2 * len(contacts) : 2]
+        return cls(work, last - first, slip, works[:, 2::2], works[:, 3::2], **more)
 
     def part(self, kept: slice) -> Losses:
         """Of some of the samples: their work and impulses; what was stored and slip are not known there."""
@@ -183,9 +169,3 @@ def _sliders(law: Any) -> list[tuple[list[int], int, int]]:
             found.append((own, place + i, events.index("slip")))
         border, place = border + getattr(part, "borders", 0), place + len(getattr(part, "memory", ()))
     return found
-
-
-def renew(law: Any, row: Array, border: int, delta: float, rate: float) -> str:
-    """Renew what a law has latched in a row of its parameters, as when a border is met; returns the event."""
-    event: str = law.events[_RENEW(law.renew_address)(border, delta, rate, 1.0, row.ctypes.data)]
-    return event

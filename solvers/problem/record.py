@@ -76,16 +76,15 @@ class Record(NamedTuple):
 
     def energy(self) -> Energy:
         """The energy balance; input and damping are NaN where it was not kept."""
-        works = self.works
-        if not self.complete:
-            works = np.hstack((np.full((len(works), 2), math.nan), works[:, 2:]))
-        start = self.back @ self.begin
-        return Energy.of_run(self.system.M, self.system.K, works, self.motion, start, self.works_of_friction)
+        works, start = self.works, self.back @ self.begin
+        given = works[:, :2] if self.complete else np.full((len(works), 2), math.nan)
+        stored, initial = (self.system.energy(*np.split(x, 2, axis=-1)) for x in (self.motion, start))
+        taken = works[:, 2::2].sum(axis=1)
+        return Energy(given[:, 0], given[:, 1], taken, stored, float(initial), *self.works_of_friction)
 
     def losses(self) -> Losses:
         """What each contact has taken."""
-        ends = (self.begin, self.latched), (self.last, self.memory)
-        return Losses.of_run(self.system.contacts, self.back, *ends, self.works, self.transitions, self.rubbed)
+        return Losses.of_run(self)
 
     def exchanged(self) -> Array:
         """Peak force times peak indentation of every contact, J."""

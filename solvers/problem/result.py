@@ -14,7 +14,6 @@ from solvers.problem import event_list as at
 from solvers.problem.frames import Columns
 from solvers.problem.friction import SLIDES
 from solvers.problem.matrices import Array
-from solvers.problem.system import stored_energy
 
 if TYPE_CHECKING:
     from solvers.problem.losses import Losses
@@ -284,15 +283,6 @@ class Energy:
     initial: float
     friction: Any = 0.0
     spin: Any = 0.0
-
-    @classmethod
-    def of_run(cls, M: Any, K: Any, works: Array, motion: Array, start: Array, rubbed: Any = (0.0, 0.0)) -> Energy:
-        """From the works (k, 2 + 2m) and the motion [q, q̇] (k, 2n), which began at (2n,).
-
-        ``rubbed`` are the works of friction and of spins, (k,) each.
-        """
-        stored, initial = (stored_energy(M, K, *np.split(x, 2, axis=-1)) for x in (motion, start))
-        return cls(works[:, 0], works[:, 1], works[:, 2::2].sum(axis=1), stored, float(initial), *rubbed)
 
     def __repr__(self) -> str:
         return f"<energy balance of {counted(len(self.stored), 'sample')}>"

@@ -84,19 +84,20 @@ def sampled_values(forcing: Forcing, t: Array) -> dict[int, Array]:
         own = forcing.tone_load == load  # of a load whose other tones are sampled
         tones = forcing.tone_amplitude[own] @ np.exp(1j * np.outer(forcing.tone_omega[own], t))
         rows = forcing.table[forcing.table_start[j] : forcing.table_start[j + 1]]
-        found[load] = tones.real + _quintics(float(forcing.table_dt[j]), rows, t)
+        dt = float(forcing.table_dt[j])
+        cell = np.clip((t / dt).astype(np.int64), 0, len(rows) - 2)
+        found[load] = tones.real + quintics(dt, rows, cell, t / dt - cell)[0]
     return found
 
 
-def _quintics(dt: float, rows: Array, t: Array) -> Array:
-    """Values (k,) of a node table at times (k,)."""
-    cell = np.clip((t / dt).astype(np.int64), 0, len(rows) - 2)
-    x, scale = t / dt - cell, np.array([1.0, dt, dt * dt])
-    a, b = rows[cell, :3] * scale, rows[cell + 1, -3:] * scale
-    rest = b - np.stack((a @ [1.0, 1.0, 0.5], a @ [0.0, 1.0, 1.0], a[:, 2]), axis=1)
-    cubic, fourth, fifth = rest @ [10.0, -4.0, 0.5], rest @ [-15.0, 7.0, -1.0], rest @ [6.0, -3.0, 0.5]
-    found: Array = a[:, 0] + x * (a[:, 1] + x * (0.5 * a[:, 2] + x * (cubic + x * (fourth + x * fifth))))
-    return found
+def quintics(dt: float, rows: Array, cell: Any, x: Array) -> tuple[Array, Array]:
+    """Values and slopes (...,) of a node table within some of its cells, at places x (...,) from 0 to 1."""
+    a, b = (side * np.array([1.0, dt, dt * dt]) for side in (rows[cell, :3], rows[cell + 1, -3:]))
+    rest = b - np.stack((a @ [1.0, 1.0, 0.5], a @ [0.0, 1.0, 1.0], a[..., 2]), axis=-1)
+    c3, c4, c5 = rest @ [10.0, -4.0, 0.5], rest @ [-15.0, 7.0, -1.0], rest @ [6.0, -3.0, 0.5]
+    value = a[..., 0] + x * (a[..., 1] + x * (0.5 * a[..., 2] + x * (c3 + x * (c4 + x * c5))))
+    slope = a[..., 1] + x * (a[..., 2] + x * (3.0 * c3 + x * (4.0 * c4 + 5.0 * x * c5)))
+    return value, slope / dt
 
 
 def joined(tables: list[Array]) -> Array:

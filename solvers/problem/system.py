@@ -430,14 +430,9 @@ class System:
         return hasattr(self.M, "toarray")
 
     def energy(self, q: Array, q_dot: Array) -> Array:
-        """Stored energy ½ q'ᵀ M q' + ½ qᵀ K q in J, for (..., n) arrays."""
-        return stored_energy(self.M, self.K, q, q_dot)
-
-
-def stored_energy(M: Any, K: Any, q: Array, q_dot: Array) -> Array:
-    """½ q'ᵀ M q' + ½ qᵀ K q of (..., n) arrays; inf of a run that diverged."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        return 0.5 * (np.vecdot(product(q_dot, M), q_dot) + np.vecdot(product(q, K), q))
+        """Stored energy ½ q'ᵀ M q' + ½ qᵀ K q in J, for (..., n) arrays; inf of a run that diverged."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return 0.5 * (np.vecdot(product(q_dot, self.M), q_dot) + np.vecdot(product(q, self.K), q))
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.problem import Array, System
+from solvers.problem import Array, System, renewal_slopes
 from solvers.problem import event_list as at
 from solvers.problem.friction import CODE, FREE, MU, STIFFNESS
 from solvers.sensitivities import laws
@@ -49,11 +49,10 @@ def cross(flow: Flow, t: float, row: Array, acting: Acting, span: float, last: A
         _renew_slider(flow, t, s, acting, following, shift)
         flow.y -= np.outer(flow.push[s].T @ _friction_jump(flow, t, s, acting, following), shift)
         return following, shift
-    memory = row[at.GUARD] >= 0.0
     rate, acceleration = flow.rates(t, s, acting)
     d_delta, d_rate = flow.change(t, s)
     entering = row[at.FROM] == 0.0 and row[at.TO] > 0.0
-    if memory:
+    if row[at.GUARD] >= 0.0:
         shift = _at_border(flow, t, row, acting, (d_delta, d_rate, rate, acceleration), last)
     else:
         shift = _at_knot(flow, t, row, acting, (d_delta, rate, acceleration), span)
@@ -175,7 +174,7 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
         shift = last
     else:
         shift = -d_margin / margin_rate if margin_rate < 0.0 and t > 0.0 else np.zeros(flow.columns)
-    maps = laws.renewal_slopes(law, acting.rows[s], *place, acting.entry_rate[s])
+    maps = renewal_slopes(law, acting.rows[s], *place, acting.entry_rate[s])
     latched = np.outer(maps[:, 0], d_delta + rate * shift) + np.outer(maps[:, 1], d_rate + acceleration * shift)
     latched += maps[:, 2:] @ known
     places = list(law.memory)
@@ -198,10 +197,11 @@ def _jump(flow: Flow, t: float, row: Array, before: Acting, then: Acting) -> tup
     """Jumps of N and of the forces (m,) on the rows at an event."""
     s, found = int(row[at.ELEMENT]), []
     for acting in (before, then):
-        normal = np.array([0.0 if acting.segment[s] == 0 else _force_beside(flow, row, before, then, acting)])
-        found.append((normal[0], forces_of(flow.motion_of(t, s), flow.slider(s, acting), normal)[:, 0]))
-        if acting.segment[s] == 0:
-            found[-1] = 0.0, 0.0 * found[-1][1]
+        normal, forces = np.zeros(1), np.zeros(len(flow.push[s]))
+        if acting.segment[s]:
+            normal[0] = _force_beside(flow, row, before, then, acting)
+            forces = forces_of(flow.motion_of(t, s), flow.slider(s, acting), normal)[:, 0]
+        found.append((normal[0], forces))
     return float(found[1][0] - found[0][0]), found[1][1] - found[0][1]
 
 

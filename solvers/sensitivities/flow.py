@@ -21,15 +21,7 @@ import numpy as np
 from solvers.problem import Array, System, dense
 from solvers.problem.friction import SLIDER, STIFFNESS
 from solvers.sensitivities import laws
-from solvers.sensitivities.elements import (
-    ElementMotion,
-    Linear,
-    Slider,
-    acceleration_of,
-    forces_of,
-    linear,
-    motion_of,
-)
+from solvers.sensitivities.elements import ElementMotion, Linear, Slider, acceleration_of, forces_of, linear, motion_of
 from solvers.sensitivities.nearby import Change
 from solvers.sensitivities.panels import Panels, S, moved, propagator, running
 from solvers.sensitivities.stretches import Acting, Motion
@@ -168,9 +160,8 @@ class Flow:
         if getattr(law, "bend", None) != "force":
             return np.asarray(self.over_laws(s, acting, lambda one, own: laws.force(one, own, inside, rate)))
         pushes: Any = laws.bend(law, inside, rate)
-        return (
-            np.asarray(self.by.over_laws(s, lambda one: laws.uncut_force(one, inside, rate))) * (pushes > 0.0)[:, None]
-        )
+        uncut = np.asarray(self.by.over_laws(s, lambda one: laws.uncut_force(one, inside, rate)))
+        return uncut * (pushes > 0.0)[:, None]
 
     def force_change(self, t: Array, s: int, acting: Acting) -> Linear:
         """Changes of an element's forces at times (k,), by its motion and by everything else."""
@@ -216,17 +207,19 @@ class Flow:
         """N, dN/dt and dN (m,) at fixed time of an element that acts."""
         times = np.array([t])
         change, moved_rows = self.force_change(times, s, acting), self.read[s] @ self.y
-        law: Any = self.system.contacts[s].law
-        inside = self._inside(s, acting, self.motion_of(t, s))
-        slopes = laws.slopes(law, acting.rows[s], inside, acting.entry_rate[s])[:2, 0]
+        slopes, _ = self._slopes(t, s, acting)
         changed = change.normal_other[0] + np.einsum("dak,dac->c", change.normal, moved_rows)
         return float(self.force(times, s, acting)[0]), float(slopes @ self.rates(t, s, acting)), changed
 
+    def _slopes(self, t: float, s: int, acting: Acting) -> tuple[Array, tuple[Array, Array]]:
+        """N_δ and N_δ̇ of an element that acts, and the δ and δ̇ that its law is given."""
+        inside = self._inside(s, acting, self.motion_of(t, s))
+        law: Any = self.system.contacts[s].law
+        return laws.slopes(law, acting.rows[s], inside, acting.entry_rate[s])[:2, 0], inside
+
     def size_of_force(self, t: float, s: int, acting: Acting) -> float:
         """What the terms of N add up to, N."""
-        law: Any = self.system.contacts[s].law
-        inside = self._inside(s, acting, self.motion_of(t, s))
-        slopes = laws.slopes(law, acting.rows[s], inside, acting.entry_rate[s])[:2, 0]
+        slopes, inside = self._slopes(t, s, acting)
         return float(sum(abs(slope * np.ravel(part)[0]) for slope, part in zip(slopes, inside, strict=True)))
 
     def fly(self, start: float, end: float, samples: Array) -> Array:

@@ -7,13 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from solvers.problem import Array
+from solvers.problem import Array, renew
 
 _REALS = ctypes.c_void_p
 _KNOWN = ctypes.c_int64, _REALS, _REALS, ctypes.c_double, _REALS
-_AT = ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double, _REALS
 _ONE, _THREE = ctypes.CFUNCTYPE(None, *_KNOWN, _REALS), ctypes.CFUNCTYPE(None, *_KNOWN, *[_REALS] * 3)
-_MAPS = ctypes.CFUNCTYPE(None, *_AT, _REALS)
 _SHARE, _LEAST = 1e-7, 1e-10  # relative and least step in differences of margins, which are nearly linear
 
 
@@ -98,18 +96,8 @@ def margin_slopes(law: Any, row: Array, border: int, delta: float, rate: float, 
     return found
 
 
-def renewal_slopes(law: Any, row: Array, border: int, delta: float, rate: float, entry_rate: float) -> Array:
-    """Derivatives (l, 2 + l) of the numbers latched on a border by δ, δ̇ and the numbers latched before."""
-    count = len(law.memory)
-    out = np.zeros((count, 2 + count))
-    _MAPS(law.renew_gradient_address)(border, delta, rate, entry_rate, *_pointers(row, out))
-    return out
-
-
 def renewed(law: Any, row: Array, border: int, delta: float, rate: float) -> Array:
     """Parameters after a renewal."""
-    from solvers.problem import renew
-
     after = row.copy()
     renew(law, after, border, delta, rate)
     return after

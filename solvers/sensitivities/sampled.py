@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.problem import Array, System, forcing_of
+from solvers.problem import Array, System, forcing_of, quintics
 from solvers.sensitivities.panels import X, lagrange
 
 _MOST = 64  # cells in a panel, a power of two
@@ -64,20 +64,14 @@ def _resolved(dt: float, rows: Array, begins: Any, width: int, sizes: Array) -> 
     """Whether panels of so many cells hold a load and its slope to these sizes, at the cells' ends and middles."""
     between = np.arange(2 * width + 1) / (2.0 * width)
     to_them = lagrange(between).T
-    at_nodes, there = (_quintics(dt, rows, begins, width * places) for places in (X, between))
+    at_nodes, there = (_of_table(dt, rows, begins, width * places) for places in (X, between))
     pairs = zip(at_nodes, there, sizes, strict=True)
     off = [np.abs(known @ to_them - exact).max(axis=1) <= most for known, exact, most in pairs]
     return off[0] & off[1]
 
 
-def _quintics(dt: float, rows: Array, begins: Any, places: Array) -> tuple[Array, Array]:
+def _of_table(dt: float, rows: Array, begins: Any, places: Array) -> tuple[Array, Array]:
     """Values and slopes (k, j) of a table at places counted in cells from each beginning; it ends as it last was."""
     u = begins[:, None] + places
     cell = np.minimum(u.astype(int), len(rows) - 2)
-    x = np.minimum(u - cell, 1.0)
-    a, b = (side * np.array([1.0, dt, dt * dt]) for side in (rows[cell, :3], rows[cell + 1, -3:]))
-    rest = b - np.stack((a @ [1.0, 1.0, 0.5], a @ [0.0, 1.0, 1.0], a[..., 2]), axis=-1)
-    c3, c4, c5 = rest @ [10.0, -4.0, 0.5], rest @ [-15.0, 7.0, -1.0], rest @ [6.0, -3.0, 0.5]
-    value = a[..., 0] + x * (a[..., 1] + x * (0.5 * a[..., 2] + x * (c3 + x * (c4 + x * c5))))
-    slope = a[..., 1] + x * (a[..., 2] + x * (3.0 * c3 + x * (4.0 * c4 + 5.0 * x * c5)))
-    return value, slope / dt
+    return quintics(dt, rows, cell, np.minimum(u - cell, 1.0))

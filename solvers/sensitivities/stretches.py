@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 
 from solvers.compiled.state import law_parameters
-from solvers.integration import prepared_run
-from solvers.problem import Array, Solution, SolverError, Status, System, dense
+from solvers.problem import Array, Solution, System, dense
 from solvers.problem import event_list as at
-from solvers.problem.whole_runs import whole_runs
 from solvers.sensitivities import laws
 from solvers.sensitivities.elements import Slider, motion_of
 from solvers.sensitivities.panels import Clock, Panels
@@ -60,26 +58,6 @@ class Stretch:
         """Times at which the motion is needed."""
         ends = np.array([self.start, self.end])
         return [ends] if self.panels is None else [ends, self.panels.times.ravel()]
-
-
-def replayed(
-    system: System, x: Array, duration: float, times: Any, method: Any, memory: Sequence[Any] | None
-) -> tuple[Solution, Array]:
-    """The run with its list of events (k, 14), a row an event."""
-    n = system.size
-    run = prepared_run(system, x[:n], x[n:], duration, times, method, False, memory)
-    with whole_runs():
-        status = run.to_the_end(None)
-    solution = run.solution(status, 0.0)
-    rows = run.state.log[: int(run.state.count[_LOGGED])]
-    rows = rows[rows[:, at.GUARD] != at.FRICTION]
-    run.engine.release()
-    if solution.status is not Status.DONE:
-        raise SolverError(f"the run has no derivative to its end: {solution.status.value}", solution)
-    return solution, rows
-
-
-_LOGGED = 4  # place of the number of events in `State.count`
 
 
 def acting_at_start(system: System, x: Array, rows: Array, memory: Sequence[Any] | None) -> Acting:

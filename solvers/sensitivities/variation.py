@@ -11,27 +11,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.problem import Array, ContactLog, Solution, System, dense
+from solvers.compiled.state import LOGGED
+from solvers.integration import prepared_run
+from solvers.problem import Array, ContactLog, Solution, SolverError, Status, System, dense
 from solvers.problem import event_list as at
 from solvers.problem.friction import tell_sliders
+from solvers.problem.whole_runs import whole_runs
 from solvers.sensitivities.elements import motion_of
 from solvers.sensitivities.events import GRAZING, NoDerivativeError, called, cross, knot_shift
 from solvers.sensitivities.flow import Flow, begun_numbers, latched_columns
 from solvers.sensitivities.nearby import Change, Nearby, unchanged
 from solvers.sensitivities.panels import Panels, S, coefficients, interpolated, largest, zeros
 from solvers.sensitivities.sampled import SampledLoads
-from solvers.sensitivities.stretches import (
-    Acting,
-    Division,
-    Motion,
-    Stretch,
-    acting_at_start,
-    grouped,
-    replayed,
-)
+from solvers.sensitivities.stretches import Acting, Division, Motion, Stretch, acting_at_start, grouped
 
 SMOOTH = 1e-3  # relative size of the last Legendre coefficients of forces' derivatives, above which panels are halved
-_FINEST, _REPEATS = 4, 2  # largest refinement of panels, and passes after the first to locate kinks
+_REFINEMENTS, _REPEATS = (1, 2, 4), 2  # of panels, until derivatives are smooth; passes after the first to locate kinks
 _MOST_ENTRIES = 4_000_000  # of the tables of panels held at once
 _SAME_BEND = 1e-9  # of the duration: a kink may be found twice, once from each side
 _NEAR_PEAK = 0.9  # of the largest force so far: panels whose nodes are all below have no larger one
@@ -152,21 +147,20 @@ def sensitivities(
         Change(system, [unchanged(system) if one is None else one for one, _ in parameters], duration),
         [np.zeros(2 * system.size) if one is None else np.asarray(one, dtype=float) for _, one in parameters],
     )
-    log, rows = replayed(system, asked.x, duration, asked.dense_times(), asked.method, memory)
+    log, rows = asked.replayed(asked.dense_times())
     asked.measure(log, rows)
-    refinement, best, bends = 1, None, np.zeros(0)
-    while best is None or (best.roughness > SMOOTH and refinement < _FINEST):
-        if best is not None:
-            refinement *= 2
+    best, bends = None, np.zeros(0)
+    for refinement in _REFINEMENTS:
         walk = _Walk(asked, rows, refinement, bends)
-        walk.pass_all()
         for _ in range(_REPEATS if walk.bends else 0):  # the second time they are known to rounding
             bends = _without_repeats(walk.bends, _SAME_BEND * duration)
             walk = _Walk(asked, rows, refinement, bends)
-            walk.pass_all()
-        if best is not None and walk.roughness >= best.roughness:
+        if best is not None and walk.flow.roughness >= best.flow.roughness:
             break
         best = walk
+        if not best.flow.roughness > SMOOTH:
+            break
+    assert best is not None
     return best.results()
 
 
@@ -207,6 +201,20 @@ class _Request:
         """Loads that are no tones, as the run takes them."""
         return SampledLoads(self.system, self.duration, min(max(self.method.rtol, 1e-12), 1e-6))
 
+    def replayed(self, times: Array) -> tuple[Solution, Array]:
+        """The run, sampled at times, with its list of events (k, 14), a row an event."""
+        q, q_dot = np.split(self.x, 2)
+        run = prepared_run(self.system, q, q_dot, self.duration, times, self.method, False, self.memory)
+        with whole_runs():
+            status = run.to_the_end(None)
+        solution = run.solution(status, 0.0)
+        rows = run.state.log[: int(run.state.count[LOGGED])]
+        rows = rows[rows[:, at.GUARD] != at.FRICTION]
+        run.engine.release()
+        if solution.status is not Status.DONE:
+            raise SolverError(f"the run has no derivative to its end: {solution.status.value}", solution)
+        return solution, rows
+
     def dense_times(self) -> Array:
         """Times dense enough to see how near each stop comes."""
         fastest = float(np.sqrt(np.abs(self.system.blocks.k)).max(initial=0.0))
@@ -237,7 +245,7 @@ class _Request:
             return
         times = np.unique(np.concatenate([t + h * _FINE_OFFSETS for _, t, h in near]))
         times = times[(times >= 0.0) & (times <= self.duration)]
-        closer = replayed(self.system, self.x, self.duration, times, self.method, self.memory)[0]
+        closer, _ = self.replayed(times)
         for s in {s for s, _, _ in near}:
             for t, _, top in self._maxima(closer, s):
                 if abs(top) <= GRAZING * self.span[s]:
@@ -302,7 +310,7 @@ def _ends_on_knot(row: Array, following: Array | None) -> bool:
 
 
 class _Walk:
-    """One pass over a run."""
+    """One pass over a run, with the derivatives collected on the way."""
 
     def __init__(self, asked: _Request, rows: Array, refinement: int, bends: Array) -> None:
         system, by = asked.system, asked.by
@@ -312,7 +320,7 @@ class _Walk:
         self.stretches = list(division.stretches(self.acting, rows, asked.duration, refinement))
         wanted = [np.array([0.0, asked.duration]), asked.times, *(t for one in self.stretches for t in one.times)]
         times = np.unique(np.clip(np.concatenate(wanted), 0.0, asked.duration))
-        self.solution, again = replayed(system, asked.x, asked.duration, times, asked.method, asked.memory)
+        self.solution, again = asked.replayed(times)
         _check_same(rows, again, asked.duration)
         self.motion = Motion(self.solution)
         n2, own = 2 * system.size, sum(len(getattr(one.law, "memory", ())) for one in system.contacts)
@@ -329,13 +337,9 @@ class _Walk:
         self.contacts: list[_Contact] = []
         self.bends: list[float] = []  # times at which laws have kinks that are no knots
         self.open: dict[int, _Contact] = {}
+        self._pass_all()
 
-    @property
-    def roughness(self) -> float:
-        """Of the forces' derivatives, see `Sensitivity`."""
-        return self.flow.roughness
-
-    def pass_all(self) -> None:
+    def _pass_all(self) -> None:
         """Follow the run and collect the derivatives."""
         self._store_at(0.0)
         for stretch in self.stretches:

@@ -9,7 +9,6 @@ after a renewal, is judged by its sign as soon as that is more than rounding. Me
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -25,32 +24,18 @@ from solvers.compiled.kernels import (
     surface_tolerance,
 )
 from solvers.compiled.renewals import count_event, margins, margins_before, margins_in, renew
-from solvers.compiled.sliding import (
-    POINT,
-    XI,
-    XI_RATE,
-    move_point,
-    point_of,
-    slider_margins,
-    xi_tolerances,
-)
-from solvers.compiled.state import LAST_EVENT, T, most_borders, rate_tolerance
+from solvers.compiled.sliding import POINT, XI, XI_RATE, move_point, point_of, slider_margins, xi_tolerances
+from solvers.compiled.state import LAST_EVENT, T, rate_tolerance
 from solvers.problem.friction import CODE
 from solvers.stepping.events import NONE, bisection, golden_section, motion_of, point_at, polynomial
 
 _MISSED = 1e-3  # the most, in units of its largest, by which a margin may be negative after a landing on its border
 # θ at which margins are evaluated, closer near 0: a border may be crossed just after the start
 _NODES = np.array([0.0, *(2.0**i for i in (-20, -15, -11, -8, -7, -6, -5, -4, -3, -2)), *(np.arange(3, 9) / 8.0)])
+NODES = _NODES.size
 _TOGETHER = 1e-12  # margin, relative to its value at the start, at which a border counts as reached along with another
 _SHORTLY = 1e-3  # part of a step before its end at which margins are extrapolated
 _RATE_STEP = 1e-4  # part of a step over which the rate of a margin is differenced
-
-
-def border_space(problem: Any) -> list[Any]:
-    """Working arrays of the borders, in the order of their fields in `loop.Space`."""
-    stops, most, n = problem.law.size, most_borders(problem), _NODES.size
-    first = [np.empty(n * most), np.empty((2, n)), np.empty(2), np.empty(most), np.zeros((stops, 4))]
-    return [*first, *(np.zeros((stops, most)) for _ in range(3)), np.empty((2, POINT))]
 
 
 @inner

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from solvers.problem import Array, Forcing, System
+from solvers.problem import Array, Forcing, System, require_step
 from solvers.stepping.critical_step import eigen_oscillators
 from solvers.stepping.events import IGNORED, LOCATED
 from solvers.stepping.stability import Limit, Radius, limit
@@ -30,6 +30,9 @@ class ConstantStep(ABC):
     dt: float
     locate: bool
     force_unstable: bool
+
+    def __post_init__(self) -> None:
+        require_step("dt", self.dt)
 
     @property
     def steps(self) -> tuple[float, float]:
@@ -71,7 +74,7 @@ class ConstantStep(ABC):
         """
         return limit(self, system, indentation, duration)
 
-    def critical(self, M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Array]:
+    def critical(self, M: Any, C: Any, K: Any, G: Any) -> tuple[Array, Array]:
         """Stiffness k and damping c (j,) of the oscillators that decide on matrices."""
         return eigen_oscillators(M, C, K, G)
 

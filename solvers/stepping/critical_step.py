@@ -33,7 +33,7 @@ _EXTREMES = (("LM", 6), ("SR", 3), ("LI", 3))  # eigenvalues computed of sparse 
 _NOTHING = 1e-6  # share of the largest eigenvalue below which one is a rigid-body motion, or rounding
 
 
-def eigen_oscillators(M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Array]:
+def eigen_oscillators(M: Any, C: Any, K: Any, G: Any) -> tuple[Array, Array]:
     """(k, c) of the eigenvalues of λ² M + λ (C + G) + K; of large sparse matrices only those of the extreme ones."""
     if hasattr(M, "toarray") and M.shape[0] > _DENSE:
         values = _extreme_eigenvalues(M, C if G is None else C + G, K)
@@ -71,12 +71,8 @@ def _extreme_eigenvalues(M: Any, C: Any, K: Any) -> Array:
 
     operator = LinearOperator((2 * n, 2 * n), matvec=rate, dtype=float)
     start = np.ones(2 * n) + np.arange(2 * n) % 3
-    return np.concatenate(
-        [
-            eigs(operator, count, which=which, v0=start, tol=1e-4, return_eigenvectors=False)
-            for which, count in _EXTREMES
-        ]
-    )
+    options: Any = {"v0": start, "tol": 1e-4, "return_eigenvectors": False}
+    return np.concatenate([eigs(operator, count, which=which, **options) for which, count in _EXTREMES])
 
 
 def _fastest(M: Any, K: Any) -> tuple[float, Array]:
@@ -93,7 +89,7 @@ def _fastest(M: Any, K: Any) -> tuple[float, Array]:
     return float(k[0]), phi[:, 0]
 
 
-def newmark_oscillator(beta: float, gamma: float, M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Array]:
+def newmark_oscillator(beta: float, gamma: float, M: Any, C: Any, K: Any, G: Any) -> tuple[Array, Array]:
     """(k, c) of the vector that makes Q(h) singular first, by iteration on its Rayleigh quotient."""
     a, b, h = 2.0 * gamma - 4.0 * beta, 4.0 * gamma - 2.0, 0.0
     C = C if G is None else 0.0 * C

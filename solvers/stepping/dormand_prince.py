@@ -15,12 +15,13 @@ from typing import Any, ClassVar
 from solvers.compiled.dop853_tableau import E3, E5, EXTENDED, STAGES, A, C, D
 from solvers.compiled.kernels import copy, inner, kernel, rhs
 from solvers.problem import Array, Forcing, System
-from solvers.stepping.events import LOCATED
+from solvers.stepping.events import ATOL, LOCATED, RTOL
 
 
 @kernel
-def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
-    """One step; returns (error estimate in units of the tolerance, law calls). ``work`` holds the stages."""
+def step(problem, t, h, move):
+    """One step; returns (error estimate in units of the tolerance, law calls). ``move.work`` holds the stages."""
+    x, rate, segment, entry_rate, x_new, rate_new, dense, work, limits = move
     trial, batch = work[EXTENDED], work[EXTENDED + 1]
     copy(rate, work[0], x.size)
     calls = 0
@@ -30,7 +31,7 @@ def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, wo
             copy(trial, x_new, x.size)
         calls += rhs(problem, t + C[i] * h, trial, segment, entry_rate, work[i], batch)
     copy(work[STAGES], rate_new, x.size)
-    error = _error(2 * problem.k.size, h, x, x_new, work, rtol, atol)
+    error = _error(2 * problem.k.size, h, x, x_new, work, limits)
     if error <= 1.0:
         for i in range(STAGES + 1, EXTENDED):
             _stage(i, h, x, work, trial)
@@ -50,10 +51,10 @@ def _stage(i, h, x, work, trial):
 
 
 @inner
-def _error(size, h, x, x_new, work, rtol, atol):
+def _error(size, h, x, x_new, work, limits):
     """DOP853's mixed estimate in the energy-like norm: positions and rates against their largest."""
     # one scale for all positions and one for all rates: a mode at rest must not dictate the step
-    half = size // 2
+    half, rtol, atol = size // 2, limits[RTOL], limits[ATOL]
     p_scale, v_scale = atol, atol
     for e in range(half):
         p_scale = max(p_scale, rtol * max(abs(x[e]), abs(x_new[e])))
@@ -115,6 +116,7 @@ class DormandPrince:
     takes_annuli: ClassVar[bool] = True
     takes_friction: ClassVar[bool] = True
     events: ClassVar[int] = LOCATED
+    steps: ClassVar[tuple[float, float]] = (math.inf, math.inf)  # the longest
     work_rows: ClassVar[int] = EXTENDED + 2
     constants: ClassVar[tuple[float, ...]] = ()
     step: ClassVar[Any] = staticmethod(step)

@@ -56,13 +56,11 @@ class Engine:
         self.state.now[T_END] = duration
         dt = 0.0 if method.adaptive else max(method.steps)
         least = negligible_energy(self.problem, np.sum(self.problem.load * self.problem.power, axis=1), dt)
-        watch = watched(system, self.back @ z, least)
-        self.space = new_space(self.problem, self.state, method.work_rows, watch, method.constants, kinks_of(system))
         fastest = max([math.sqrt(abs(k)) for k in self.problem.k] + list(self.problem.c) + [1.0 / duration])
-        self.state.now[[H_FLIGHT, H_CONTACT]] = 0.1 / fastest, 0.01 / fastest
-        self.atol = absolute_tolerance(method, self.problem, z, fastest)
-        if not method.adaptive:
-            self.state.now[[H_FLIGHT, H_CONTACT]] = method.steps
+        self.state.now[[H_FLIGHT, H_CONTACT]] = (0.1 / fastest, 0.01 / fastest) if method.adaptive else method.steps
+        atol = absolute_tolerance(method, self.problem, z, fastest)
+        self.space = new_space(self.problem, self.state, method, atol, watched(system, self.back @ z, least))
+        self.space.kinks[:] = kinks_of(system)
         self.rate, loop = rhs, march_of(isinstance(self.problem, PlanarProblem))
         self.loop: Any = partial(loop, method.step)
 
@@ -88,11 +86,7 @@ class Engine:
         method = self.method
         if self.state.now[T] == 0.0 and not np.isfinite(self.state.rate).all():
             return LAW_NOT_FINITE  # loads and starts have been checked before
-        steps = (math.inf, math.inf) if method.adaptive else method.steps
-        code = self.loop(
-            *(self.problem, self.state, self.space, budget, steps, (method.rtol, self.atol)),
-            *(method.adaptive, method.events),
-        )
+        code = self.loop(self.problem, self.state, self.space, budget, method.adaptive, method.events)
         return GAINED if code in (DONE, RUNNING) and self._gained() else code
 
     def has_gained(self, exchanged: Callable[[], Array]) -> bool:

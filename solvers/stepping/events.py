@@ -5,7 +5,10 @@ Inside a step the displacement of every row is the polynomial of the method's de
 circular clearance ±(|u| - c) of two.
 """
 
+from __future__ import annotations
+
 import math
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
@@ -31,8 +34,23 @@ UNRESOLVED = -1.0  # in place of θ: a stop that has just left its border crosse
 NONE = 2.0  # in place of θ: no event in the step
 MOST_LANDINGS = 60
 """Trials of a landing: where the level is only just reached, each of Newton or bisection halves the distance."""
+IN_FLIGHT, IN_CONTACT, RTOL, ATOL = range(4)  # places in `Move.limits`
 IGNORED, HENON, LOCATED = range(3)
 """How a method treats events: segments follow at the end of a step; Hénon's step onto an entry; all located."""
+
+
+class Move(NamedTuple):
+    """What a step of any method reads and writes: arrays of `State` and of `loop.Space`."""
+
+    x: Annotated[Any, "X"]
+    rate: Annotated[Any, "X"]
+    segment: Annotated[Any, "int E"]
+    entry_rate: Annotated[Any, "E"]
+    x_new: Annotated[Any, "X"]  # end of the step
+    rate_new: Annotated[Any, "X"]
+    dense: Annotated[Any, "7, X"]  # rows r of the interpolant, see above
+    work: Annotated[Any, "rows, X"]  # of the method, whose constants are in the last row
+    limits: Annotated[Any, "4"]  # longest steps in flight and in contact, s, then rtol and atol
 
 
 @kernel

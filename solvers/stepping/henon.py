@@ -40,14 +40,14 @@ def hermite(h, x, rate, x_new, rate_new, dense):
 
 
 @kernel
-def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
-    """One Heun step; returns (error estimate 0, law calls). ``dense`` gets the cubic Hermite interpolant."""
-    size = x.size
+def step(problem, t, h, move):
+    """One Heun step; returns (error estimate 0, law calls). ``move.dense`` gets the cubic Hermite interpolant."""
+    x, rate, segment, entry_rate, x_new, rate_new, dense, work, _ = move
     trial, second, batch = work[0], work[1], work[2]
-    for i in range(size):
+    for i in range(x.size):
         trial[i] = x[i] + h * rate[i]
     calls = rhs(problem, t + h, trial, segment, entry_rate, second, batch)
-    for i in range(size):
+    for i in range(x.size):
         x_new[i] = x[i] + 0.5 * h * (rate[i] + second[i])
     calls += rhs(problem, t + h, x_new, segment, entry_rate, rate_new, batch)
     hermite(h, x, rate, x_new, rate_new, dense)
@@ -55,22 +55,22 @@ def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, wo
 
 
 @inner
-def land(problem, t, h, x, rate, segment, entry_rate, stop, level, x_new, work):
-    """Hénon's step of a stop onto ``level``; returns its duration, s, or -1 where it fails (δ̇ near 0)."""
-    trial, second, batch = work[0], work[1], work[2]
+def land(problem, t, h, move, stop):
+    """Hénon's step onto the surface of a stop; returns its duration, s, or -1 where it fails (δ̇ near 0)."""
+    x, rate, trial, second, batch = move.x, move.rate, move.work[0], move.work[1], move.work[2]
     delta_dot = indentation_rate(problem, stop, x)
-    distance = level - indentation(problem, stop, x)
+    distance = -indentation(problem, stop, x)
     if not delta_dot > 0.0:
         return -1.0
     for i in range(x.size):
         trial[i] = x[i] + distance * rate[i] / delta_dot
-    rhs(problem, t + distance / delta_dot, trial, segment, entry_rate, second, batch)
+    rhs(problem, t + distance / delta_dot, trial, move.segment, move.entry_rate, second, batch)
     second_delta_dot = indentation_rate(problem, stop, trial)
     duration = 0.5 * distance * (1.0 / delta_dot + 1.0 / second_delta_dot)
     if not (second_delta_dot > 0.0 and 0.0 <= duration <= 2.0 * h):
         return -1.0
     for i in range(x.size):
-        x_new[i] = x[i] + 0.5 * distance * (rate[i] / delta_dot + second[i] / second_delta_dot)
+        move.x_new[i] = x[i] + 0.5 * distance * (rate[i] / delta_dot + second[i] / second_delta_dot)
     return duration
 
 

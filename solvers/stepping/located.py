@@ -13,6 +13,7 @@ from solvers.compiled.kernels import (
     indentation_rate,
     inner,
     kernel,
+    merged,
     off_knots,
     radius_of,
     rubs,
@@ -77,29 +78,30 @@ def _peaks(problem, state, space, h):
         motion_of(problem, s, state.x, space.dense, space.coefficients)
         for column in (PEAK_DELTA, PEAK_FORCE):
             known = (problem, state, s, column, space.coefficients, space.work[0])
-            best, place = -np.inf, 0
-            for i in range(_PEAK_NODES.size):
-                value = _peak_value(known, _PEAK_NODES[i])
-                if value > best:
-                    best, place = value, i
+            best, a, b = _largest_node(_peak_value, known)
             if best > 0.9 * state.active[s, column]:
-                a, b = _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
                 best = max(best, golden_section(_peak_value, known, a, b)[1])
                 state.active[s, column] = max(state.active[s, column], best)
         if rubs(problem, s):
             _peak_of_friction(problem, state, space, h, s)
 
 
+@merged
+def _largest_node(value, known):
+    """(largest ``value(known, θ)`` at some θ of the step, and the θ before and after)."""
+    best, place = -np.inf, 0
+    for i in range(_PEAK_NODES.size):
+        found = value(known, _PEAK_NODES[i])
+        if found > best:
+            best, place = found, i
+    return best, _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
+
+
 @inner
 def _peak_of_friction(problem, state, space, h, s):
     """Raise the largest |F_t| by the step just accepted; the coefficients are those of `motion_of`."""
-    known, best, place = (problem, state, space, h, s), -1.0, 0
-    for i in range(_PEAK_NODES.size):
-        value = _friction_at(known, _PEAK_NODES[i])
-        if value > best:
-            best, place = value, i
-    a, b = _PEAK_NODES[max(place - 1, 0)], _PEAK_NODES[min(place + 1, _PEAK_NODES.size - 1)]
-    slider = slider_of(problem, s)
+    known, slider = (problem, state, space, h, s), slider_of(problem, s)
+    best, a, b = _largest_node(_friction_at, known)
     slider[PEAK] = max(slider[PEAK], best, golden_section(_friction_at, known, a, b)[1])
 
 
@@ -129,7 +131,7 @@ def _peak_value(known, theta):
 @inner
 def first_kink(problem, state, space):
     """θ of the first kink inside the step: a law is cut at zero, or a damper of approach begins or ends; else NONE."""
-    first, batch = NONE, space.work[0]
+    first = NONE
     for s in range(problem.law.size):
         if state.segment[s] == 0 or space.kinks[s] == 0:
             continue
@@ -137,12 +139,12 @@ def first_kink(problem, state, space):
         lowest = landing_tolerance(problem, state, s)
         for i in range(1, _KINK_NODES.size):
             a, b = _KINK_NODES[i - 1], _KINK_NODES[i]
-            before = _side(problem, state, space, s, a, lowest, batch)
-            if before == _side(problem, state, space, s, b, lowest, batch):
+            before = _side(problem, state, space, s, a, lowest)
+            if before == _side(problem, state, space, s, b, lowest):
                 continue
             for _ in range(50):
                 middle = 0.5 * (a + b)
-                same = _side(problem, state, space, s, middle, lowest, batch) == before
+                same = _side(problem, state, space, s, middle, lowest) == before
                 a, b = (middle, b) if same else (a, middle)
             if b > NEAR_END and b < 1.0 - NEAR_END:
                 first = min(first, b)
@@ -151,13 +153,13 @@ def first_kink(problem, state, space):
 
 
 @inner
-def _side(problem, state, space, s, theta, lowest, batch):
+def _side(problem, state, space, s, theta, lowest):
     """Which side of its kinks a law is on at θ of the step: plus 1 cut, plus 2 approaching; no cut near the surface."""
     radius = radius_of(problem, s)
     delta, rate = delta_at(space.coefficients, radius, theta), rate_at(space.coefficients, radius, theta)
     side = 2 if space.kinks[s] & 2 and rate > 0.0 else 0
     if space.kinks[s] & 1 and delta > lowest:
-        force = force_at(problem, s, delta, rate, state.entry_rate[s], batch)
+        force = force_at(problem, s, delta, rate, state.entry_rate[s], space.work[0])
         side += 1 if force == 0.0 else 0
     return side
 
@@ -190,18 +192,17 @@ def _beyond_level(problem, stop, direction, level, x):
 
 
 @shared
-def land(step, problem, state, space, h, longest, stop, direction, level, border, rtol, atol):
-    """Repeat the step with the duration that ends on ``level``, or on a ``border`` if that is not -1.
+def land(step, problem, state, space, move, longest, event):
+    """Repeat the step just tried, ``longest``, with the duration that ends on its first event.
 
-    Returns the duration, s, or if it fails minus the step to try instead.
+    ``event`` is (θ, stop, direction, level, border): it ends on the level, or on the border if that is not -1. Returns
+    the duration, s, or if it fails minus the step to try instead.
     """
+    theta, stop, direction, level, border = event
     tolerance = landing_tolerance(problem, state, stop)
-    before, beyond = 0.0, longest
+    h, before, beyond = theta * longest, 0.0, longest
     for _ in range(MOST_LANDINGS):
-        error, calls = step(
-            *(problem, state.now[T], h, state.x, state.rate, state.segment, state.entry_rate),
-            *(space.x_new, space.rate_new, space.dense, space.work, rtol, atol),
-        )
+        error, calls = step(problem, state.now[T], h, move)
         state.count[CALLS] += calls
         distance, slope = _beyond_level(problem, stop, direction, level, space.x_new)
         if border >= 0:

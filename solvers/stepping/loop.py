@@ -7,25 +7,14 @@ does not recompile the loop; on matrices loop and method are run as Python, see 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import (
-    INTEGERS,
-    MATRIX,
-    PLANAR_PROBLEM,
-    PROBLEM,
-    REAL,
-    VECTOR,
-    bends_at,
-    entry,
-    inlined,
-    inner,
-    merged,
-    rhs,
-)
+from solvers.compiled.fields import packed_type, zeros_of
+from solvers.compiled.kernels import PLANAR_PROBLEM, PROBLEM, REAL, bends_at, entry, inlined, inner, merged, rhs
+from solvers.compiled.sliding import POINT
 from solvers.compiled.state import (
     CALLS,
     GAINED,
@@ -39,11 +28,22 @@ from solvers.compiled.state import (
     T_END,
     State,
     T,
+    most_borders,
 )
 from solvers.problem import Array
-from solvers.stepping.borders import border_ahead, border_space, renew_border, renew_together
+from solvers.stepping.borders import NODES, border_ahead, renew_border, renew_together
 from solvers.stepping.energy_gain import modal_gains
-from solvers.stepping.events import HENON, LOCATED, NONE, UNRESOLVED, count_in_contact, entry_by_sign
+from solvers.stepping.events import (
+    HENON,
+    IN_CONTACT,
+    IN_FLIGHT,
+    LOCATED,
+    NONE,
+    UNRESOLVED,
+    Move,
+    count_in_contact,
+    entry_by_sign,
+)
 from solvers.stepping.henon import hermite
 from solvers.stepping.henon import land as henon_landing
 from solvers.stepping.located import NEAR_END, SWITCHED, accept, before_step, first_crossing, first_kink, land
@@ -56,27 +56,35 @@ _MOST_NODES = 16  # of a signal on a step; a period of its fastest part has ten 
 class Space(NamedTuple):
     """Working arrays of the loop."""
 
-    x_new: Any  # (x.size,) end of the step
-    rate_new: Any  # (x.size,)
-    dense: Any  # (7, x.size) rows r of the interpolant, see `events`
-    work: Any  # (rows, x.size) of the method
-    coefficients: Any  # (6, 8), see `events.motion_of`
-    watch: Any  # see `watched`
-    kinks: Any  # (m,) kinks of the laws inside a segment, see `stability.kinks_of`; used under error control
-    margin: Any  # (nodes × B,) margins of an element's borders, row by row, B the most of any; see `borders`
-    points: Any  # (2, nodes) its δ and δ̇
-    trial: Any  # (2,) δ and δ̇ at one point
-    one: Any  # (B,) margins of one element at one point
-    scale: Any  # (m, 4) rounding of δ and δ̇, ξ and ξ̇, m and m/s
-    at_start: Any  # (m, B) margins at the start of the step
-    present: Any  # (m, B) margins in the state evaluated last
-    rounding: Any  # (m, B) their rounding
-    point: Any  # (2, 6) motion of an element with friction, see `compiled.sliding`
+    x_new: Annotated[Any, "X"]  # this and the next four as in `Move`
+    rate_new: Annotated[Any, "X"]
+    dense: Annotated[Any, "7, X"]
+    work: Annotated[Any, "rows, X"]
+    limits: Annotated[Any, "4"]
+    coefficients: Annotated[Any, "6, 8"]  # see `events.motion_of`
+    watch: Annotated[Any, "5+E"]  # see `watched`
+    kinks: Annotated[Any, "int E"]  # of the laws inside a segment, see `stability.kinks_of`; used under error control
+    margin: Annotated[Any, "nodes*B"]  # of an element's borders, row by row, B the most of any; see `borders`
+    points: Annotated[Any, "2, nodes"]  # its δ and δ̇
+    trial: Annotated[Any, "2"]  # δ and δ̇ at one point
+    one: Annotated[Any, "B"]  # margins of one element at one point
+    scale: Annotated[Any, "E, 4"]  # rounding of δ and δ̇, ξ and ξ̇, m and m/s
+    at_start: Annotated[Any, "E, B"]  # margins at the start of the step
+    present: Annotated[Any, "E, B"]  # margins in the state evaluated last
+    rounding: Annotated[Any, "E, B"]  # their rounding
+    point: Annotated[Any, "2, point"]  # motion of an element with friction, see `compiled.sliding`
 
 
-SPACE = types.NamedTuple(
-    [VECTOR, VECTOR, MATRIX, MATRIX, MATRIX, VECTOR, INTEGERS, VECTOR, MATRIX, VECTOR, VECTOR, *[MATRIX] * 5], Space
-)
+SPACE = packed_type(Space)
+
+
+@shared
+def _move_of(state, space):
+    """What a step reads and writes."""
+    return Move(
+        *(state.x, state.rate, state.segment, state.entry_rate),
+        *(space.x_new, space.rate_new, space.dense, space.work, space.limits),
+    )
 
 
 @shared
@@ -131,15 +139,12 @@ def _constant(table, node):
 
 
 @merged
-def _entry_by_henon(problem, state, space, h):
+def _entry_by_henon(problem, state, space, move, h):
     """(duration, stop) of the paper's step, which ends on an entry; negative where it grazes, (h, -1) without one."""
     theta, stop = entry_by_sign(problem, state.x, space.x_new, state.segment)
     if not theta < NONE:
         return h, -1
-    duration = henon_landing(
-        *(problem, state.now[T], h, state.x, state.rate, state.segment, state.entry_rate),
-        *(stop, 0.0, space.x_new, space.work),
-    )
+    duration = henon_landing(problem, state.now[T], h, move, stop)
     if duration < 0.0:
         return duration, stop
     state.count[CALLS] += rhs(
@@ -151,14 +156,13 @@ def _entry_by_henon(problem, state, space, h):
 
 
 @shared
-def march(step, rate_of, gained, problem, state, space, budget, steps, tolerances, adaptive, events):
+def march(step, rate_of, gained, problem, state, space, budget, adaptive, events):
     """Advance the state to the end of the run or for ``budget`` steps; returns a status code.
 
-    ``rate_of`` writes the rate of a state as `rhs` does, ``gained`` tells whether the run gains energy. ``steps`` are
-    the longest in flight and in contact, s, ``tolerances`` are (rtol, atol).
+    ``rate_of`` writes the rate of a state as `rhs` does, ``gained`` tells whether the run gains energy.
     """
-    now, count, (dt_flight, dt_contact), (rtol, atol) = state.now, state.count, steps, tolerances
-    t_end = now[T_END]
+    now, count, dt_flight, dt_contact = state.now, state.count, space.limits[IN_FLIGHT], space.limits[IN_CONTACT]
+    t_end, move = now[T_END], _move_of(state, space)
     not_finite, walking_in = False, False
     reached_kink = 0.0  # s: a kink this near to the start has been reached; rounding switches the law there
     for _ in range(budget):
@@ -178,10 +182,7 @@ def march(step, rate_of, gained, problem, state, space, budget, steps, tolerance
             h = _longest_resolved(problem, now[T], h)
         if h < max(4e-15 * now[T], _LEAST_STEP) and h < t_end - now[T]:
             return LAW_NOT_FINITE if not_finite else STEP_TOO_SMALL
-        error, calls = step(
-            *(problem, now[T], h, state.x, state.rate, state.segment, state.entry_rate),
-            *(space.x_new, space.rate_new, space.dense, space.work, rtol, atol),
-        )
+        error, calls = step(problem, now[T], h, move)
         count[CALLS] += calls
         not_finite = not np.isfinite(error)
         if adaptive and not error <= 1.0:
@@ -192,7 +193,8 @@ def march(step, rate_of, gained, problem, state, space, budget, steps, tolerance
         # --- events
         stop, direction, border, tried = -1, 0, -1, h
         if events == LOCATED:
-            theta, stop, direction, level, border = _first_event(problem, state, space, h, adaptive)
+            event = _first_event(problem, state, space, h, adaptive)
+            theta, stop, direction, _, border = event
             if border >= 0 and theta == 0.0:  # the step begins on the border and crosses it
                 renew_border(problem, state, space, stop, border)
                 _update_rate(rate_of, problem, state, space)
@@ -202,13 +204,13 @@ def march(step, rate_of, gained, problem, state, space, budget, steps, tolerance
                 count[REJECTED] += 1
                 continue
             if theta < NONE:
-                h = land(step, problem, state, space, theta * h, tried, stop, direction, level, border, rtol, atol)
+                h = land(step, problem, state, space, move, h, event)
                 if h < 0.0:  # only the interpolant crosses, or the landing is not accurate: shorter step
                     now[phase] = -h
                     count[REJECTED] += 1
                     continue
         elif events == HENON and phase == H_FLIGHT and not walking_in:  # the paper's scheme
-            h, stop = _entry_by_henon(problem, state, space, h)
+            h, stop = _entry_by_henon(problem, state, space, move, h)
             direction = 1
             if h < 0.0:  # it grazes: approach with the small step
                 now[H_FLIGHT], walking_in = dt_contact, True
@@ -243,36 +245,23 @@ def march(step, rate_of, gained, problem, state, space, budget, steps, tolerance
     return RUNNING
 
 
-def _march_modes(step, problem, state, space, budget, steps, tolerances, adaptive, events):
+def _march_modes(step, problem, state, space, budget, adaptive, events):
     """`march` on decoupled modes."""
-    return march(step, rhs, modal_gains, problem, state, space, budget, steps, tolerances, adaptive, events)
+    return march(step, rhs, modal_gains, problem, state, space, budget, adaptive, events)
 
 
 @lru_cache(maxsize=2)
 def march_of(planar: bool) -> Any:
     """The compiled loop for a type of problem."""
-    problem, pair = PLANAR_PROBLEM if planar else PROBLEM, types.UniTuple(REAL, 2)
-    step = types.Tuple([REAL, types.int64])(
-        *[problem, REAL, REAL, VECTOR, VECTOR, INTEGERS, VECTOR], *[VECTOR, VECTOR, MATRIX, MATRIX, REAL, REAL]
-    )
-    known = types.FunctionType(step), problem, STATE, SPACE, types.int64, pair, pair
-    return entry(types.int64(*known, types.boolean, types.int64))(_march_modes)
+    problem = PLANAR_PROBLEM if planar else PROBLEM
+    step = types.FunctionType(types.Tuple([REAL, types.int64])(problem, REAL, REAL, packed_type(Move)))
+    return entry(types.int64(step, problem, STATE, SPACE, types.int64, types.boolean, types.int64))(_march_modes)
 
 
-def new_space(
-    problem: Any, state: State, work_rows: int, watch: Array, constants: tuple[float, ...] = (), kinks: Any = ()
-) -> Space:
-    """Working arrays; a method's constants are in the last row of ``work``."""
-    size = state.x.size
-    work = np.empty((work_rows, size))
-    work[-1, : len(constants)] = constants
-    return Space(
-        np.empty(size),
-        np.empty(size),
-        np.zeros((7, size)),
-        work,
-        np.empty((6, 8)),
-        watch,
-        np.array(kinks, dtype=np.int64),
-        *border_space(problem),
-    )
+def new_space(problem: Any, state: State, method: Any, atol: float, watch: Array) -> Space:
+    """Working arrays of a run by a method."""
+    sizes = {"X": state.x.size, "E": problem.law.size, "rows": method.work_rows, "B": most_borders(problem)}
+    space: Space = zeros_of(Space, {**sizes, "nodes": NODES, "point": POINT})
+    space.work[-1, : len(method.constants)] = method.constants
+    space.limits[:], space.watch[:] = (*method.steps, method.rtol, atol), watch
+    return space

@@ -34,7 +34,7 @@ from solvers.compiled.kernels import (
     kernel,
     rhs,
 )
-from solvers.problem import Array, System, require_step
+from solvers.problem import Array, System
 from solvers.stepping.constant_step import ConstantStep
 from solvers.stepping.critical_step import newmark_oscillator
 from solvers.stepping.events import count_in_contact
@@ -115,9 +115,10 @@ def _solve_contact(problem, s, h, entry_rate, x_new, rate_new, work):
 
 
 @shared
-def _add_contacts(reply, problem, h, segment, entry_rate, x_new, rate_new, work):
+def _add_contacts(reply, problem, h, move):
     """Find the forces of all stops in contact at the end of a step by Gauss–Seidel sweeps; returns the law calls."""
-    active, force, calls = count_in_contact(segment), work[0], 0
+    segment, work, calls = move.segment, move.work, 0
+    active, force = count_in_contact(segment), work[0]
     if active == 0:
         return 0
     for s in range(problem.law.size):
@@ -128,7 +129,7 @@ def _add_contacts(reply, problem, h, segment, entry_rate, x_new, rate_new, work)
             if segment[s] > 0:
                 before = force[s]
                 reply(problem, h, s, work)
-                calls += _solve_contact(problem, s, h, entry_rate[s], x_new, rate_new, work)
+                calls += _solve_contact(problem, s, h, move.entry_rate[s], move.x_new, move.rate_new, work)
                 largest, change = max(largest, abs(force[s])), max(change, abs(force[s] - before))
         if active == 1 or change <= 1e-12 * largest:
             break
@@ -154,15 +155,14 @@ def _finish(n, h, constants, x, rate, x_new, rate_new, change, dense):
 
 
 @shared
-def newmark(
-    balance, flight, solve, reply, problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol
-):
-    """One step; the last row of ``work`` holds (α_m, α_f, β, γ).
+def newmark(balance, flight, solve, reply, problem, t, h, move):
+    """One step; the last row of ``move.work`` holds (α_m, α_f, β, γ).
 
     ``balance`` writes r and the rates of the energy balance and returns the law calls, ``flight`` writes r without
     contact, ``solve`` puts S⁻¹ r in place of r, all of them behind n entries; ``reply`` writes (1-α_f) S⁻¹ w of a stop
-    to ``work[3]``. Returns (error estimate 0, law calls). ``dense`` gets the cubic Hermite interpolant.
+    to ``work[3]``. Returns (error estimate 0, law calls). ``move.dense`` gets the cubic Hermite interpolant.
     """
+    x, rate, segment, entry_rate, x_new, rate_new, dense, work, _ = move
     n, constants, calls = problem.k.size, work[4], 0
     if constants[1] != 0.0:
         calls += balance(problem, t, x, segment, entry_rate, dense[0], work[2])
@@ -171,7 +171,7 @@ def newmark(
     _blend(n, constants, dense[0], rate_new)
     solve(problem, h, work, rate_new)
     _accelerate(n, h, constants, rate_new, x_new)
-    calls += _add_contacts(reply, problem, h, segment, entry_rate, x_new, rate_new, work)
+    calls += _add_contacts(reply, problem, h, move)
     _store_accelerations(n, rate_new, work[1])
     calls += balance(problem, t + h, x_new, segment, entry_rate, rate_new, work[2])
     _finish(n, h, constants, x, rate, x_new, rate_new, work[1], dense)
@@ -210,27 +210,9 @@ def _reply(problem, h, s, work):
 
 
 @kernel
-def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
+def step(problem, t, h, move):
     """`newmark` on decoupled modes."""
-    return newmark(
-        rhs,
-        _flight,
-        _solve,
-        _reply,
-        problem,
-        t,
-        h,
-        x,
-        rate,
-        segment,
-        entry_rate,
-        x_new,
-        rate_new,
-        dense,
-        work,
-        rtol,
-        atol,
-    )
+    return newmark(rhs, _flight, _solve, _reply, problem, t, h, move)
 
 
 class _Family(ConstantStep):
@@ -248,7 +230,7 @@ class _Family(ConstantStep):
         """Sparse matrices, and damping or gyroscopic terms that couple the modes, are stepped on as they are."""
         return system.sparse or system.blocks.loss.size > 0
 
-    def critical(self, M: Any, C: Any, K: Any, G: Any = None) -> tuple[Array, Array]:
+    def critical(self, M: Any, C: Any, K: Any, G: Any) -> tuple[Array, Array]:
         """The oscillator that limits a step on matrices, since contacts couple the modes."""
         _, _, beta, gamma = self.constants
         return newmark_oscillator(beta, gamma, M, C, K, G)
@@ -285,9 +267,6 @@ class CentralDifference(_Family):
 
     constants: ClassVar[tuple[float, ...]] = (0.0, 0.0, 0.0, 0.5)
 
-    def __post_init__(self) -> None:
-        require_step("dt", self.dt)
-
 
 @dataclass(frozen=True)
 class Newmark(_Family):
@@ -318,7 +297,7 @@ class Newmark(_Family):
     force_unstable: bool = False
 
     def __post_init__(self) -> None:
-        require_step("dt", self.dt)
+        super().__post_init__()
         if not 0.0 <= self.beta < math.inf:
             raise ValueError(f"beta must be >= 0 and finite, got {self.beta!r}")
         if not 0.5 <= self.gamma < math.inf:
@@ -358,7 +337,7 @@ class GeneralizedAlpha(_Family):
     force_unstable: bool = False
 
     def __post_init__(self) -> None:
-        require_step("dt", self.dt)
+        super().__post_init__()
         if not 0.0 <= self.rho_inf <= 1.0:
             raise ValueError(f"rho_inf must lie in [0, 1], got {self.rho_inf!r}")
 

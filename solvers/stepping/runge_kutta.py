@@ -15,7 +15,7 @@ from functools import partial
 from typing import Any, ClassVar
 
 from solvers.compiled.kernels import kernel, rhs
-from solvers.problem import System, require_step
+from solvers.problem import System
 from solvers.stepping.constant_step import ConstantStep
 from solvers.stepping.henon import hermite
 from solvers.stepping.shared import shared
@@ -31,13 +31,13 @@ def _add_stage(start, stage, weight, reach, x, x_new, trial):
 
 
 @shared
-def runge_kutta(rate_of, problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
+def runge_kutta(rate_of, problem, t, h, move):
     """One step with the rates f = ``rate_of``; returns (error estimate 0, law calls).
 
-    ``dense`` gets the cubic Hermite interpolant.
+    ``move.dense`` gets the cubic Hermite interpolant.
     """
-    trial, stage, batch = work[0], work[1], work[2]
-    calls = 0
+    x, rate, segment, entry_rate, x_new, rate_new, dense, work, _ = move
+    trial, stage, batch, calls = work[0], work[1], work[2], 0
     _add_stage(x, rate, h / 6.0, 0.5 * h, x, x_new, trial)
     for j in range(1, 4):
         calls += rate_of(problem, t + (h if j == 3 else 0.5 * h), trial, segment, entry_rate, stage, batch)
@@ -49,9 +49,9 @@ def runge_kutta(rate_of, problem, t, h, x, rate, segment, entry_rate, x_new, rat
 
 
 @kernel
-def step(problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol):
+def step(problem, t, h, move):
     """`runge_kutta` on decoupled modes."""
-    return runge_kutta(rhs, problem, t, h, x, rate, segment, entry_rate, x_new, rate_new, dense, work, rtol, atol)
+    return runge_kutta(rhs, problem, t, h, move)
 
 
 @dataclass(frozen=True)
@@ -84,9 +84,6 @@ class RK4(ConstantStep):
 
     work_rows: ClassVar[int] = 3
     step: ClassVar[Any] = staticmethod(step)
-
-    def __post_init__(self) -> None:
-        require_step("dt", self.dt)
 
     @property
     def radius(self) -> Radius:

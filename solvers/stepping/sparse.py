@@ -35,14 +35,14 @@ class MatrixEngine(Engine):
     def __init__(self, method: Any, system: System, z: Array, forcing: Forcing, duration: float) -> None:
         from scipy.sparse import csc_array, eye_array
 
-        self.method, self.system, self.duration, self.atol = method, system, duration, method.atol
+        self.method, self.system, self.duration = method, system, duration
         self.M, self.C, self.K = (csc_array(matrix) for matrix in (system.M, system.C, system.K))
         self.by_rate = self.C if system.gyroscopic is None else csc_array(system.by_rate)
         self.problem = matrix_problem_of(system, forcing)
         self.back = eye_array(2 * system.size, format="csc")
         self.state = new_state(z, len(system.contacts))
         self.state.now[[H_FLIGHT, H_CONTACT, T_END]] = *method.steps, duration
-        self.space = new_space(self.problem, self.state, method.work_rows, watched(system, z, 0.0), method.constants)
+        self.space = new_space(self.problem, self.state, method, method.atol, watched(system, z, 0.0))
         self.open = np.zeros_like(self.state.segment)
         self.moving = slice(system.size, 2 * system.size)  # rates in x, accelerations or forces in its rate
         self.factors: dict[float, Factor] = {}

@@ -84,7 +84,7 @@ def alpha_radius(alpha_m: float, alpha_f: float, beta: float, gamma: float) -> R
 # --- limits ----------------------------------------------------------------------------------------------------------
 
 
-def largest_steps(radius: Radius, k: Array, c: Array, duration: float = math.inf) -> Array:
+def largest_steps(radius: Radius, k: Array, c: Array, duration: float) -> Array:
     """Largest h (j,) up to which modes (j,) are not amplified by a tenth within ``duration`` s; 0 if there is none."""
 
     def stable(h: Array, mode: Any) -> Any:

@@ -5,7 +5,7 @@ With δ = σ|u| - c' (c' = c, or -c of an outer circle) and e = u/|u|, at fixed 
     dδ = σ e·du - dc',   dδ̇ = σ (e·du̇ + (u̇ - ṙe)·du/r),
 
 and the components of the force change by their slopes, see `contact.turn_slopes`, and by the change of N at fixed u,
-u̇.
+u̇. Every ``run`` is a `linearised_step.Linearised`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 
 from solvers.compiled.kernels import dot, inlined, inner, is_circle
+from solvers.compiled.state import T
 from solvers.exponential.circles.contact import turn_slopes, turned_of
 from solvers.exponential.contact.nodes import S
 
@@ -29,65 +30,58 @@ def explicit_change(variation, r, d, t):
 
 
 @inlined
-def is_parameter(variation, derivatives, column):
+def is_parameter(run, column):
     """Whether a column is the derivative by the parameter; the others are by the start."""
-    return variation.step > 0.0 and column == derivatives.y.shape[0] - 1
+    return run.variation.step > 0.0 and column == run.derivatives.y.shape[0] - 1
 
 
 @inner
-def row_change(problem, variation, derivatives, y, c, r, d, t):
+def row_change(run, y, c, r, d, t):
     """Change of a row's displacement (d = 0) or rate (d = 1) at fixed time, in column c, whose state is y."""
+    problem = run.problem
     value = dot(problem.read[r] if d == 0 else problem.read_rate[r], y, 2 * problem.k.size)
-    return value + explicit_change(variation, r, d, t) if is_parameter(variation, derivatives, c) else value
+    return value + explicit_change(run.variation, r, d, t) if is_parameter(run, c) else value
 
 
 @inner
-def radial_change(problem, variation, derivatives, x, c, s, d, t):
+def radial_change(run, x, c, s, d, t):
     """Change of δ (d = 0) or δ̇ (d = 1) of a circle in the state x at fixed time, in column c."""
-    row, size, y = problem.first[s], 2 * problem.k.size, derivatives.y[c]
+    problem, y = run.problem, run.derivatives.y[c]
+    row, size = problem.first[s], 2 * problem.k.size
     u, w = (
         dot(problem.read[row], x, size) - problem.gap[row],
         dot(problem.read[row + 1], x, size) - problem.gap[row + 1],
     )
     r = math.sqrt(u * u + w * w)
     u, w = u / r, w / r
-    change = u * row_change(problem, variation, derivatives, y, c, row, d, t)
-    change += w * row_change(problem, variation, derivatives, y, c, row + 1, d, t)
+    change = u * row_change(run, y, c, row, d, t) + w * row_change(run, y, c, row + 1, d, t)
     if d == 1:
         u_dot, w_dot = dot(problem.read_rate[row], x, size), dot(problem.read_rate[row + 1], x, size)
         along = u * u_dot + w * w_dot
-        change += (u_dot - along * u) / r * row_change(problem, variation, derivatives, y, c, row, 0, t)
-        change += (w_dot - along * w) / r * row_change(problem, variation, derivatives, y, c, row + 1, 0, t)
+        change += (u_dot - along * u) / r * row_change(run, y, c, row, 0, t)
+        change += (w_dot - along * w) / r * row_change(run, y, c, row + 1, 0, t)
     change = change if problem.radius[s] > 0.0 else -change
-    return change - _radius_change(variation, derivatives, c, s) if d == 0 else change
+    return change - run.variation.radius[s] if d == 0 and is_parameter(run, c) else change
 
 
 @inlined
-def _radius_change(variation, derivatives, c, s):
-    """Change of c' in column c."""
-    return variation.radius[s] if is_parameter(variation, derivatives, c) else 0.0
-
-
-@inlined
-def change_of(problem, variation, derivatives, x, column, s, d, t):
+def change_of(run, x, column, s, d, t):
     """Change of δ (d = 0) or δ̇ (d = 1) of any stop in the state x at fixed time, in one column."""
-    if is_circle(problem, s):
-        return radial_change(problem, variation, derivatives, x, column, s, d, t)
-    r = problem.first[s]
-    row = problem.read[r] if d == 0 else problem.read_rate[r]
-    value = dot(row, derivatives.y[column], 2 * problem.k.size)
-    return value + explicit_change(variation, r, d, t) if is_parameter(variation, derivatives, column) else value
+    if is_circle(run.problem, s):
+        return radial_change(run, x, column, s, d, t)
+    return row_change(run, run.derivatives.y[column], column, run.problem.first[s], d, t)
 
 
 @inner
-def radial_residual(problem, tables, scratch, derivatives, variation, node_set, level, begin, c, s, shift, place):
+def radial_residual(run, node_set, level, c, s, shift, place):
     """Right-hand sides for the changes of the force's components at the nodes, in column c, into ``scratch.residual``.
 
     ``scratch.motion`` holds the change of motion of both rows without that of the forces.
     """
-    row, turned, parameter = problem.first[s], turned_of(problem, scratch, s), is_parameter(variation, derivatives, c)
+    scratch, tables, derivatives, variation = run.scratch, run.tables, run.derivatives, run.variation
+    row, turned, parameter = run.problem.first[s], turned_of(run.problem, scratch, s), is_parameter(run, c)
     for i in range(S):
-        t = begin + tables.contact_step[level] * tables.times[node_set, i]
+        t = run.past.now[T] + tables.contact_step[level] * tables.times[node_set, i]
         along = derivatives.entry[c, s] * scratch.slope[s, 2, i]
         if parameter:
             along += derivatives.by_parameter[s, i]
@@ -106,11 +100,12 @@ def radial_residual(problem, tables, scratch, derivatives, variation, node_set, 
 
 
 @inner
-def add_radial_change(problem, derivatives, variation, s, w, t, factor, force, by_law, out):
+def add_radial_change(run, s, w, t, factor, force, by_law, out):
     """Add the changes of a circle's force, in the state w of a landing, to the rates of all columns.
 
     The slopes of the law are in ``derivatives.batch[2:5]``; ``by_law`` is its derivative by the parameter.
     """
+    problem, derivatives = run.problem, run.derivatives
     row, size, batch, turned = problem.first[s], 2 * problem.k.size, derivatives.batch, derivatives.turned
     read, rate = problem.read, problem.read_rate
     u, u_dot = dot(read[row], w, size) - problem.gap[row], dot(rate[row], w, size)
@@ -118,13 +113,13 @@ def add_radial_change(problem, derivatives, variation, s, w, t, factor, force, b
     turn_slopes(u, v, u_dot, v_dot, force, batch[2], batch[3], problem.radius[s], 0, turned)
     for c in range(derivatives.y.shape[0]):
         y, along = derivatives.trial[c], batch[4] * derivatives.entry[c, s]
-        if is_parameter(variation, derivatives, c):
-            along += by_law - batch[2] * variation.radius[s]
+        if is_parameter(run, c):
+            along += by_law - batch[2] * run.variation.radius[s]
         for a in range(2):
             change = along * turned[4, a, 0]
             for b in range(2):
                 for d in range(2):
-                    moved = row_change(problem, variation, derivatives, y, c, row + b, d, t)
+                    moved = row_change(run, y, c, row + b, d, t)
                     change += turned[2 * a + b, d, 0] * moved
             for e in range(size):
                 out[c, e] += factor * change * problem.push[row + a, e]

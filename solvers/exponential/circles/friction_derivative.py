@@ -68,56 +68,56 @@ def _latched_place(problem, s):
 
 
 @inner
-def xi_change(problem, variation, derivatives, x, c, s, t):
+def xi_change(run, x, c, s, t):
     """Change of ξ in the state x at fixed time, in column c."""
-    first, size, change, y = row_of(problem, s), 2 * problem.k.size, 0.0, derivatives.y[c]
+    problem, y, change = run.problem, run.derivatives.y[c], 0.0
+    first, size = row_of(problem, s), 2 * problem.k.size
     u = dot(problem.read[first], x, size) - problem.gap[first]
     w = dot(problem.read[first + 1], x, size) - problem.gap[first + 1]
     for a in range(count_of(problem, s)):
-        change += row_directions(problem, s, u, w, a)[1] * row_change(
-            problem, variation, derivatives, y, c, first + a, 0, t
-        )
+        change += row_directions(problem, s, u, w, a)[1] * row_change(run, y, c, first + a, 0, t)
     return change
 
 
 @inner
-def _copy_slider(problem, ahead, behind, variation, s):
+def _copy_slider(run, s):
     """Copy the slider's code and place to the laws ahead and behind."""
-    if variation.law_step > 0.0:
-        slider, one, other = slider_of(problem, s), slider_of(ahead, s), slider_of(behind, s)
+    if run.variation.law_step > 0.0:
+        slider, one, other = slider_of(run.problem, s), slider_of(run.ahead, s), slider_of(run.behind, s)
         one[CODE], one[SLIDER] = slider[CODE], slider[SLIDER]
         other[CODE], other[SLIDER] = slider[CODE], slider[SLIDER]
 
 
 @inner
-def latch_begin(problem, ahead, behind, past, derivatives, variation, s):
+def latch_begin(run, s):
     """Changes of s as latched at the begin of a contact, whose time changes by ``derivatives.shift``."""
+    problem, past, derivatives, variation = run.problem, run.past, run.derivatives, run.variation
     t, place, slider, explicit = past.now[T], _latched_place(problem, s), slider_of(problem, s), 0.0
     xi_rate = xi_and_rate_at(problem, s, t, past.x)[1]
     if variation.law_step > 0.0:
-        explicit = xi_and_rate_at(ahead, s, t, past.x)[0] - xi_and_rate_at(behind, s, t, past.x)[0]
+        explicit = xi_and_rate_at(run.ahead, s, t, past.x)[0] - xi_and_rate_at(run.behind, s, t, past.x)[0]
         explicit /= 2.0 * variation.law_step
     for c in range(derivatives.y.shape[0]):
-        change = xi_change(problem, variation, derivatives, past.x, c, s, t) + xi_rate * derivatives.shift[c, s]
-        change += explicit if is_parameter(variation, derivatives, c) else 0.0
+        change = xi_change(run, past.x, c, s, t) + xi_rate * derivatives.shift[c, s]
+        change += explicit if is_parameter(run, c) else 0.0
         derivatives.latched[c, place] = change if slider[CODE] == 0.0 else 0.0
-    _copy_slider(problem, ahead, behind, variation, s)
+    _copy_slider(run, s)
 
 
 @inner
-def begin_rubbing(problem, ahead, behind, past, derivatives, variation, s):
+def begin_rubbing(run, s):
     """Begin the slider of a contact and the derivative of its place."""
-    begin_slider(problem, s, past.now[T], past.x, past.entry_rate[s], False)
-    latch_begin(problem, ahead, behind, past, derivatives, variation, s)
+    begin_slider(run.problem, s, run.past.now[T], run.past.x, run.past.entry_rate[s], False)
+    latch_begin(run, s)
 
 
 @inner
-def end_rubbing(problem, ahead, behind, derivatives, variation, s):
+def end_rubbing(run, s):
     """End the slider of a contact; the derivative of its place is zero."""
-    end_slider(problem, s)
-    for c in range(derivatives.y.shape[0]):
-        derivatives.latched[c, _latched_place(problem, s)] = 0.0
-    _copy_slider(problem, ahead, behind, variation, s)
+    end_slider(run.problem, s)
+    for c in range(run.derivatives.y.shape[0]):
+        run.derivatives.latched[c, _latched_place(run.problem, s)] = 0.0
+    _copy_slider(run, s)
 
 
 @inner
@@ -129,33 +129,32 @@ def _slider_place(problem, s, entry_rate, segment, t, x):
 
 
 @inner
-def _changes_by_parameter(problem, ahead, behind, past, variation, s):
+def _changes_by_parameter(run, s):
     """Changes of N and of ξ - F_t/k_t at fixed motion per unit of a parameter of the laws."""
-    if variation.law_step == 0.0:
+    if run.variation.law_step == 0.0:
         return 0.0, 0.0
-    entry, segment, t, x, width = past.entry_rate[s], past.segment[s], past.now[T], past.x, 2.0 * variation.law_step
-    place = _slider_place(ahead, s, entry, segment, t, x) - _slider_place(behind, s, entry, segment, t, x)
-    delta, rate = indentation_and_rate(problem, s, x)
-    pressed = normal_force(ahead, s, segment, entry, delta, rate)
-    return (pressed - normal_force(behind, s, segment, entry, delta, rate)) / width, place / width
+    past, width = run.past, 2.0 * run.variation.law_step
+    entry, segment, t, x = past.entry_rate[s], past.segment[s], past.now[T], past.x
+    place = _slider_place(run.ahead, s, entry, segment, t, x) - _slider_place(run.behind, s, entry, segment, t, x)
+    delta, rate = indentation_and_rate(run.problem, s, x)
+    pressed = normal_force(run.ahead, s, segment, entry, delta, rate)
+    return (pressed - normal_force(run.behind, s, segment, entry, delta, rate)) / width, place / width
 
 
 @inner
-def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
+def pass_slider(run, s, j):
     """Cross border j of a slider: renew it, and its derivative ds if it sticks from then on.
 
     Where slip ends, dt* is that of the event which ended it, if one did; where N begins to grow, ds = dξ + ξ̇ dt* with
     dt* = -dN/Ṅ, unless it has jumped there. So has F_t where N has jumped below its limit.
     """
+    problem, past, derivatives = run.problem, run.past, run.derivatives
     t, slider, entry = past.now[T], slider_of(problem, s), past.entry_rate[s]
     jumped = begins_beyond_zero(problem, s, entry, past.segment[s], past.x)
     friction_jump = -slider_force(problem, s, past.segment[s], entry, t, past.x)
     rhs(problem, t, past.x, past.segment, past.entry_rate, derivatives.rate[0], derivatives.batch)
-    code_before, share, by_law = (
-        slider[CODE],
-        friction_by_normal(slider) / slider[STIFFNESS],
-        _changes_by_parameter(problem, ahead, behind, past, variation, s),
-    )
+    code_before, share = slider[CODE], friction_by_normal(slider) / slider[STIFFNESS]
+    by_law = _changes_by_parameter(run, s)
     delta, rate = indentation_and_rate(problem, s, past.x)
     acceleration = acceleration_of(problem, s, past.x, derivatives.rate[0])
     normal_force(problem, s, past.segment[s], entry, delta, rate)
@@ -166,11 +165,11 @@ def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
     friction_jump += slider_force(problem, s, past.segment[s], entry, t, past.x)
     event = problem.law.size if t > 0.0 else s  # at the start only its own entry may be what it falls with
     for c in range(derivatives.y.shape[0]):
-        normal_change = by_delta * change_of(problem, variation, derivatives, past.x, c, s, 0, t)
-        normal_change += by_rate * change_of(problem, variation, derivatives, past.x, c, s, 1, t)
+        normal_change = by_delta * change_of(run, past.x, c, s, 0, t)
+        normal_change += by_rate * change_of(run, past.x, c, s, 1, t)
         normal_change += by_entry * derivatives.entry[c, s]
-        change = xi_change(problem, variation, derivatives, past.x, c, s, t) - share * normal_change
-        if is_parameter(variation, derivatives, c):
+        change = xi_change(run, past.x, c, s, t) - share * normal_change
+        if is_parameter(run, c):
             normal_change, change = normal_change + by_law[0], change + by_law[1]
         shift = derivatives.shift[c, event] if past.now[LAST_EVENT] == t else 0.0
         if code_before == FREE and not jumped:
@@ -179,7 +178,7 @@ def pass_slider(problem, ahead, behind, past, derivatives, variation, s, j):
             change += (xi_rate - share * normal_rate) * shift
             add_tangential(problem, s, -friction_jump * shift, past.x, derivatives.y[c])
         derivatives.latched[c, _latched_place(problem, s)] = change if slider[CODE] == 0.0 else 0.0
-    _copy_slider(problem, ahead, behind, variation, s)
+    _copy_slider(run, s)
 
 
 @inner
@@ -205,19 +204,20 @@ def _forces_of_side(side, past, scratch, s, place, normals, frictions):
 
 
 @inner
-def rubbing_by_parameter(problem, ahead, behind, tables, past, scratch, derivatives, variation, s):
+def rubbing_by_parameter(run, s):
     """Forces at the nodes of a step, and the changes of N and F_t at fixed motion per unit of the parameter.
 
     The changes go to ``derivatives.by_rows`` at the first two rows of the element.
     """
-    rubbing_forces(problem, tables, past, scratch, s)
+    problem, past, scratch, derivatives, variation = run.problem, run.past, run.scratch, run.derivatives, run.variation
+    rubbing_forces(problem, run.tables, past, scratch, s)
     store_row_directions(problem, scratch, s)
     if variation.law_step == 0.0:
         return
     first, place = row_of(problem, s), place_of(problem, s)
     normals, frictions = derivatives.by_rows[first], derivatives.by_rows[first + 1]
-    _forces_of_side(behind, past, scratch, s, place, scratch.numbers, scratch.trial)
-    _forces_of_side(ahead, past, scratch, s, place, normals, frictions)
+    _forces_of_side(run.behind, past, scratch, s, place, scratch.numbers, scratch.trial)
+    _forces_of_side(run.ahead, past, scratch, s, place, normals, frictions)
     for i in range(S):
         normals[i] = (normals[i] - scratch.numbers[i]) / (2.0 * variation.law_step)
         frictions[i] = (frictions[i] - scratch.trial[i]) / (2.0 * variation.law_step)
@@ -225,29 +225,24 @@ def rubbing_by_parameter(problem, ahead, behind, tables, past, scratch, derivati
 
 
 @inner
-def rubbing_residual(problem, tables, scratch, derivatives, variation, node_set, level, begin, c, s, shift, place, at):
+def rubbing_residual(run, node_set, level, c, s, shift, place):
     """Right-hand sides for the changes of the forces on the rows at the nodes, in column c, into ``scratch.residual``.
 
     ``scratch.motion`` holds the change of motion of the rows without that of the forces. In a frame that moves with an
     entry the clock of the spin is moved, too.
     """
-    first, m, slider, slopes = (
-        row_of(problem, s),
-        count_of(problem, s),
-        slider_of(problem, s),
-        scratch.row_slopes[9 * s :],
-    )
-    parameter, latched = is_parameter(variation, derivatives, c), derivatives.latched[c, _latched_place(problem, s)]
-    latched -= slider[ARM] * slider[SPIN] * shift
+    problem, tables, scratch = run.problem, run.tables, run.scratch
+    derivatives, variation = run.derivatives, run.variation
+    first, m, slider = row_of(problem, s), count_of(problem, s), slider_of(problem, s)
+    parameter, slopes = is_parameter(run, c), scratch.row_slopes[9 * s :]
+    latched = derivatives.latched[c, _latched_place(problem, s)] - slider[ARM] * slider[SPIN] * shift
     for i in range(S):
-        t = begin + tables.contact_step[level] * tables.times[node_set, i]
+        t = run.past.now[T] + tables.contact_step[level] * tables.times[node_set, i]
         d_normal = derivatives.entry[c, s] * scratch.slope[s, 2, i]
         d_friction = friction_by_normal(slider) * d_normal - friction_by_xi(slider) * latched
         if parameter and variation.law_step > 0.0:
-            d_normal, d_friction = (
-                d_normal + derivatives.by_rows[first, i],
-                d_friction + derivatives.by_rows[first + 1, i],
-            )
+            d_normal += derivatives.by_rows[first, i]
+            d_friction += derivatives.by_rows[first + 1, i]
         for a in range(m):
             by_delta, by_xi = scratch.node_directions[6 * s + 2 * a, i], scratch.node_directions[6 * s + 2 * a + 1, i]
             change = by_delta * d_normal + by_xi * d_friction
@@ -264,25 +259,17 @@ def rubbing_residual(problem, tables, scratch, derivatives, variation, node_set,
 
 @inner
 def _friction_in_state(side, s, t, w, normal):
-    """F_t at another value of the parameter, in the state w of a landing."""
+    """F_t by the slider of one ``side`` of the parameter, or of the run itself, in the state w of a landing."""
     return friction_force(radius_of(side, s), slider_of(side, s), xi_and_rate_at(side, s, t, w)[0], normal)
 
 
 @inner
-def _forces_in_state(problem, s, entry_rate, t, w, delta, rate, batch):
-    """N and F_t in the state w of a landing, where δ and δ̇ are given."""
-    normal = force_at(problem, s, delta, rate, entry_rate, batch)
-    return normal, friction_force(
-        radius_of(problem, s), slider_of(problem, s), xi_and_rate_at(problem, s, t, w)[0], normal
-    )
-
-
-@inner
-def add_rubbing_change(problem, ahead, behind, derivatives, variation, s, entry_rate, w, t, delta, factor, out):
+def add_rubbing_change(run, s, w, t, delta, factor, out):
     """Add the changes of an element's forces, in the state w of a landing, to the rates of all columns.
 
     The slopes of the law are in ``derivatives.batch[2:5]``, N ahead and behind in the next two.
     """
+    problem, derivatives, variation = run.problem, run.derivatives, run.variation
     first, m, size, batch = row_of(problem, s), count_of(problem, s), 2 * problem.k.size, derivatives.batch
     by_delta, by_rate, by_entry, rate = batch[2], batch[3], batch[4], indentation_rate(problem, s, w)
     motion, slopes, slider = derivatives.at_rows, derivatives.turned, slider_of(problem, s)
@@ -290,9 +277,10 @@ def add_rubbing_change(problem, ahead, behind, derivatives, variation, s, entry_
     if variation.law_step > 0.0:
         width = 2.0 * variation.law_step
         normal_by_parameter = (batch[5] - batch[6]) / width
-        friction_by_parameter = _friction_in_state(ahead, s, t, w, batch[5]) / width
-        friction_by_parameter -= _friction_in_state(behind, s, t, w, batch[6]) / width
-    normal, tangential = _forces_in_state(problem, s, entry_rate, t, w, delta, rate, batch[5:8])
+        friction_by_parameter = _friction_in_state(run.ahead, s, t, w, batch[5]) / width
+        friction_by_parameter -= _friction_in_state(run.behind, s, t, w, batch[6]) / width
+    normal = force_at(problem, s, delta, rate, run.past.entry_rate[s], batch[5:8])
+    tangential = _friction_in_state(problem, s, t, w, normal)
     for a in range(m):
         motion[a, 0, 0] = dot(problem.read[first + a], w, size) - problem.gap[first + a]
         motion[a, 1, 0] = dot(problem.read_rate[first + a], w, size)
@@ -301,14 +289,14 @@ def add_rubbing_change(problem, ahead, behind, derivatives, variation, s, entry_
         y, latched = derivatives.trial[c], derivatives.latched[c, _latched_place(problem, s)]
         d_normal = by_entry * derivatives.entry[c, s]
         d_friction = friction_by_normal(slider) * d_normal - friction_by_xi(slider) * latched
-        if is_parameter(variation, derivatives, c):
+        if is_parameter(run, c):
             d_normal, d_friction = d_normal + normal_by_parameter, d_friction + friction_by_parameter
         for a in range(m):
             press, rub = row_directions(problem, s, motion[0, 0, 0], motion[1, 0, 0], a)
             change = press * d_normal + rub * d_friction
             for b in range(m):
                 for d in range(2):
-                    moved = row_change(problem, variation, derivatives, y, c, first + b, d, t)
+                    moved = row_change(run, y, c, first + b, d, t)
                     change += slopes[a * m + b, d, 0] * moved
             for e in range(size):
                 out[c, e] += factor * change * problem.push[first + a, e]

@@ -29,7 +29,6 @@ from solvers.compiled.kernels import inner, merged, row_of, rubs, slider_of
 from solvers.compiled.state import PEAK_FORCE, T
 from solvers.problem import Array, Record, System, dense
 from solvers.problem.friction import ARM, MU, SPIN, may_pull
-from solvers.problem.system import stored_energy
 
 MULTIPLE, ROUNDING = 20.0, 1e-9  # see the module; relative to the energy handled
 CANCELLED = 1e-6  # the most that may cancel in the energies of coupled blocks, relative to the energy handled
@@ -126,7 +125,7 @@ def unbalanced(record: Record, rtol: float) -> bool:
     """Whether the energy balance at the samples of a run has a residual above the tolerated one."""
     rows, system = _checked_places(len(record.motion)), record.system
     motion = np.concatenate(((record.back @ record.begin)[None], record.motion.take(rows, axis=0)))
-    stored = stored_energy(system.M, system.K, motion[:, : system.size], motion[:, system.size :])
+    stored = system.energy(motion[:, : system.size], motion[:, system.size :])
     works = record.works.take(rows, axis=0)
     left, handled = stored[1:] - stored[0] - works @ _signs(works.shape[1]), stored[0] + stored[1:].max()
     if record.rubbed is not None:

@@ -77,12 +77,9 @@ def _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h
 
     Signals at the nodes are left in ``scratch.energy_sums``, motion of the tones there in ``scratch.terms``.
     """
-    n, size, gain = int(tables.own_blocks), problem.k.size, 0.0
+    n, size, gain, steady = int(tables.own_blocks), problem.k.size, 0.0, energy_tables.steady[kind, place]
     for k in range(size - n):
-        alpha, beta = (
-            load8(energy_tables.steady[kind, place, k, 0], 0),
-            load8(energy_tables.steady[kind, place, k, 1], 0),
-        )
+        alpha, beta = load8(steady[k, 0], 0), load8(steady[k, 1], 0)
         p, v = splat8(state.x[n + k]), splat8(state.x[size + n + k])
         store8(scratch.terms, 2 * S * k, alpha * p + beta * v)
         store8(scratch.terms, 2 * S * k + S, alpha * v - beta * splat8(problem.k[n + k]) * p)
@@ -129,18 +126,10 @@ def _block_forces(problem, tables, state, scratch, node_set, b, y):
 @merged
 def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h):
     """The same for a whole step by the forms of each block."""
-    n, size, kind, weights = (
-        int(tables.own_blocks),
-        problem.k.size,
-        energy_tables.kind[node_set],
-        load8(tables.plain[node_set], 0),
-    )
+    n, size, kind, plain = int(tables.own_blocks), problem.k.size, energy_tables.kind[node_set], tables.plain[node_set]
     y, sums, entering = scratch.energy_sums[0], scratch.energy_sums[1], tables.weight_exponent[node_set] > 0.0
-    gain, loss = (
-        _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, tables.plain[node_set]),
-        0.0,
-    )
-    gains, losses = splat8(0.0), splat8(0.0)
+    gain, loss = _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, plain), 0.0
+    weights, gains, losses = load8(plain, 0), splat8(0.0), splat8(0.0)
     for b in range(n):
         signal, p, v = _block_forces(problem, tables, state, scratch, node_set, b, y), state.x[b], state.x[size + b]
         table, c = energy_tables.contact[kind, place, b], problem.c[b]

@@ -41,18 +41,18 @@ def contact_table(
     points = gauss(_POINTS)
     out = np.zeros((len(h), len(k), SQUARES + S + 2, 2 * S))
     shapes = (_POINTS, _ROWS), (2, _POINTS, S), (_POINTS, 2, _BEGIN), (2, _ROWS), (_ROWS, _WIDE)
-    scratch = [np.zeros(shape) for shape in shapes]
+    scratch = tuple(np.zeros(shape) for shape in shapes)
     structure = k.copy(), c.copy(), h.copy()
     kind = time_exponent, weight_exponent, nodes.copy(), weights
-    _fill(*structure, *kind, points, np.vstack((so_far(points[0]), points[1])), *scratch, out)
+    _fill(structure, kind, (points, np.vstack((so_far(points[0]), points[1]))), scratch, out)
     return out
 
 
 @kernel
-def _fill(
-    k, c, h, time_exponent, weight_exponent, nodes, weights, points, so_far, velocity, basis, pushed, state, sums, out
-):
-    """Fill all tables of a kind; the arguments between ``so_far`` and ``out`` are scratch."""
+def _fill(structure, kind, rule, scratch, out):
+    """Fill all tables of a kind; ``rule`` has the points of a panel and the weights of integrals up to these."""
+    (k, c, h), (time_exponent, _, _, _), (points, _) = structure, kind, rule
+    velocity, basis, pushed, state, sums = scratch
     for level in range(h.size):
         known = 0  # panels for which ``basis`` has been computed; it can be reused if there is one panel
         for b in range(k.size):
@@ -62,10 +62,11 @@ def _fill(
             for panel in range(panels):
                 begin, width = panel / panels, 1.0 / panels
                 if panels > 1 or known != 1:
-                    _fill_basis(nodes, weights, weight_exponent, points, begin, width, basis)
+                    _fill_basis(kind, points, begin, width, basis)
                     known = panels
-                _unit_impulses(k[b], c[b], h[level], time_exponent, points, begin, width, basis, pushed)
-                _move(k[b], c[b], h[level], time_exponent, points, so_far, begin, width, pushed, state, velocity)
+                block = k[b], c[b], h[level], time_exponent
+                _unit_impulses(block, points, begin, width, basis, pushed)
+                _move(block, rule, begin, width, pushed, state, velocity)
                 for q in range(points.shape[1]):
                     sigma = begin + width * points[0, q]
                     measure = points[1, q] * width * h[level] * time_exponent * sigma ** (time_exponent - 1.0)
@@ -89,29 +90,21 @@ def _write(sums, out):
 
 
 @inner
-def _fill_basis(nodes, weights, weight_exponent, points, begin, width, basis):
+def _fill_basis(kind, points, begin, width, basis):
     """Polynomials of plain forces at the points of a panel, and those of the stop that enters times its weight."""
+    _, weight_exponent, nodes, weights = kind
     for q in range(points.shape[1]):
         sigma = begin + width * points[0, q]
         weight = sigma**weight_exponent if weight_exponent > 0.0 else 0.0
-        for kind in range(2):
-            lagrange(nodes, weights[kind], sigma, basis[kind, q])
+        for i in range(2):
+            lagrange(nodes, weights[i], sigma, basis[i, q])
         for j in range(S):
             basis[1, q, j] *= weight
 
 
 @inner
-def _propagated(k, c, x, p, v):
-    """State of a block a time x later, or earlier if x < 0, by the inverse of α I + β A with the determinant
-    e^{-cx}.
-    """
-    alpha, beta = _propagator_of(k, c, x)
-    return alpha * p + beta * v, alpha * v - beta * (k * p + c * v)
-
-
-@inner
 def _propagator_of(k, c, x):
-    """α, β of a time x of any sign."""
+    """α, β of a time x; for x < 0 by the inverse of α I + β A, whose determinant is e^{-cx}."""
     alpha, beta = propagate(k, c, abs(x))
     if x < 0.0:
         grown = math.exp(-c * x)
@@ -120,14 +113,15 @@ def _propagator_of(k, c, x):
 
 
 @inner
-def _unit_impulses(k, c, h, time_exponent, points, begin, width, basis, pushed):
+def _unit_impulses(block, points, begin, width, basis, pushed):
     """Changes of (p, v) by unit forces at the points of a panel, per σ, moved back to the panel's start."""
+    k, c, h, time_exponent = block
     start = h * begin**time_exponent
     for q in range(points.shape[1]):
         sigma = begin + width * points[0, q]
-        p, v = _propagated(
-            k, c, start - h * sigma**time_exponent, 0.0, width * h * time_exponent * sigma ** (time_exponent - 1.0)
-        )
+        alpha, beta = _propagator_of(k, c, start - h * sigma**time_exponent)
+        push = width * h * time_exponent * sigma ** (time_exponent - 1.0)
+        p, v = beta * push, alpha * push - beta * (c * push)
         for kind in range(2):
             for j in range(S):
                 pushed[q, 0, S * kind + j] = basis[kind, q, j] * p
@@ -135,8 +129,9 @@ def _unit_impulses(k, c, h, time_exponent, points, begin, width, basis, pushed):
 
 
 @inner
-def _move(k, c, h, time_exponent, points, so_far, begin, width, pushed, state, velocity):
+def _move(block, rule, begin, width, pushed, state, velocity):
     """Velocities at the points of a panel by variation of constants; ``state`` is moved to its end."""
+    (k, c, h, time_exponent), (points, so_far) = block, rule
     count, start = points.shape[1], h * begin**time_exponent
     for q in range(count + 1):
         end = begin + width * points[0, q] if q < count else begin + width

@@ -123,7 +123,8 @@ def _flight_part(energy_tables: EnergyTables, problem: Problem, tables: Tables, 
     h = tables.flight_step[0] * 2.0 ** (-np.arange(levels) / _OCTAVE)
     signal = tables.signal[..., :n].reshape(*tables.signal.shape[:3], size)
     spacing = energy_tables.spacing
-    last, Y = _last(_doubled_forms(problem, powers, *_halved_steps(problem, spacing))), powers.shape[-1]
+    *_, last = _doubled_forms(problem, powers, *_halved_steps(problem, spacing))
+    Y = powers.shape[-1]
     kept = np.append(np.arange(size, Y), driver)
     b = np.arange(0 if _coupled(tables) else int(tables.own_blocks))
 
@@ -136,10 +137,8 @@ def _flight_part(energy_tables: EnergyTables, problem: Problem, tables: Tables, 
         plain[..., b] = entries_of(forms, Y, n, b) * np.array([1.0, 2.0, 1.0])[:, None]
         return rows, plain, pairs
 
-    groups = [read(forms) for forms in _doubled_forms(problem, powers, h, _OCTAVE, tables.flight_propagator, signal)][
-        ::-1
-    ]
-    steps = [np.concatenate(parts)[: len(tables.flight_step)] for parts in zip(*groups, strict=True)]
+    groups = [read(forms) for forms in _doubled_forms(problem, powers, h, _OCTAVE, tables.flight_propagator, signal)]
+    steps = [np.concatenate(parts)[: len(tables.flight_step)] for parts in zip(*reversed(groups), strict=True)]
     cell = read(carried(last, _ends(size, Y, spacing)))
     rows, plain, pairs = (np.concatenate(both) for both in zip(steps, cell, strict=True))
     return energy_tables._replace(
@@ -197,7 +196,7 @@ def _brief_forms(problem: Problem, powers: Any, h: Any) -> Forms:
     for point, weight in zip(points, weights, strict=True):
         begin = flow_of(all_rows, all_rows, np.sqrt(weight * h)[:, None] * ones, Y)
         generator = flow_of(rows, columns, point * h[:, None] * values, Y)
-        total = total + carried(start, taylor(begin, generator, 12))
+        total = total + carried(start, taylor(begin, generator))
     return total
 
 
@@ -214,10 +213,7 @@ def _doubled_forms(problem: Problem, powers: Any, h: Any, octave: int, propagato
     yield form
     for end in range(len(h), octave, -octave):
         which = slice(end - octave, end)
-        if end > len(propagator):
-            moves = _moves(problem, h[which])
-        else:
-            moves = propagator[which], signal[which]
+        moves = _moves(problem, h[which]) if end > len(propagator) else (propagator[which], signal[which])
         form = form + carried(form, _flow(problem, h[which], *moves))
         yield form
 
@@ -235,12 +231,6 @@ def _halved_steps(problem: Problem, h: float) -> tuple[Any, int, Any, Any]:
     fastest = float((np.sqrt(problem.k) + problem.c).max())
     steps = h * 2.0 ** -np.arange(1 + max(0, math.ceil(math.log2(max(h * fastest, 1e-300) / _BRIEF))))
     return steps, 1, *_moves(problem, steps)
-
-
-def _last(forms: Iterator[Forms]) -> Forms:
-    """The last forms, of the longest step."""
-    *_, last = forms
-    return last
 
 
 def _flow(problem: Problem, h: Any, propagator: Any, signal: Any) -> Forms:

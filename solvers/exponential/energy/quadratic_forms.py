@@ -68,10 +68,10 @@ def entries_of(forms: Forms, size: int, n: int, b: Any) -> Any:
     return np.stack((main[:, b], beside[:, b], main[:, n + b]), axis=1)
 
 
-def taylor(begin: Forms, generator: Forms, terms: int) -> Forms:
-    """``begin`` × exp(``generator``) by ``terms`` terms of its series."""
+def taylor(begin: Forms, generator: Forms) -> Forms:
+    """``begin`` × exp(``generator``) by twelve terms of its series."""
     flow = term = begin
-    for i in range(1, terms):
+    for i in range(1, 12):
         term = (term @ generator) / i
         flow = flow + term
     return flow

@@ -82,11 +82,8 @@ def _panel_points(tables, scratch, node_set, h, begin, width):
     for q in range(S):
         sigma = begin + width * tables.gauss[0, q]
         pace = h * raised(sigma, time_exponent - 1.0)
-        scratch.trial[q], scratch.clipped[q], between[_DT, q] = (
-            sigma,
-            pace * sigma - start,
-            width * time_exponent * pace,
-        )
+        scratch.trial[q], scratch.clipped[q] = sigma, pace * sigma - start
+        between[_DT, q] = width * time_exponent * pace
     sigma = load8(scratch.trial, 0)
     for j in range(S):
         product = splat8(1.0)
@@ -176,18 +173,14 @@ def _add_works(problem, tables, state, scratch, row):
                 )
                 row[account], row[account + 1] = row[account] + friction_work, row[account + 1] + friction_impulse
                 row[account + 2] += slip_distance
-                row[size + 2 + 2 * s] += work
-                row[size + 3 + 2 * s] += impulse
-                continue
-            if is_circle(problem, s):
+            elif is_circle(problem, s):
                 work, impulse = work_within_circle(problem, tables, scratch, s, _DT + 1)
-                row[size + 2 + 2 * s] += work
-                row[size + 3 + 2 * s] += impulse
-                continue
-            combine(scratch.along, problem.read_rate[r], size, None, scratch.trial)
-            impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_DT + 1 + r], 0)
-            row[size + 2 + 2 * s] += sum8(impulses * load8(scratch.trial, 0))
-            row[size + 3 + 2 * s] += sum8(impulses)
+            else:
+                combine(scratch.along, problem.read_rate[r], size, None, scratch.trial)
+                impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_DT + 1 + r], 0)
+                work, impulse = sum8(impulses * load8(scratch.trial, 0)), sum8(impulses)
+            row[size + 2 + 2 * s] += work
+            row[size + 3 + 2 * s] += impulse
 
 
 @merged
