@@ -20,6 +20,7 @@ _ROUGH = 1e-8  # the same with memory if no step is better: rounding decides whe
 _NEARLY = 1e-5  # relative residual below which the next step is expected to be the last
 _MOST_HALVINGS = 6  # of a step that does not reduce the residual
 _MOST_SEGMENTS = 3  # runs of a period to find the segments of laws with memory it begins with
+_ZERO = 1e-12  # of its size, up to which a latched number is 0: laws go by its sign, as smooth hysteresis by that of z
 _DEEPEST = 1e3  # energy of a stop, in units of the motion's, above which a guess is refused: its run would be slow
 
 
@@ -78,7 +79,8 @@ def newton(
         step = _step(chain, unknowns - guess, condition)
         for halving in range(_MOST_HALVINGS if most > 10 else 2):
             wanted = condition is not None or (slope and error < _NEARLY)
-            trial, trial_error = _fire(problem, unknowns + 0.5**halving * step, measure, wanted)
+            moved = _without_rounding(problem, chain, unknowns + 0.5**halving * step)
+            trial, trial_error = _fire(problem, moved, measure, wanted)
             if trial_error < error:
                 break
         else:
@@ -156,6 +158,14 @@ def _fire(problem: PeriodicProblem, unknowns: Array, measure: _Measure, slope: b
     except (SolverError, ValueError, ArithmeticError):
         return None, math.inf
     return chain, error if math.isfinite(error) else math.inf
+
+
+def _without_rounding(problem: PeriodicProblem, chain: Chain, unknowns: Array) -> Array:
+    """The same unknowns, latched numbers that differ from 0 by rounding set to 0 in place."""
+    if chain.coordinates < chain.x.shape[1]:
+        latched = unknowns[:-1].reshape(chain.x.shape)[:, chain.coordinates :]
+        latched[np.abs(latched) <= _ZERO * problem.units(chain)] = 0.0
+    return unknowns
 
 
 def _with_ends(chain: Chain) -> Array:
