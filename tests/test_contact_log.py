@@ -9,7 +9,7 @@ from structures import beam_structure
 
 import fembeam as fb
 import solvers
-from contacts import Hertz, KelvinVoigt
+from contacts import Hertz, KelvinVoigt, WaltonBraun
 from fembeam.response import PlacedLog, site
 from fembeam.results import files, html_page
 
@@ -57,6 +57,16 @@ def test_the_direction_is_the_way_the_place_moves_as_the_gap_closes():
         way = model.phi((one.place, one.direction))[:2]
         moved = -row[:2] @ way  # of δ, per unit of way·way
         assert moved == pytest.approx(way @ way, rel=1e-12)
+
+
+@pytest.mark.parametrize("law", [WaltonBraun(1e5, 4e5), WaltonBraun(1e5, 4e5) + Hertz(1e7)])
+def test_stops_whose_law_opens_have_no_angles(law):
+    """A contact that a border of its law begins and ends is in no circle; its force there is no angle."""
+    wall = solvers.Contact([1.0], law, gap=1e-3)
+    log = solvers.integrate(solvers.System.modal([50.0], [0.01], [wall]), [0.0], [-1.0], 0.2).contacts
+    assert len(log) == 3
+    assert np.all(np.isnan([log.angle_in, log.angle_out]))
+    assert not {"angle_in", "angle_out"} & set(log.named_arrays())
 
 
 def test_by_name_place_and_direction():

@@ -272,6 +272,24 @@ def test_the_last_slip_before_an_opening_is_one(method):
     np.testing.assert_allclose(before, [1.0299075e-3, 3.668486e-5, 2.7209e-13, 2.955e-14], rtol=1e-3)
 
 
+@pytest.mark.parametrize(("mu", "k", "v_t"), [(0.3, (300.0, 60.0), 3.0), (0.5, (400.0, 100.0), 3.0)])
+def test_forces_in_another_unit_give_the_same_bits(mu, k, v_t):
+    """Margins of stick, N, and of slip, m/s, each have their own rounding: slips before an opening stay, none comes."""
+
+    def bounced(unit):
+        law, friction = Hertz(unit * 1e4, 2.0), Friction(mu, unit * 1e3)
+        wall = Contact([-1.0, 0.0], law, map="oblique", tangent=[0.0, 1.0], friction=friction)
+        ball = System(unit * np.eye(2), np.zeros((2, 2)), unit * np.diag(k), [wall])
+        return integrate(ball, [-0.05, 0.0], [2.0, v_t], 1.0)
+
+    here = bounced(1.0)
+    for unit in (2.0**30, 2.0**-30):
+        there = bounced(unit)
+        assert np.array_equal(there.q, here.q)
+        assert np.array_equal(there.transitions.t, here.transitions.t)
+        assert list(there.transitions.event) == list(here.transitions.event)
+
+
 @every_method
 def test_a_start_where_the_law_pulls_is_free_whatever_is_latched(method):
     """N = 4 N - 40 N, cut at zero: a spring that was drawn before holds nothing."""

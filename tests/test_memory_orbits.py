@@ -388,3 +388,15 @@ def test_a_start_of_another_length_is_refused():
     system, period = oscillator(JENKINS, 0.9)
     with pytest.raises(ValueError, match=r"2 finite numbers .* or 4 with what is latched"):
         orbit(system, period, [0.0, 0.0, 0.0])
+
+
+def test_smooth_hysteresis_has_no_marks_of_rounding():
+    """z latched as 0 came back from Newton's method as 1e-20, of either sign, and was met as a border at t = 0."""
+
+    def made(omega):
+        law, load = BoucWen(0.2, 0.1, 1.0, 6.0, 4.0), fb.Harmonic(0.6, omega)
+        return System.modal([1.0], [0.03], [Contact([1.0], law, always=True)], [([1.0], load)]), 2.0 * np.pi / omega
+
+    found = branch(made, (0.69, 0.76), orbit(*made(0.69)), at=0.69).run()
+    assert not found.special
+    assert {tuple(one.transitions.event) for one in found.orbits} == {("reversal", "zero") * 2}

@@ -85,6 +85,23 @@ def test_kernels(numbers, slopes):
     np.testing.assert_array_equal(renewal_slopes(law, -1, d[0], v[0], row), np.hstack((np.zeros((3, 2)), same)))
 
 
+def spring_back(delta, delta_dot, peak, stiffness):
+    """F = stiffness δ³/peak²."""
+    return stiffness * delta**3 / peak**2
+
+
+@pytest.mark.parametrize("size", [1.0, 1e-3, 1e-6])
+def test_derivatives_of_any_size_of_motion(size):
+    """Steps of differences go with the reach: those for millimetres were 1 % of a peak of 100 nm."""
+    law = memory_law("foam", {"unload": Segment(spring_back)}, {"peak": 1e-4 * size}, reach=1e-3 * size)(stiffness=2e4)
+    d = [0.8e-4 * size, 0.3e-4 * size]
+    by_delta, by_peak = np.array([3.0, -2.0])[:, None] * 2e4 * np.array([0.8, 0.3]) ** [[2], [3]]
+    np.testing.assert_allclose(asked(law, "gradient", 3, d, [0.0, 0.0], law.parameters)[0], by_delta, rtol=1e-8)
+    np.testing.assert_allclose(
+        asked(law, "memory_gradient_address", 2, d, [0.0, 0.0], law.parameters)[1], by_peak, rtol=1e-8
+    )
+
+
 def test_it_travels_and_tells_of_itself():
     assert pickle.loads(pickle.dumps(OWN)) == OWN
     assert "friction: stick: F = stiffness (δ - s).; slip: drag" in OWN.describe()

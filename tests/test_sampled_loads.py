@@ -136,6 +136,18 @@ def test_sampled_loads_together_move_as_the_sum_of_each_alone():
 # --- kinks --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(("omega", "phase"), [(2.86, [3.07, 5.86, 0.49]), (1.13, [5.68, 1.14, 1.08])])
+def test_a_stop_at_rest_on_its_surface_beside_one_that_is_pressed(omega, phase):
+    """Tones give its rate a rounding into the stop, and no time is left to its surface: such runs did not end."""
+    tones = fb.Multisine([1.0, 1.0, 1.0], omega * np.array([1.0, 1.7, 2.3]), phase)
+    stops = [Contact([1.0], Hertz(1e3)), Contact([1.0], Hertz(1e3), gap=-0.1)]
+    system = System.modal([2.0], [0.01], stops, [([1.0], tones), ([1.0], fb.Step(0.1, 0.5, 0.3))])
+    here, there = (
+        integrate(system, [0.0], [0.0], 0.5, method=method(1e-10)) for method in (Exponential, DormandPrince)
+    )
+    np.testing.assert_allclose([here.q, here.q_dot], [there.q, there.q_dot], rtol=1e-7)
+
+
 @pytest.mark.parametrize("place", [0.1, 1e-3, 1e-6, 0.0])
 def test_an_entry_just_before_a_kink(place):
     """Under a constant load of 1 N, q = 1 - cos t reaches the stop; a part of a cell later the load has a kink."""

@@ -142,7 +142,7 @@ class CustomMemoryLaw(Law):
 
     def memory_kernel(self, name: str) -> Any:
         """Borders, renewals and their derivatives."""
-        return compiled(self.pieces, len(self.latched), 1 + len(self.latched) + len(self.values), name)
+        return compiled(self.pieces, len(self.latched), 1 + len(self.latched) + len(self.values), self.reach, name)
 
     def border_name(self, border: int, parameters: NDArray[np.float64]) -> str:
         """The border's function and its segment."""
@@ -174,7 +174,8 @@ def memory_law(
     name : to show.
     segments : `Segment` by name; a run begins in the first.
     latched : start value of every latched number by name, in the order of the arguments.
-    reach : m, > 0; binding leads the law through slow cycles of 1 %, 10 % and 100 % of it, to find mistakes.
+    reach : m, > 0, of the motion it is for; binding leads the law through slow cycles of 1 %, 10 % and 100 % of it, to
+        find mistakes. Differences for derivatives suit motions down to 1e-3 of it.
     jumps : say True if the force jumps at a border.
     opens : say True if the first segment is that of an open stop: no force, and the law is for δ > 0 only.
 

@@ -15,31 +15,34 @@ import numpy as np
 from contacts.custom_kernels import Function, batch_of, gradient_batch, inner, kept, or_say_where
 
 Pieces = tuple[tuple[Function, Function | None, tuple[tuple[Function, Function | None, int], ...]], ...]
-LEAST = 1e-11, 1e-8, 1e-9  # steps of differences at zero: δ in m, its rate in m/s, a latched number of any unit
+LEAST = 1e-8, 1e-5, 1e-6  # steps of differences at zero, in units of a law's reach: of δ, its rate, a latched number
 RELATIVE = 1e-5
 
 
 @lru_cache(maxsize=256)
-def compiled(pieces: Pieces, latched: int, count: int, name: str) -> Any:
+def compiled(pieces: Pieces, latched: int, count: int, reach: float, name: str) -> Any:
     """One kernel of segments (force, slopes, borders (value, renewal, next)) with ``count`` numbers in a row."""
-    signature, function = _kernels(pieces, latched, count)[name]
+    signature, function = _kernels(pieces, latched, count, reach)[name]
     return or_say_where(lambda: kept(signature, function), pieces[0][0], "law with memory")
 
 
 @lru_cache(maxsize=256)
-def _kernels(pieces: Pieces, latched: int, count: int) -> dict[str, tuple[Any, Function]]:
+def _kernels(pieces: Pieces, latched: int, count: int, reach: float) -> dict[str, tuple[Any, Function]]:
     """Signature and function of every kernel by name; nothing is compiled yet."""
     from contacts.kernels import GRADIENT, SIGNATURE
     from contacts.sum_kernels import RENEW, RENEW_GRADIENT
 
     scalar, several = cache(inner), 2 + latched  # what serves several segments is compiled once
+    least = tuple(part * reach for part in LEAST)
     width = max(1, *(len(borders) for *_, borders in pieces))
     padded = [border for *_, borders in pieces for border in (*borders, *[None] * width)[:width]]
     force = _chosen([_read(scalar(f)) for f, *_ in pieces])
-    slopes = [_written(scalar(s), several) if s else _written_slopes(scalar(f), several, count) for f, s, _ in pieces]
+    slopes = [
+        _written(scalar(s), several) if s else _written_slopes(scalar(f), several, count, least) for f, s, _ in pieces
+    ]
     value = _chosen([_read(scalar(b[0])) if b else _nowhere() for b in padded])
     renewals = [_written(scalar(b[1]), latched) if b and b[1] else _kept(latched) for b in padded]
-    renewal_slopes = _chosen([_jacobian(f, latched, several, count) for f in renewals])
+    renewal_slopes = _chosen([_jacobian(f, latched, several, count, least) for f in renewals])
     following = tuple(float(b[2]) if b else 0.0 for b in padded)
     forces, by_point, by_memory, borders = _points(force, _chosen(slopes), value, latched, width)
     return {
@@ -133,7 +136,7 @@ def _written(function: Function, count: int) -> Function:
 
 
 @lru_cache(maxsize=256)
-def _jacobian(write: Function, rows: int, columns: int, count: int) -> Function:
+def _jacobian(write: Function, rows: int, columns: int, count: int, least: tuple[float, ...]) -> Function:
     """Derivatives of what `write` writes by its first arguments, (rows, columns), by central differences."""
     from numba.np.unsafe.ndarray import to_fixed_tuple
 
@@ -143,7 +146,7 @@ def _jacobian(write: Function, rows: int, columns: int, count: int) -> Function:
         at, ends = np.array(given), np.empty((2, rows))
         for c in range(columns):
             x = at[c]
-            h = RELATIVE * abs(x) + LEAST[min(c, 2)]
+            h = RELATIVE * abs(x) + least[min(c, 2)]
             for side in range(2):
                 at[c] = x + (2 * side - 1) * h
                 write(ends[side], to_fixed_tuple(at, size))
@@ -155,9 +158,9 @@ def _jacobian(write: Function, rows: int, columns: int, count: int) -> Function:
 
 
 @lru_cache(maxsize=256)
-def _written_slopes(force: Function, columns: int, count: int) -> Function:
+def _written_slopes(force: Function, columns: int, count: int, least: tuple[float, ...]) -> Function:
     """Derivatives of a force by differences, written like given ones."""
-    jacobian = _jacobian(_written(force, 1), 1, columns, count)
+    jacobian = _jacobian(_written(force, 1), 1, columns, count, least)
 
     def slopes(out, given):  # type: ignore[no-untyped-def]
         jacobian(out.reshape((1, columns)), given)

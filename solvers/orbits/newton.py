@@ -56,13 +56,17 @@ def newton(
         step = _step(chain, unknowns - guess, row)
         for halving in range(_MOST_HALVINGS if most > 10 else 2):
             wanted = row is not None or (slope and error < _NEARLY)
-            trial, trial_error = _fire(problem, unknowns + 0.5**halving * step, measure, wanted)
+            moved = _with_zeros(problem, chain, unknowns + 0.5**halving * step)
+            trial, trial_error = _fire(problem, moved, measure, wanted)
             if trial_error < error:
                 break
         else:
             break
         unknowns, chain, error = np.append(trial.x.ravel(), unknowns[-1] + 0.5**halving * step[-1]), trial, trial_error
         history.append(error)
+    if error <= TOLERANCE:
+        chain, error = _with_exact_zeros(problem, chain, error, measure)
+        unknowns = np.append(chain.x.ravel(), unknowns[-1])
     enough = _ROUGH if chain is not None and chain.coordinates < x.shape[1] else TOLERANCE
     if error <= enough and slope and not chain.has_slope:
         chain, error = _fire(problem, unknowns, measure, True)
@@ -134,6 +138,29 @@ def _fire(problem: PeriodicProblem, unknowns: Array, measure: _Measure, slope: b
     except (SolverError, ValueError, ArithmeticError):
         return None, math.inf
     return chain, error if math.isfinite(error) else math.inf
+
+
+def _with_zeros(problem: PeriodicProblem, chain: Chain, unknowns: Array) -> Array:
+    """The same unknowns, with 0 for latched numbers that are 0 to the tolerance, like those the shots before end with.
+
+    Laws go by their sign, as smooth hysteresis by that of z, and Newton's steps leave rounding there.
+    """
+    exact, first = unknowns.copy(), chain.coordinates
+    if first < chain.x.shape[1]:
+        latched, least = exact[:-1].reshape(chain.x.shape)[:, first:], TOLERANCE * problem.units(chain)
+        ends = np.array([np.concatenate(solution.memory) for solution in chain.solutions])
+        latched[(np.abs(latched) <= least) & (np.abs(np.roll(ends, 1, axis=0)) <= least)] = 0.0
+    return exact
+
+
+def _with_exact_zeros(problem: PeriodicProblem, chain: Chain, error: float, measure: _Measure) -> tuple[Any, float]:
+    """A chain that has converged, run again with such numbers 0 where they are not, and its relative residual."""
+    unknowns = np.append(chain.x.ravel(), chain.parameter)
+    exact = _with_zeros(problem, chain, unknowns)
+    if np.array_equal(exact, unknowns):
+        return chain, error
+    again, its_error = _fire(problem, exact, measure, chain.has_slope)
+    return (again, its_error) if its_error <= TOLERANCE else (chain, error)
 
 
 def _with_ends(chain: Chain) -> Array:

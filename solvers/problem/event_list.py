@@ -31,6 +31,11 @@ def begins_of(rows: Array) -> Array:
     return rows[(rows[:, FROM] == 0.0) & (rows[:, TO] > 0.0)]
 
 
+def angles_of(rows: Array) -> Array:
+    """Angles in a circular clearance at begins and ends, rad; NaN also where a border of a law gives its force."""
+    return np.where(rows[:, GUARD] < 0.0, rows[:, FORCE], np.nan)
+
+
 def paired(begins: Array, ends: Array) -> tuple[Array, Array]:
     """The begin of the contact that each end ends, beside the ends; an element begins and ends in turn."""
     first = np.empty_like(ends)

@@ -125,8 +125,8 @@ class ContactLog(Columns):
             impulse=ends[:, at.IMPULSE] - first[:, at.IMPULSE],
             energy_loss=ends[:, at.WORK] - first[:, at.WORK],
             entry_rate_clipped=first[:, at.CLIPPED].astype(bool),
-            angle_in=first[:, at.FORCE].copy(),
-            angle_out=ends[:, at.FORCE].copy(),
+            angle_in=at.angles_of(first),
+            angle_out=at.angles_of(ends),
             names=tuple(names),
         )
 

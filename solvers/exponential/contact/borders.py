@@ -33,11 +33,13 @@ from solvers.compiled.renewals import count_event, margins, margins_before, marg
 from solvers.compiled.sliding import DELTA, RATE
 from solvers.compiled.state import AT_ONCE, LAST_EVENT, T, rate_tolerance
 from solvers.exponential.contact.crossings import extremum
+from solvers.exponential.contact.first_step import UNKNOWN
 from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, motion_of, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL, S, lagrange
 from solvers.exponential.contact.peaks import maximum_and_place, motion_around
 from solvers.exponential.contact.slider_margins import (
     ENDS,
+    margin_rounding,
     slider_margins_around,
     slider_margins_at_nodes,
     slider_margins_in,
@@ -356,6 +358,27 @@ def _may_dip(problem, state, scratch, s, landed, w, x):
     return False
 
 
+@merged
+def _estimate_rounding(problem, state, scratch, s, x, begin, end):
+    """Largest margins of an element and their rounding over a landing to x, where no step of its segment has told."""
+    count, deltas, rates = problem.border_count[s], scratch.local_motion[KNOWN, :3], scratch.local_motion[KNOWN, 3:6]
+    if not rubs(problem, s):
+        delta, rate = indentation_and_rate(problem, s, x)
+        for i in range(3):
+            deltas[i], rates[i] = delta, rate
+        deltas[1] += surface_tolerance(problem, s, x)
+        rates[2] += max(rate_tolerance(problem, s, x), _REST * scratch.reference_speed[s])
+        margins(problem, state, s, 3, deltas, rates, scratch.ends)
+    for j in range(count):
+        if rubs(problem, s):
+            rounding = margin_rounding(problem, state, s, j, x[state.x.size], x)
+        else:
+            there = scratch.ends[3 * j : 3 * j + 3]
+            rounding = abs(there[1] - there[0]) + abs(there[2] - there[0])
+        scratch.largest[s, j] = max(abs(begin[j]), abs(end[j]))
+        scratch.noise[s, j] = max(_ROUNDING * scratch.largest[s, j], 2.0 * rounding)
+
+
 @part(PASSED, types.UniTuple(types.int64, 2), types.int64, types.int64, VECTOR, VECTOR)
 def passed(problem, state, scratch, element, border, w, x):
     """(element, border) of the margin that is furthest below zero in x, relative to its value in w, or (-1, -1).
@@ -373,6 +396,8 @@ def passed(problem, state, scratch, element, border, w, x):
         if s != element or border < 0:
             margins_of(problem, state, scratch, s, w[size], w, begin)
             margins_of(problem, state, scratch, s, x[size], x, end)
+            if scratch.noise[s, 0] == UNKNOWN:
+                _estimate_rounding(problem, state, scratch, s, x, begin, end)
         close = False
         for j in range(count):
             if s == element and j == border:
@@ -395,12 +420,20 @@ def _update_rate(problem, state, scratch, s):
         rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, state.rate, scratch.trial)
 
 
+@inlined
+def _forget_rounding(problem, scratch, s):
+    """The margins of a segment that begins have another rounding, and perhaps another unit."""
+    for j in range(problem.border_count[s]):
+        scratch.noise[s, j] = UNKNOWN
+
+
 @inner
 def renew_border(problem, state, scratch, element, border):
     """Latch in the present state what one border of an element asks for."""
     delta, rate = indentation_and_rate(problem, element, state.x)
     _update_rate(problem, state, scratch, element)
     renew(problem, state, element, border, delta, rate)
+    _forget_rounding(problem, scratch, element)
     count_event(state)
 
 
@@ -422,6 +455,7 @@ def renew_all(problem, state, scratch, element, border):
         _update_rate(problem, state, scratch, s)
         if s == element and count == 1:
             renew(problem, state, s, border, delta, rate)
+            _forget_rounding(problem, scratch, s)
             continue
         begun, just_before, margin = scratch.margin_begin[s], scratch.margin_before, scratch.margin_end[s]
         if s != element:  # that of the element itself is still needed
@@ -437,6 +471,7 @@ def renew_all(problem, state, scratch, element, border):
         for j in range(count):
             if scratch.fired[j] >= margin[j]:
                 renew(problem, state, s, j, delta, rate)
+                _forget_rounding(problem, scratch, s)
                 if not rubs(problem, s):
                     margins_of(problem, state, scratch, s, state.now[T], x, margin)
     count_event(state)

@@ -31,6 +31,7 @@ from solvers.exponential.tables import EXPONENT, STIFFNESS
 LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN, BALANCED = range(7)
 """Places in Scratch.control: level and node set of the last step; kind of the next one, see below; stop that entered
 last; level of the next step; 1 once the run has begun; 1 if it keeps the energy balance."""
+UNKNOWN = -1.0  # in Scratch.noise, of an element whose segment has just begun: its margins may have another unit
 ENTRY, SEGMENT = 1, 2  # values of NEW: first step of a contact, or of a segment of its law; 0: any other step
 _LEAST_SPEED = 1e-60  # m/s: lower bound of a reference speed, and of the speed of an impact
 _PRESSED_SHARE = 1e-3  # of `pressed_speed` as a reference speed: a stop at rest under a force moves by rounding
@@ -57,6 +58,8 @@ def begin_steps(problem, tables, state, scratch, stop):
                 reached = math.hypot(reached, 0.1 * second)
             pressed = _PRESSED_SHARE * pressed_speed(problem, tables, state, s, scratch.trial)
             scratch.reference_speed[s] = max(speed, reached, pressed, _LEAST_SPEED)
+        for j in range(problem.border_count[s] if s == stop or not in_contact_before else 0):
+            scratch.noise[s, j] = UNKNOWN
         others |= in_contact_before
     control[NODE_SET], control[NEW] = 0, SEGMENT
     if state.segment[stop] > 0 and state.active[stop, T_IN] == state.now[T]:

@@ -50,7 +50,7 @@ from solvers.compiled.kernels import (
     surface_tolerance,
 )
 from solvers.compiled.parts import PASSED
-from solvers.compiled.sliding import WITHIN_ROUNDING, XI, XI_RATE, slider_force, xi_tolerances
+from solvers.compiled.sliding import WITHIN_ROUNDING, XI, XI_RATE, slider_force
 from solvers.compiled.state import (
     CALLS,
     LANDING,
@@ -81,6 +81,7 @@ from solvers.exponential.contact.node_response import (
     own_accelerance,
 )
 from solvers.exponential.contact.peaks import state_peaks
+from solvers.exponential.contact.slider_margins import margin_rounding
 from solvers.problem.friction import CODE, FREE, MU, PEAK, SLIDES, STIFFNESS
 
 OPENED = 2  # place in `Scratch.landed`: 1 + stop whose opening the step in ``scratch.stages`` ends at, or 0
@@ -585,7 +586,7 @@ def _guess_before_opening(problem, tables, state, scratch, stop, border, guess, 
     begin, _ = _event_function(problem, tables, state, scratch, stop, border, w, 0.0, margins)
     force = slider[STIFFNESS] * spring_stretch(radius, slider, scratch.point[1, XI]) if sticks > 0.0 else 0.0
     largest = max(abs(begin), largest)
-    rounding = slider[STIFFNESS] * xi_tolerances(problem, stop, state.now[T], state.x)[0]
+    rounding = margin_rounding(problem, state, stop, border, state.now[T], state.x)
     scratch.largest[stop, border], scratch.noise[stop, border] = largest, max(_ROUNDING * largest, 2.0 * rounding)
     if end < 0.0 and border == SLIDES and slider[CODE] != FREE:
         coefficients = _margin_before_opening(problem, scratch, stop, kappa, sign, begin, end, force)

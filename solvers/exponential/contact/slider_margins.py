@@ -14,6 +14,7 @@ from solvers.compiled.friction import friction_force
 from solvers.compiled.kernels import (
     VECTOR,
     copy,
+    indentation_and_rate,
     inlined,
     inner,
     merged,
@@ -33,10 +34,12 @@ from solvers.compiled.sliding import (
     RATE,
     motion_without_accelerations,
     move_point,
+    normal_force,
     normal_forces,
     normal_slopes,
     point_of,
     slider_margins,
+    slopes_of,
     xi_tolerances,
 )
 from solvers.compiled.state import T, rate_tolerance
@@ -71,6 +74,20 @@ _ON_BEND = 1e-9  # δ̇, in units of the reference speed, that a landing on a be
 def _slips(slider):
     """Whether a slider slips."""
     return abs(slider[CODE]) == 1.0
+
+
+@inner
+def margin_rounding(problem, state, s, j, t, x):
+    """Rounding of margin j of a slider in the state x by that of ξ, ξ̇, δ and δ̇: m/s of its own in slip, else N."""
+    slider, (of_way, of_rate) = slider_of(problem, s), xi_tolerances(problem, s, t, x)
+    if j == SLIDES and _slips(slider):
+        return of_rate
+    delta, rate = indentation_and_rate(problem, s, x)
+    least = surface_tolerance(problem, s, x)
+    normal_force(problem, s, state.segment[s], state.entry_rate[s], max(delta, least), rate)
+    by_delta, by_rate, _ = slopes_of(problem, s, state.entry_rate[s])
+    of_normal = abs(by_delta) * least + abs(by_rate) * rate_tolerance(problem, s, x)
+    return of_normal if slider[CODE] != 0.0 else slider[MU] * of_normal + slider[STIFFNESS] * of_way
 
 
 @inlined

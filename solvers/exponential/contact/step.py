@@ -305,9 +305,10 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
     node_set = control[NODE_SET] if control[NEW] else 0
     longest, wanted = 0.8 * time_to_border, control[NEXT_LEVEL]
     if problem.table_dt.size:
-        longest = min(longest, longest_under_signals(problem, tables, state, scratch, wanted))
-        if longest == 0.0:
+        allowed = longest_under_signals(problem, tables, state, scratch, wanted)
+        if allowed == 0.0:
             return RUNNING
+        longest = min(longest, allowed)  # 0 beside a surface that is left or entered at rest
     level = level_of(tables, longest) if longest < tables.contact_step[wanted] else wanted
     copy(scratch.side, scratch.side_at_begin, scratch.side.size)
     while True:
