@@ -85,7 +85,7 @@ from solvers.exponential.contact.slider_margins import margin_rounding
 from solvers.problem.friction import CODE, FREE, MU, PEAK, SLIDES, STIFFNESS
 
 OPENED = 2  # place in `Scratch.landed`: 1 + stop whose opening the step in ``scratch.stages`` ends at, or 0
-LAST_RESORT = 3  # the same: 1 where a step across the border would be the shortest one, else 0
+LAST_RESORT = 3  # the same: 1 where no step could end before the border, nor the landing last longer than one
 _MOST_TRIALS = 8  # iterations for the step that ends at an output time
 _MIDPOINT_UP_TO = 1e-4  # change of a landing's length, relative, that the midpoint rule makes: its error is the cube
 _CLASSICAL_UP_TO = 4e-3  # the same by the classical rule, of order 4

@@ -20,6 +20,7 @@ from solvers.compiled.kernels import (
     indentation_and_rate,
     indentation_rate,
     inlined,
+    inner,
     is_circle,
     is_planar,
     merged,
@@ -77,6 +78,7 @@ from solvers.exponential.energy.contact_balance import account_contact
 _ERROR_GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
 _CROSSING_KNOWN = 8  # levels, √2 each, shorter at once: a step not resolved yet may see a crossing near its start
+NEITHER, MOVES_OUT, RESTS = range(3)  # what `_on_border` finds
 _ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # ratio of the errors of two steps whose lengths differ by √2, one level
 
 
@@ -122,12 +124,22 @@ def _nearest_surface(problem, state, scratch):
     return first, stop, direction
 
 
-@inlined
-def _rests_there(problem, state, scratch, stop, time_to_border):
-    """Whether a stop is on a border that it reaches in a given time at a rate that is rounding: it need not land."""
-    rate = abs(scratch.start_motion[stop, 1])
-    near = stop >= 0 and abs(time_to_border) * rate <= OUTSIDE * surface_tolerance(problem, stop, state.x)
-    return near and rate <= rate_tolerance(problem, stop, state.x)
+@inner
+def _on_border(problem, tables, state, scratch, stop, time_to_border):
+    """What is so near a border that no step can end before it: `MOVES_OUT` if it was switched, `RESTS`, or neither.
+
+    One that is within rounding of the border at a rate that is rounding rests there and need not land. Otherwise a
+    landing of any error is allowed, unless it may last longer than the shortest step: by the rounding of δ at the rate.
+    """
+    if switch_on_surface(problem, state, True):
+        return MOVES_OUT
+    if not time_to_border < tables.contact_step[tables.contact_step.size - 1]:
+        return NEITHER
+    rate, rounding = abs(scratch.start_motion[stop, 1]), surface_tolerance(problem, stop, state.x)
+    if abs(time_to_border) * rate <= OUTSIDE * rounding and rate <= rate_tolerance(problem, stop, state.x):
+        return RESTS
+    scratch.landed[LAST_RESORT] = rounding <= tables.contact_step[tables.contact_step.size - 1] * rate
+    return NEITHER
 
 
 @merged
@@ -229,14 +241,7 @@ def _continue_after(problem, tables, state, scratch, stop, level, alone):
 
 @merged
 def _try_nearest(problem, tables, state, scratch, stop, direction, time_to_border):
-    """Land on the border reached first if that is worth a trial; returns whether it was done.
-
-    Within the shortest step a landing of any error is taken, unless it may last longer: by the rounding of δ at a rate.
-    """
-    last_resort, shortest = 0, tables.contact_step[tables.contact_step.size - 1]
-    if time_to_border < shortest:
-        last_resort = surface_tolerance(problem, stop, state.x) <= shortest * abs(scratch.start_motion[stop, 1])
-    scratch.landed[LAST_RESORT] = last_resort
+    """Land on the border reached first if that is worth a trial; returns whether it was done."""
     worth = stop >= 0 and may_land(problem, tables, state, scratch, stop, direction, time_to_border)
     return worth and _try_landing(problem, tables, state, scratch, stop, direction, time_to_border)
 
@@ -288,12 +293,14 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
     """One accepted step in contact, a landing if a border is near, else by collocation; returns a status code."""
     control, shortest = scratch.control, tables.contact_step.size - 1
     time_to_border, stop, direction = _nearest_surface(problem, state, scratch)
+    scratch.landed[LAST_RESORT] = 0
     if time_to_border < tables.contact_step[shortest] or control[NEXT_LEVEL] == shortest:
-        if switch_on_surface(problem, state, True):
+        found = _on_border(problem, tables, state, scratch, stop, time_to_border)
+        if found == MOVES_OUT:
             if in_contact(state):
                 begin_steps(problem, tables, state, scratch, latest_entered(state))
             return RUNNING
-        if _rests_there(problem, state, scratch, stop, time_to_border):
+        if found == RESTS:
             time_to_border, stop, direction = np.inf, -1, 0
     if control[NEW] == ENTRY and problem.parts[PRESSED] and _switch_pressed(problem, state):
         begin_steps(problem, tables, state, scratch, latest_entered(state))
