@@ -297,14 +297,13 @@ def _exit_direction(problem, state, s, locates):
     """
     delta, delta_dot = indentation_and_rate(problem, s, state.x)
     tolerance, segment = surface_tolerance(problem, s, state.x) if locates else 0.0, state.segment[s]
-    direction = 0
-    if delta >= problem.knots[s, segment] - tolerance and delta_dot > 0.0:
-        direction = 1
-    elif segment > 0 and delta <= problem.knots[s, segment - 1] + tolerance:
-        if locates and segment == 1 and delta < problem.knots[s, 0] - OUTSIDE * tolerance:
-            return -1
-        direction = -1 if delta_dot < 0.0 else 0
-    return direction if direction == 0 or abs(delta_dot) > rate_tolerance(problem, s, state.x) else 0
+    above = delta >= problem.knots[s, segment] - tolerance and delta_dot > 0.0
+    if not (above or (segment > 0 and delta <= problem.knots[s, segment - 1] + tolerance)):
+        return 0
+    if abs(delta_dot) <= rate_tolerance(problem, s, state.x):
+        drifted = locates and segment == 1 and delta < problem.knots[s, 0] - OUTSIDE * tolerance
+        return -1 if drifted else 0
+    return 1 if above else -1 if delta_dot < 0.0 else 0
 
 
 @inlined
