@@ -31,7 +31,7 @@ from solvers.compiled.kernels import (
 from solvers.compiled.parts import PASSED, part
 from solvers.compiled.renewals import count_event, margins, margins_before, margins_in, renew
 from solvers.compiled.sliding import DELTA, RATE
-from solvers.compiled.state import AT_ONCE, LAST_EVENT, T, rate_tolerance
+from solvers.compiled.state import AT_ONCE, LAST_EVENT, PEAK_FORCE, T, rate_tolerance
 from solvers.exponential.contact.crossings import extremum
 from solvers.exponential.contact.first_step import UNKNOWN
 from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, motion_of, rate_ripple_of, ripple_of
@@ -45,7 +45,7 @@ from solvers.exponential.contact.slider_margins import (
     slider_margins_in,
     slider_margins_on_step,
 )
-from solvers.problem.friction import CODE, PRESSES, STICK
+from solvers.problem.friction import CODE, FREE, PRESSES, STICK
 
 UNRESOLVED = -2  # in place of an element: the step is too long to tell whether a border is crossed
 _ON_BORDER = 1e-9  # margin, in units of its largest on the step, up to which the step counts as begun on the border
@@ -360,7 +360,10 @@ def _may_dip(problem, state, scratch, s, landed, w, x):
 
 @merged
 def _estimate_rounding(problem, state, scratch, s, x, begin, end):
-    """Largest margins of an element and their rounding over a landing to x, where no step of its segment has told."""
+    """Largest margins of an element and their rounding over a landing to x, where no step of its segment has told.
+
+    N has the rounding of its peak, too: that it is zero may have been told by it in the segment before.
+    """
     count, deltas, rates = problem.border_count[s], scratch.local_motion[KNOWN, :3], scratch.local_motion[KNOWN, 3:6]
     if not rubs(problem, s):
         delta, rate = indentation_and_rate(problem, s, x)
@@ -370,13 +373,16 @@ def _estimate_rounding(problem, state, scratch, s, x, begin, end):
         rates[2] += max(rate_tolerance(problem, s, x), _REST * scratch.reference_speed[s])
         margins(problem, state, s, 3, deltas, rates, scratch.ends)
     for j in range(count):
+        peak = 0.0
         if rubs(problem, s):
             rounding = margin_rounding(problem, state, s, j, x[state.x.size], x)
+            if j == PRESSES or slider_of(problem, s)[CODE] == FREE:
+                peak = state.active[s, PEAK_FORCE]
         else:
             there = scratch.ends[3 * j : 3 * j + 3]
             rounding = abs(there[1] - there[0]) + abs(there[2] - there[0])
         scratch.largest[s, j] = max(abs(begin[j]), abs(end[j]))
-        scratch.noise[s, j] = max(_ROUNDING * scratch.largest[s, j], 2.0 * rounding)
+        scratch.noise[s, j] = max(_ROUNDING * max(scratch.largest[s, j], peak), 2.0 * rounding)
 
 
 @part(PASSED, types.UniTuple(types.int64, 2), types.int64, types.int64, VECTOR, VECTOR)
