@@ -239,10 +239,9 @@ class ModalEquations:
         """What every run keeps of its scene and contacts, by the name of its attribute; the arrays are read-only."""
         rows = self.contact_rows
         along = [one.z if is_finite(one.z) and one.direction is None else np.nan for one in rows]
+        stops = [(z, one.push, one.gap) for z, one in zip(along, rows, strict=True)]
         found: dict[str, Any] = {
-            "stops": np.array([(z, one.push, one.gap) for z, one in zip(along, rows, strict=True)], float).reshape(
-                -1, 3
-            ),
+            "stops": np.array(stops, dtype=float).reshape(-1, 3),
             "on": np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
             "kinds": np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
             "circles": np.array([one.circle for one in rows], dtype=float).reshape(-1, 3),

@@ -127,7 +127,7 @@ def unbalanced(record: Record, rtol: float) -> bool:
     motion = np.concatenate(((record.back @ record.begin)[None], record.motion.take(rows, axis=0)))
     stored = system.energy(motion[:, : system.size], motion[:, system.size :])
     works = record.works.take(rows, axis=0)
-    left, handled = stored[1:] - stored[0] - works @ _signs(works.shape[1]), stored[0] + stored[1:].max()
+    left, handled = stored[1:] - stored[0] - works @ _signs(works.shape[1]), stored[0] + np.abs(stored[1:]).max()
     if record.rubbed is not None:
         friction, spin = (part[rows] for part in record.works_of_friction)
         left, handled = left + friction - spin, handled + np.abs(friction).max() + np.abs(spin).max()
