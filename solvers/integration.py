@@ -65,8 +65,11 @@ class Engine(Protocol):
     def state(self) -> State:
         """What has been reached, and the outputs."""
 
+    def sample(self, times: Array | None) -> None:
+        """Make room for outputs at times; None if the end alone is kept."""
+
     def record(self, **arrays: Array) -> None:
-        """Replace arrays of the state that outputs go to: ``log``, ``out``, ``due``, ``event_record``."""
+        """Replace arrays of the state that outputs go to: ``log``, ``event_record``."""
 
     def start(self) -> None:
         """What is to be done once before the first step."""
@@ -226,10 +229,7 @@ class _Run:
 
     def __init__(self, system: System, engine: Engine, times: Array | None, tangent: Any) -> None:
         self.system, self.engine, self.times = system, engine, times
-        if times is not None:
-            due = np.full(len(times) + 1, math.inf)
-            np.minimum(times, engine.duration, out=due[:-1])
-            engine.record(out=np.empty((len(times), self.state.x.size)), due=due)
+        engine.sample(times)
         self.tangent: Any = None
         self.parameter: Any = tangent if isinstance(tangent, Parameter) else None
         if tangent:
@@ -312,7 +312,7 @@ class _Run:
             t, motion, accounts = state.now[T : T + 1].copy(), engine.back.dot(last[:size])[None], last[None, size:]
         else:
             x = state.out[: self._sampled(status)]
-            t, motion = self.times[: len(x)], product(x[:, :size], engine.back.T)
+            t, motion = self.times[: len(x)].copy(), product(x[:, :size], engine.back.T)
             accounts = x[:, size:].copy()  # so that all the samples can be let go
         record = Record(
             self.system, engine.back, self.initial, self.latched, last, self.memory, t, motion, accounts,

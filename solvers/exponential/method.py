@@ -171,6 +171,9 @@ class Exponential:
         return Engine(self, system, z, prepared, duration)
 
 
+_KEPT = 100_000  # numbers of outputs for which a workspace keeps the room
+
+
 def _spacing(due: Array) -> float:
     """Time between two outputs, s."""
     return float(due[1] - due[0]) if len(due) > 2 else 1.0
@@ -205,14 +208,19 @@ class Engine:
         """The state reached."""
         return self.workspace.state
 
+    def sample(self, times: Array | None) -> None:
+        """Make room for outputs at times; None if the end alone is kept."""
+        self.workspace.sample(times, self.duration)
+
     def record(self, **arrays: Array) -> None:
-        """Replace arrays of the state that outputs go to: ``log``, ``out``, ``due``, ``event_record``."""
+        """Replace arrays of the state that outputs go to: ``log``, ``event_record``."""
         self.workspace.replace(**arrays)
 
     def release(self) -> None:
         """Leave the workspace to another run; this run's state must not be read any more."""
         if not self.workspace.state.event_record.size:
-            self.workspace.forget_outputs()
+            if self.workspace.state.out.size > _KEPT:
+                self.workspace.sample(None, self.duration)
             self.prepared.spare_workspaces.append(self.workspace)
 
     def start(self) -> None:

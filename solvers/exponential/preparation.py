@@ -36,6 +36,7 @@ from solvers.exponential.steady_response import steady_response, without_resonan
 from solvers.exponential.tables import TONE_TABLES, Tables, build, doublings, fill_tones, law_tables_of
 from solvers.problem import Array, Contact, Forcing, Memo, System, dense, on_one_grid
 from solvers.problem.friction import ACCOUNTS
+from solvers.problem.run_arguments import output_arrays
 
 TABLES, SCRATCH = packed_type(Tables), packed_type(Scratch)
 _KNOWN = "energy", "accuracy"  # arrays of the scratch that Python reads or writes
@@ -62,6 +63,7 @@ class Workspace:
         n = rest.size // 2
         self.p, self.v = self.state.x[:blocks], self.state.x[n : n + blocks]  # of the structure's own blocks
         self.replace(log=new_log(len(self.state.segment)))
+        self.times: Array | None = None  # of the outputs there is room for
         self.first = self.state, self.block[layout.size :].copy()  # and the addresses of its arrays
 
     def begin(self, z: Array, duration: float, rtol: float) -> None:
@@ -74,10 +76,14 @@ class Workspace:
         self.p += z[: self.p.size]
         self.v += z[self.p.size :]
 
-    def forget_outputs(self) -> None:
-        """Remove the outputs of a run, so that the next one keeps its end only, and a short list of events."""
-        if self.state is not self.first[0]:
-            self.state, self.block[self.layout.size :] = self.first
+    def sample(self, times: Array | None, duration: float) -> None:
+        """Make room for outputs at times, or for the end alone; room for the same times is used again."""
+        if self.times is times:
+            return
+        self.state, self.block[self.layout.size :] = self.first
+        self.times = times
+        if times is not None:
+            self.replace(**output_arrays(times, duration, self.state.x.size))
 
     def replace(self, **arrays: Array) -> None:
         """Replace arrays of the state by others."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from solvers.problem import Array, Contact, Parameter, System
 from solvers.problem.matrices import number
 
 _MOST_SAMPLES = 500_000_000
+_FEW_SAMPLES = 10_000  # up to which an even sampling is kept
 _SHORTEST = 1e-50  # s, of a run: derivatives of sampled loads are fifth powers of parts of it
 
 
@@ -107,7 +109,23 @@ def _joined(n: int, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
 
 
 def output_times(duration: float, dt: Any) -> Array | None:
-    """Output times of a sampling, or those given; None for none."""
+    """Output times of a sampling, or those given; None for none. Few of an even sampling are shared, read-only."""
+    if type(duration) is float and type(dt) is float and 0.0 < dt * _FEW_SAMPLES > duration:
+        return _few_times(duration, dt)
+    return _output_times(duration, dt)
+
+
+@lru_cache(maxsize=16)
+def _few_times(duration: float, dt: float) -> Array | None:
+    """The same, kept."""
+    times = _output_times(duration, dt)
+    if times is not None:
+        times.setflags(write=False)
+    return times
+
+
+def _output_times(duration: Any, dt: Any) -> Array | None:
+    """The same, made anew."""
     duration = number(duration, "duration")
     if not 0.0 < duration < math.inf:
         raise ValueError(f"duration must be positive and finite (s), got {duration!r}")
@@ -132,6 +150,13 @@ def output_times(duration: float, dt: Any) -> Array | None:
     if count > _MOST_SAMPLES:
         raise ValueError(f"dt = {dt:g} s over {duration:g} s asks for {count} samples; choose a larger dt")
     return np.arange(count) * dt
+
+
+def output_arrays(times: Array, duration: float, width: int) -> dict[str, Array]:
+    """Arrays of a state for the outputs of a run at times: due times, of which the last is never reached, and rows."""
+    due = np.full(len(times) + 1, math.inf)
+    np.minimum(times, duration, out=due[:-1])
+    return {"out": np.empty((len(times), width)), "due": due}
 
 
 def _given_times(duration: float, given: ArrayLike) -> Array:

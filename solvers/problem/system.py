@@ -28,6 +28,8 @@ from solvers.problem.friction import Friction, Rubbing, row_of
 from solvers.problem.matrices import Array, check_mass, dense, number, product, square_matrix
 from solvers.problem.memo import Memo
 
+_SMALL = 64  # coordinates up to which one product gives the energy of a motion sooner than two of half the size
+
 
 class Law(Protocol):
     """What a contact law must offer. `contacts.law.Law` has it all, and what laws with memory add.
@@ -433,6 +435,20 @@ class System:
         """Stored energy ½ q'ᵀ M q' + ½ qᵀ K q in J, for (..., n) arrays; inf of a run that diverged."""
         with np.errstate(over="ignore", invalid="ignore"):
             return 0.5 * (np.vecdot(product(q_dot, self.M), q_dot) + np.vecdot(product(q, self.K), q))
+
+    def energy_of(self, motion: Array) -> Array:
+        """The same for rows [q, q̇] (k, 2n)."""
+        n = self.size
+        if n > _SMALL:
+            return self.energy(motion[:, :n], motion[:, n:])
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.vecdot(motion.dot(self._energy_form), motion)
+
+    @cached_property
+    def _energy_form(self) -> Array:
+        """(2n, 2n) of which the energy is the quadratic form in [q, q̇]."""
+        none = np.zeros((self.size, self.size))
+        return 0.5 * np.block([[dense(self.K), none], [none, dense(self.M)]])
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,7 @@ from solvers.compiled.state import (
     problem_of,
 )
 from solvers.problem import Array, Forcing, Status, System
+from solvers.problem.run_arguments import output_arrays
 from solvers.stepping.energy_gain import IN_A_ROW, NOW, STEPS_OF_GAIN, gains, largest_loads, negligible_energy, watched
 from solvers.stepping.events import HENON
 from solvers.stepping.loop import march_of, new_space
@@ -63,6 +64,11 @@ class Engine:
         self.space.kinks[:] = kinks_of(system)
         self.rate, loop = rhs, march_of(isinstance(self.problem, PlanarProblem))
         self.loop: Any = partial(loop, method.step)
+
+    def sample(self, times: Array | None) -> None:
+        """Make room for outputs at times; None if the end alone is kept."""
+        if times is not None:
+            self.record(**output_arrays(times, self.duration, self.state.x.size))
 
     def record(self, **arrays: Array) -> None:
         """Replace arrays of the state that outputs go to: ``log``, ``out``, ``due``."""

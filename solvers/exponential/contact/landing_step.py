@@ -131,8 +131,9 @@ def landing_step(problem, tables, with_energy, count, variable, stop, span, w, s
     tableau = A if count == STAGES else CLASSICAL if count == 4 else MIDPOINT
     for i in range(count):
         combine(stages, tableau[i], i, w, trial)
+        counts = with_energy and tableau[count, i] != 0.0  # in the balance, whose own rates it does not change
         calls += _rate(
-            problem, tables, with_energy, variable, stop, span, trial, segment, entry_rate, side, stages[i], batch
+            problem, tables, counts, variable, stop, span, trial, segment, entry_rate, side, stages[i], batch
         )
     combine(stages, tableau[count], count, w, trial)
     return calls

@@ -34,7 +34,6 @@ MULTIPLE, ROUNDING = 20.0, 1e-9  # see the module; relative to the energy handle
 CANCELLED = 1e-6  # the most that may cancel in the energies of coupled blocks, relative to the energy handled
 LOADS = 100.0  # roundings tolerated of the energy of loads that cancel
 FACTOR = 4.0  # margin of the check without a balance
-_NONE = np.zeros(0)
 _SAMPLES = 64  # samples whose balance is checked, the last one among them
 FIRST, LAST, ALLOWED = range(3)  # places in Scratch.energy: own energy at start and end, and E_c, J
 
@@ -73,12 +72,9 @@ def note_energy(problem, tables, state, scratch):
     scratch.energy[LAST], scratch.energy[ALLOWED] = own_energy(problem, tables, state.x), max(allowed, 0.0)
 
 
-def tolerated_energy(handled: float, exchanged: Array, rtol: float) -> float:
-    """Residual, J, that the balance of a run may have.
-
-    ``exchanged`` (k,) : peak force times peak indentation of every contact.
-    """
-    return (MULTIPLE * rtol + ROUNDING) * float(handled + np.abs(exchanged).sum())
+def tolerated_energy(handled: float, rtol: float) -> float:
+    """Residual, J, that the balance of a run may have."""
+    return (MULTIPLE * rtol + ROUNDING) * handled
 
 
 def is_bounded(system: System) -> bool:
@@ -98,12 +94,12 @@ def has_gained(
 ) -> bool:
     """Whether a run without balance ends with more energy than it can have been given.
 
-    ``sampled`` has its sampled loads; ``exchanged`` is as in `tolerated_energy`, computed only if it decides.
+    ``sampled`` has its sampled loads; ``exchanged`` gives peak force times peak indentation of every contact.
     """
     first, last, allowed = energy.tolist()
     if not last > FACTOR * allowed or system.blocks.loss.size:
         return False
-    allowed += tolerated_energy(first, exchanged(), rtol)
+    allowed += tolerated_energy(first + float(np.abs(exchanged()).sum()), rtol)
     if not last > FACTOR * allowed:
         return False
     speed = math.sqrt(2.0 * allowed)
@@ -124,20 +120,26 @@ def _checked_places(count: int) -> Any:
 def unbalanced(record: Record, rtol: float) -> bool:
     """Whether the energy balance at the samples of a run has a residual above the tolerated one."""
     rows, system = _checked_places(len(record.motion)), record.system
-    motion = np.concatenate(((record.back @ record.begin)[None], record.motion.take(rows, axis=0)))
-    stored = system.energy(motion[:, : system.size], motion[:, system.size :])
-    works = record.works.take(rows, axis=0)
-    left, handled = stored[1:] - stored[0] - works @ _signs(works.shape[1]), stored[0] + np.abs(stored[1:]).max()
+    motion, works = record.motion.take(rows, axis=0), record.works.take(rows, axis=0)
+    stored = system.energy_of(motion)
+    begun = float(stored[0] if record.t[0] == 0.0 else system.energy_of((record.back @ record.begin)[None])[0])
+    left, rubbed = stored - begun - works.dot(_signs(works.shape[1])), 0.0
     if record.rubbed is not None:
         friction, spin = (part[rows] for part in record.works_of_friction)
-        left, handled = left + friction - spin, handled + np.abs(friction).max() + np.abs(spin).max()
-    handled += np.abs(works[:, :2]).max(axis=0).sum()
-    residual, allowed = np.abs(left).max(), tolerated_energy(handled, _NONE, rtol)
+        left, rubbed = left + friction - spin, np.abs(friction).max() + np.abs(spin).max()
+    # At first by bounds that cost least: the largest residual is at most their norm, the largest energy at least the
+    # root mean square.
+    if math.sqrt(left.dot(left)) <= tolerated_energy(begun + math.sqrt(stored.dot(stored) / _SAMPLES), rtol):
+        return False
+    residual = np.abs(left).max()
+    handled = begun + np.abs(stored).max() + np.abs(works[:, :2]).max(axis=0).sum() + rubbed
+    allowed = tolerated_energy(handled, rtol)
     if residual <= allowed:
         return False
-    allowed = tolerated_energy(handled, record.exchanged(), rtol)
+    allowed = tolerated_energy(handled + float(np.abs(record.exchanged()).sum()), rtol)
     if system.blocks.loss.size:
-        allowed += handled * min(float(np.finfo(float).eps * _told(system, motion) / stored.max()), CANCELLED)
+        cancels = np.finfo(float).eps * _told(system, motion) / max(stored.max(), begun)
+        allowed += handled * min(float(cancels), CANCELLED)
     if residual > allowed:
         allowed += LOADS * np.finfo(float).eps * _energy_of_loads(system, record.t[rows])
     return not residual <= allowed

@@ -4,7 +4,7 @@ A flight is accounted for from a *mark* on: the start of the flight, the last ou
 of the present cell. From mark to mark one form is enough, whatever steps the flight has taken.
 
 A series reaches `SERIES_REACH` radians of the fastest block. The powers of its motion are integrated by Gauss's rule
-with seven points, exact up to the power 13 of time: within a cell signals are of degree five, and their share of p of
+with eight points, exact up to the power 15 of time: within a cell signals are of degree five, and their share of p of
 degree seven, however rough they are.
 """
 
@@ -19,9 +19,8 @@ from solvers.compiled.kernels import REAL, VECTOR, cell_ends, copy, inlined, inn
 from solvers.compiled.parts import ACCOUNT_FLIGHT, ACCOUNT_SERIES, ACCOUNT_STEP, part
 from solvers.compiled.simd import WIDTH, load8, splat8, store8, sum8
 from solvers.compiled.state import T
-from solvers.compiled.sums import combine
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.energy.quadrature import powers
+from solvers.exponential.energy.quadrature import PACE, exchanged_over
 from solvers.exponential.flight import (
     SERIES_REACH,
     SERIES_TERMS,
@@ -34,7 +33,7 @@ from solvers.exponential.flight import (
 )
 
 _MARK, _MOVING, _WITHIN = 3, 4, 5  # indices in Scratch.split_state: state at the mark, two that are moved on
-_MARKED, _JOINED, _SPLIT = 9, 10, 11  # rows of Scratch.stages: time of the mark; a state in a series, joined and split
+_MARKED = 9  # row of Scratch.stages: time of the mark
 _EXACT = 1e-17  # relative size of the last term of a series
 _EXCHANGED = types.UniTuple(REAL, 2)
 """Work and damping, J. They are returned, and states are named by their index, since parts are slow with arrays."""
@@ -63,7 +62,7 @@ def fly_within(problem, tables, scratch, place, t, span, accounted, energy_table
         t, span = t + tables.flight_step[level], span - tables.flight_step[level]
     fly_series(problem, tables, x, t, span, scratch.signal_terms, scratch.terms)
     if accounted:
-        add_to_balance(problem, row, account_series(problem, tables, energy_tables, scratch, t, span))
+        add_to_balance(problem, row, account_series(problem, tables, energy_tables, scratch, span))
 
 
 @inlined
@@ -200,15 +199,39 @@ def _account_panels(problem, tables, energy_tables, scratch, x, t, span):
     for i in range(panels):
         begin = t + i * span / panels
         fly_series(problem, tables, x, begin, span / panels, scratch.signal_terms, scratch.terms)
-        more, lost = account_series(problem, tables, energy_tables, scratch, begin, span / panels)
+        more, lost = account_series(problem, tables, energy_tables, scratch, span / panels)
         gain, loss = gain + more, loss + lost
     return gain, loss
 
 
-@part(ACCOUNT_SERIES, _EXCHANGED, REAL, REAL)
-def account_series(problem, tables, energy_tables, scratch, t, span):
-    """Work and damping, J, of the motion that the last `fly_series` has moved from t by ``span``."""
-    n, plain = problem.k.size, int(tables.own_blocks) == problem.k.size
+@part(ACCOUNT_SERIES, _EXCHANGED, REAL)
+def account_series(problem, tables, energy_tables, scratch, span):
+    """Work and damping, J, of the motion that the last `fly_series` has moved by ``span``."""
+    n, width, along = problem.k.size, tables.block_k_c.shape[1], scratch.along
+    count = _powers_of_time(tables, span, scratch.values)
+    for b in range(n):
+        p, v = splat8(0.0), splat8(0.0)
+        for i in range(count):
+            share = load8(energy_tables.series[i], 0)
+            p += splat8(scratch.values[i] * scratch.terms[i, b]) * share
+            v += splat8(scratch.values[i] * scratch.terms[i, width + b]) * share
+        store8(along[b], 0, p)
+        store8(along[n + b], 0, v)
+    pace, signals = splat8(span), scratch.between[PACE + 1 + problem.gap.size :]
+    store8(scratch.between[PACE], 0, pace)
+    for load in range(tables.power_rows.shape[0]):
+        store8(signals[load], 0, splat8(0.0))
+    for j in range(problem.table_dt.size):
+        value = splat8(0.0)
+        for i in range(6):
+            value += splat8(scratch.values[i] * scratch.signal_terms[j, i]) * load8(energy_tables.series[i], 0)
+        store8(signals[problem.table_load[j]], 0, value * pace)
+    return exchanged_over(problem, tables, scratch)
+
+
+@inlined
+def _powers_of_time(tables, span, values):
+    """Write the powers of ``span`` that count in a series into ``values``; how many these are."""
     count, size, power = S + 1, 1.0, 1.0
     for i in range(S):
         size *= tables.fastest * span / (i + 1.0)
@@ -216,65 +239,6 @@ def account_series(problem, tables, energy_tables, scratch, t, span):
         size *= tables.fastest * span / count
         count += 1
     for i in range(count):
-        scratch.values[i] = power
+        values[i] = power
         power *= span
-    if plain and tables.loss_rows.shape[0] <= n:
-        return _exchange_of_rates(problem, tables, energy_tables, scratch, count, span)
-    return _exchange_at_points(problem, tables, energy_tables, scratch, t, count, span)
-
-
-@merged
-def _exchange_of_rates(problem, tables, energy_tables, scratch, count, span):
-    """The same without tones and coupling, for all points at once; powers of time are in ``scratch.values``."""
-    points, series, width = energy_tables.gauss.shape[1], energy_tables.series, tables.block_k_c.shape[1]
-    weights, signals, gains, losses = scratch.energy_sums[0], scratch.energy_sums[1], splat8(0.0), splat8(0.0)
-    for q in range(points):
-        weights[q] = span * energy_tables.gauss[1, q]
-        for j in range(problem.table_dt.size):
-            signal = 0.0
-            for i in range(6):
-                signal += series[q, i] * scratch.values[i] * scratch.signal_terms[j, i]
-            signals[points * j + q] = weights[q] * signal
-    for i in range(0, width, WIDTH):
-        a, b, c, d = splat8(0.0), splat8(0.0), splat8(0.0), splat8(0.0)
-        e, f, g = splat8(0.0), splat8(0.0), splat8(0.0)
-        for k in range(count):
-            term = splat8(scratch.values[k]) * load8(scratch.terms[k], width + i)
-            a += splat8(series[0, k]) * term
-            b += splat8(series[1, k]) * term
-            c += splat8(series[2, k]) * term
-            d += splat8(series[3, k]) * term
-            e += splat8(series[4, k]) * term
-            f += splat8(series[5, k]) * term
-            g += splat8(series[6, k]) * term
-        damped = _sum_of_seven(weights, 0, a * a, b * b, c * c, d * d, e * e, f * f, g * g)
-        losses += load8(tables.block_k_c[1], i) * damped
-        for j in range(problem.table_dt.size):
-            power = load8(energy_tables.power[problem.table_load[j]], i)
-            gains += power * _sum_of_seven(signals, points * j, a, b, c, d, e, f, g)
-    return sum8(gains), sum8(losses)
-
-
-@inlined
-def _sum_of_seven(weights, first, a, b, c, d, e, f, g):
-    """Weighted sum of a block's values at Gauss's seven points."""
-    outer = splat8(weights[first]) * a + splat8(weights[first + 6]) * g
-    between = splat8(weights[first + 1]) * b + splat8(weights[first + 5]) * f
-    inner_ones = splat8(weights[first + 2]) * c + splat8(weights[first + 4]) * e
-    return outer + between + inner_ones + splat8(weights[first + 3]) * d
-
-
-@merged
-def _exchange_at_points(problem, tables, energy_tables, scratch, t, count, span):
-    """The same in general, point by point."""
-    n, width, z, gain, loss = problem.k.size, tables.block_k_c.shape[1], scratch.stages[_JOINED], 0.0, 0.0
-    for q in range(energy_tables.gauss.shape[1]):
-        for i in range(count):
-            scratch.energy_sums[0, i] = scratch.values[i] * energy_tables.series[q, i]
-        combine(scratch.terms, scratch.energy_sums[0], count, None, scratch.stages[_SPLIT])
-        for b in range(n):
-            z[b], z[n + b] = scratch.stages[_SPLIT, b], scratch.stages[_SPLIT, width + b]
-        by_loads, by_damping = powers(problem, tables, t + span * energy_tables.gauss[0, q], z)
-        gain += span * energy_tables.gauss[1, q] * by_loads
-        loss += span * energy_tables.gauss[1, q] * by_damping
-    return gain, loss
+    return count

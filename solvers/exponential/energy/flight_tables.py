@@ -36,7 +36,7 @@ _OCTAVE = 4  # flight steps per factor of two
 _BRIEF = 0.04  # |λ| h up to which twelve terms of a Taylor series are exact
 _MOST_NUMBERS = 10_000_000  # in ``rows``: above, with many drivers, flight is integrated by series
 _MOST_PER_BLOCK = 1000  # numbers of a summed form per block: above, with many tones, forms of each block are cheaper
-_POINTS = 7  # of Gauss's rule on a series, see `flight_balance`
+_SERIES = np.array([gauss(S)[0] ** i / math.factorial(i) for i in range(SERIES_TERMS)])  # see `flight_balance`
 _REACH = 200.0  # radians of the fastest block up to which contact steps have tables
 
 
@@ -47,12 +47,10 @@ class EnergyTables(NamedTuple):
     closed: Annotated[float, "number"]  # whether there are forms for flight
     spacing: Annotated[float, "number"]  # s, of the last step in the tables: a cell, or the time between outputs
     driver: Annotated[Any, "int d"]  # columns of the state that are drivers, see the module
-    power: Annotated[Any, "L, N8"]  # input power = signal × power row, from v
     plain: Annotated[Any, "l, 3, N8"]  # damping = Σ rows × (p², p v, v²)
     rows: Annotated[Any, "l, 6*J+d, 4*N8"]  # work, then damping, from p, then v, per unit of a signal or driver
     pairs: Annotated[Any, "l, 6*J, pairs"]  # the same from the signals, 2 × 6J padded
-    gauss: Annotated[Any, "2, points"]
-    series: Annotated[Any, "points+1, LONG"]  # weights of a series' terms at Gauss's points and at the end
+    series: Annotated[Any, "LONG, S"]  # x^i/i! at Gauss's points, see `flight_balance`
     kind: Annotated[Any, "int f"]  # contact table of every node set
     first: Annotated[float, "number"]  # contact step at which the tables begin
     longest: Annotated[Any, "kinds"]  # s: contact step up to which they may be used
@@ -69,15 +67,9 @@ ENERGY_TABLES = packed_type(EnergyTables)
 def _empty(kept: float, node_sets: int) -> EnergyTables:
     """Tables without forms; ``kept`` is 1 if there is a balance."""
     none, nothing, contact = np.zeros(0, dtype=np.int64), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0, 0))
-    flight = kept, 0.0, 0.0, none, np.zeros((0, 0)), nothing, nothing, nothing
+    flight = kept, 0.0, 0.0, none, nothing, nothing, nothing
     kind, longest, sums = np.zeros(node_sets, dtype=np.int64), np.zeros(1), np.zeros((0, 0, 0, 0))
-    return EnergyTables(*flight, gauss(_POINTS), _series(), kind, 0.0, longest, contact, contact, none, sums, sums)
-
-
-def _series() -> Any:
-    """(points + 1, LONG) x^i/i! at Gauss's points and at 1."""
-    points = np.append(gauss(_POINTS)[0], 1.0)
-    return np.array([[x**i / math.factorial(i) for i in range(SERIES_TERMS)] for x in points])
+    return EnergyTables(*flight, _SERIES, kind, 0.0, longest, contact, contact, none, sums, sums)
 
 
 NO_ENERGY_TABLES = Packed.of(_empty(0.0, 1), ENERGY_TABLES)
@@ -89,10 +81,8 @@ def energy_tables_for(problem: Problem, tables: Tables, spacing: float) -> Packe
     if not (_coupled(tables) or any(part[:, :own].any() for part in (problem.push, problem.load, problem.read_rate))):
         energy_tables = _contact_part(energy_tables, problem, tables)
     driver = np.flatnonzero(_drives(problem, tables))
-    power = np.zeros((len(problem.load), padded(len(problem.k))))
-    power[:, : len(problem.k)] = tables.power_rows[:, len(problem.k) :]
     step = problem.table_dt[0] if len(problem.table_dt) else spacing  # cells are crossed whole even without forms
-    energy_tables = energy_tables._replace(power=power, spacing=step)
+    energy_tables = energy_tables._replace(spacing=step)
     size, signals = 2 * len(problem.k), len(problem.table_dt)
     if (len(tables.flight_step) + 1) * (len(driver) + 6 * signals) * 2 * padded(size) <= _MOST_NUMBERS:
         energy_tables = _flight_part(energy_tables, problem, tables, driver)

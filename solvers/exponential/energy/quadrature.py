@@ -36,7 +36,7 @@ from solvers.exponential.responses import propagate
 
 _PANEL_RADIANS = 3.0  # up to which the energy of a damped block is off by 5e-11 ζ of its own, and its motion by less
 _INTEGRALS = 2  # first row of `Tables.gauss` with a_qr, one per r
-_DT = S  # row of `Scratch.between` with dt of the panel's points, behind polynomials, before forces
+PACE = S  # row of `Scratch.between` with dt of the panel's points, behind polynomials, before forces
 
 
 @inner
@@ -83,7 +83,7 @@ def _panel_points(tables, scratch, node_set, h, begin, width):
         sigma = begin + width * tables.gauss[0, q]
         pace = h * raised(sigma, time_exponent - 1.0)
         scratch.trial[q], scratch.clipped[q] = sigma, pace * sigma - start
-        between[_DT, q] = width * time_exponent * pace
+        between[PACE, q] = width * time_exponent * pace
     sigma = load8(scratch.trial, 0)
     for j in range(S):
         product = splat8(1.0)
@@ -100,11 +100,11 @@ def _forces(problem, tables, state, scratch, node_set):
     for u in range(scratch.force.shape[0]):
         if u < problem.gap.size and not acts(problem, state, u):
             continue
-        weighted, row = enters(problem, node_set, u) and tables.weight_exponent[node_set] > 0.0, between[_DT + 1 + u]
+        weighted, row = enters(problem, node_set, u) and tables.weight_exponent[node_set] > 0.0, between[PACE + 1 + u]
         scales, value = tables.lagrange[node_set, 1 if weighted else 0], splat8(0.0)
         for j in range(S):
             value += splat8(scales[j] * scratch.force[u, j]) * load8(between[j], 0)
-        store8(row, 0, value * load8(between[_DT], 0))
+        store8(row, 0, value * load8(between[PACE], 0))
         for q in range(S if weighted else 0):
             row[q] *= scratch.trial[q] ** tables.weight_exponent[node_set]
 
@@ -129,7 +129,7 @@ def _pull_back(problem, state, scratch, b, moves):
     for u in range(scratch.force.shape[0]):
         if u >= problem.gap.size or acts(problem, state, u):
             push = push_of(problem, u)
-            force = load8(scratch.between[_DT + 1 + u], 0)
+            force = load8(scratch.between[PACE + 1 + u], 0)
             p += splat8(push[b]) * force
             v += splat8(push[n + b]) * force
     alpha, beta = load8(moves[2], 0), load8(moves[3], 0)
@@ -169,30 +169,34 @@ def _add_works(problem, tables, state, scratch, row):
             if rubs(problem, s):
                 account = problem.friction[s, 1]
                 work, impulse, friction_work, friction_impulse, slip_distance = work_within_rubbing(
-                    problem, tables, scratch, s, _DT + 1
+                    problem, tables, scratch, s, PACE + 1
                 )
                 row[account], row[account + 1] = row[account] + friction_work, row[account + 1] + friction_impulse
                 row[account + 2] += slip_distance
             elif is_circle(problem, s):
-                work, impulse = work_within_circle(problem, tables, scratch, s, _DT + 1)
+                work, impulse = work_within_circle(problem, tables, scratch, s, PACE + 1)
             else:
                 combine(scratch.along, problem.read_rate[r], size, None, scratch.trial)
-                impulses = load8(tables.gauss[1], 0) * load8(scratch.between[_DT + 1 + r], 0)
+                impulses = load8(tables.gauss[1], 0) * load8(scratch.between[PACE + 1 + r], 0)
                 work, impulse = sum8(impulses * load8(scratch.trial, 0)), sum8(impulses)
             row[size + 2 + 2 * s] += work
             row[size + 3 + 2 * s] += impulse
 
 
 @merged
-def _add_powers(problem, tables, scratch, row):
-    """Add work of the loads and damping over the panel to ``row``."""
+def exchanged_over(problem, tables, scratch):
+    """Work of the loads and damping, J, over a panel: motion at its points, dt there, and the sampled loads times dt.
+
+    They are in ``scratch.along``, row `PACE` of ``between``, and behind its rows of forces.
+    """
+    gain, loss = splat8(0.0), splat8(0.0)
     n, own, rows = problem.k.size, int(tables.own_blocks), tables.loss_rows
-    weights, pace = load8(tables.gauss[1], 0), load8(scratch.between[_DT], 0)
+    weights, pace = load8(tables.gauss[1], 0), load8(scratch.between[PACE], 0)
     for load in range(tables.power_rows.shape[0]):
         combine(scratch.along, tables.power_rows[load], 2 * n, None, scratch.trial)
         combine(scratch.along, tables.signal_rows[load], 2 * n, None, scratch.clipped)
-        signal = load8(scratch.between[_DT + 1 + problem.gap.size + load], 0) + pace * load8(scratch.clipped, 0)
-        row[2 * n] += sum8(weights * signal * load8(scratch.trial, 0))
+        signal = load8(scratch.between[PACE + 1 + problem.gap.size + load], 0) + pace * load8(scratch.clipped, 0)
+        gain += weights * signal * load8(scratch.trial, 0)
     for r in range(rows.shape[0]):
         if rows.shape[0] > own:  # damping that couples the blocks
             combine(scratch.along, rows[r], 2 * n, None, scratch.trial)
@@ -203,7 +207,8 @@ def _add_powers(problem, tables, scratch, row):
                 value += splat8(rows[r, n + k]) * load8(scratch.along[n + k], 0)
             store8(scratch.trial, 0, value)
         value = load8(scratch.trial, 0)
-        row[2 * n + 1] += sum8(weights * pace * value * value)
+        loss += weights * pace * value * value
+    return sum8(gain), sum8(loss)
 
 
 @part(WITHIN_STEP, types.void, types.int64, *[REAL] * 3, VECTOR, types.boolean)
@@ -214,7 +219,7 @@ def state_within(problem, tables, state, scratch, node_set, h, begin, end, row, 
     """
     time_exponent = tables.time_exponent[node_set]
     sigma, last = (begin / h) ** (1.0 / time_exponent), (end / h) ** (1.0 / time_exponent)
-    panels = 1 + int(time_exponent * tables.fastest * (end - begin) / _PANEL_RADIANS)
+    panels, size = 1 + int(time_exponent * tables.fastest * (end - begin) / _PANEL_RADIANS), 2 * problem.k.size
     width = (last - sigma) / panels
     for i in range(panels):
         _panel_points(tables, scratch, node_set, h, sigma, width)
@@ -226,5 +231,6 @@ def state_within(problem, tables, state, scratch, node_set, h, begin, end, row, 
         _move_blocks(problem, tables, state, scratch, row)
         _add_works(problem, tables, state, scratch, row)
         if ledger:
-            _add_powers(problem, tables, scratch, row)
+            gain, loss = exchanged_over(problem, tables, scratch)
+            row[size], row[size + 1] = row[size] + gain, row[size + 1] + loss
         sigma += width
