@@ -14,6 +14,7 @@ from solvers.compiled.kernels import (
     REAL,
     VECTOR,
     dot,
+    inlined,
     inner,
     is_circle,
     merged,
@@ -32,9 +33,9 @@ from solvers.exponential.circles.contact import work_within_circle
 from solvers.exponential.circles.friction import work_within_rubbing
 from solvers.exponential.contact.many_stops import enters
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.responses import propagate
 
 _PANEL_RADIANS = 3.0  # up to which the energy of a damped block is off by 5e-11 ζ of its own, and its motion by less
+_TERMS, _REACH = 14, 0.4  # of Taylor's series, and its radians of the fastest block: exact to 3e-17
 _INTEGRALS = 2  # first row of `Tables.gauss` with a_qr, one per r
 PACE = S  # row of `Scratch.between` with dt of the panel's points, behind polynomials, before forces
 
@@ -110,16 +111,43 @@ def _forces(problem, tables, state, scratch, node_set):
 
 
 @merged
-def _panel_propagators(problem, scratch, length):
+def _panel_propagators(problem, tables, scratch, length):
     """α, β of every block from the start of a panel to its points, back by det E = e^{-ct}, and to its end."""
+    halvings, reach = 0, tables.fastest * length
+    while reach > _REACH:
+        halvings, reach = halvings + 1, 0.5 * reach
+    share, powers, last = splat8(0.5**halvings), splat8(1.0), splat8(1.0)
+    within, whole = share * load8(scratch.clipped, 0), share * splat8(length)
+    for i in range(_TERMS):  # t^i/i!
+        store8(scratch.terms[i], 0, powers)
+        store8(scratch.terms[i], S, last)
+        following = splat8(1.0 / (i + 1.0))
+        powers, last = powers * within * following, last * whole * following
     for b in range(problem.k.size):
-        k, c, out = problem.k[b], problem.c[b], scratch.moves[b]
-        for q in range(S):
-            alpha, beta = propagate(k, c, scratch.clipped[q])
-            grown = 1.0 / (alpha * alpha - c * alpha * beta + k * beta * beta)
-            out[0, q], out[1, q] = alpha, beta
-            out[2, q], out[3, q] = grown * (alpha - c * beta), -grown * beta
-        out[4, 0], out[4, 1] = propagate(k, c, length)
+        out, k, c = scratch.moves[b], splat8(problem.k[b]), splat8(problem.c[b])
+        alpha, beta = _propagators(scratch.terms, 0, problem.k[b], problem.c[b], halvings)
+        grown = splat8(1.0) / (alpha * alpha - c * alpha * beta + k * beta * beta)
+        store8(out[0], 0, alpha)
+        store8(out[1], 0, beta)
+        store8(out[2], 0, grown * (alpha - c * beta))
+        store8(out[3], 0, splat8(0.0) - grown * beta)
+        alpha, beta = _propagators(scratch.terms, S, problem.k[b], problem.c[b], halvings)
+        out[4, 0], out[4, 1] = 0.125 * sum8(alpha), 0.125 * sum8(beta)  # of eight times that are the same
+
+
+@inlined
+def _propagators(powers, first, k, c, halvings):
+    """α, β of a block at eight times: Taylor's series of β and β' from t^i/i!, then E(2t) = E(t)² for every halving."""
+    beta, slope, derivative, following = splat8(0.0), splat8(0.0), 0.0, 1.0
+    for i in range(_TERMS):
+        power = load8(powers[i], first)
+        beta += splat8(derivative) * power
+        slope += splat8(following) * power
+        derivative, following = following, -c * following - k * derivative
+    alpha = slope + splat8(c) * beta
+    for _ in range(halvings):
+        alpha, beta = alpha * alpha - splat8(k) * beta * beta, beta * (alpha + alpha - splat8(c) * beta)
+    return alpha, beta
 
 
 @merged
@@ -224,9 +252,8 @@ def state_within(problem, tables, state, scratch, node_set, h, begin, end, row, 
     for i in range(panels):
         _panel_points(tables, scratch, node_set, h, sigma, width)
         if i == 0 or time_exponent > 1.0:
-            _panel_propagators(
-                problem, scratch, h * (raised(sigma + width, time_exponent) - raised(sigma, time_exponent))
-            )
+            length = h * (raised(sigma + width, time_exponent) - raised(sigma, time_exponent))
+            _panel_propagators(problem, tables, scratch, length)
         _forces(problem, tables, state, scratch, node_set)
         _move_blocks(problem, tables, state, scratch, row)
         _add_works(problem, tables, state, scratch, row)
