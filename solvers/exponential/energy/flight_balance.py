@@ -34,7 +34,7 @@ from solvers.exponential.flight import (
 
 _MARK, _MOVING, _WITHIN = 3, 4, 5  # indices in Scratch.split_state: state at the mark, two that are moved on
 _MARKED = 9  # row of Scratch.stages: time of the mark
-_EXACT = 1e-17  # relative size of the last term of a series
+_EXACT = 1e-14  # relative size of the last term of a series, as that of a series of all terms
 _EXCHANGED = types.UniTuple(REAL, 2)
 """Work and damping, J. They are returned, and states are named by their index, since parts are slow with arrays."""
 
@@ -207,26 +207,65 @@ def _account_panels(problem, tables, energy_tables, scratch, x, t, span):
 @part(ACCOUNT_SERIES, _EXCHANGED, REAL)
 def account_series(problem, tables, energy_tables, scratch, span):
     """Work and damping, J, of the motion that the last `fly_series` has moved by ``span``."""
-    n, width, along = problem.k.size, tables.block_k_c.shape[1], scratch.along
+    n, signals = problem.k.size, scratch.between[PACE + 1 + problem.gap.size :]
     count = _powers_of_time(tables, span, scratch.values)
-    for b in range(n):
-        p, v = splat8(0.0), splat8(0.0)
-        for i in range(count):
-            share = load8(energy_tables.series[i], 0)
-            p += splat8(scratch.values[i] * scratch.terms[i, b]) * share
-            v += splat8(scratch.values[i] * scratch.terms[i, width + b]) * share
-        store8(along[b], 0, p)
-        store8(along[n + b], 0, v)
-    pace, signals = splat8(span), scratch.between[PACE + 1 + problem.gap.size :]
-    store8(scratch.between[PACE], 0, pace)
     for load in range(tables.power_rows.shape[0]):
         store8(signals[load], 0, splat8(0.0))
     for j in range(problem.table_dt.size):
         value = splat8(0.0)
         for i in range(6):
             value += splat8(scratch.values[i] * scratch.signal_terms[j, i]) * load8(energy_tables.series[i], 0)
-        store8(signals[problem.table_load[j]], 0, value * pace)
+        store8(signals[problem.table_load[j]], 0, splat8(span) * value)
+    if int(tables.own_blocks) == n and tables.loss_rows.shape[0] <= n:
+        return _exchange_of_rates(problem, tables, energy_tables, scratch, count, span)
+    store8(scratch.between[PACE], 0, splat8(span))
+    width, along = tables.block_k_c.shape[1], scratch.along
+    for b in range(n):
+        p, v = splat8(0.0), splat8(0.0)
+        for i in range(count):
+            share = splat8(scratch.values[i]) * load8(energy_tables.series[i], 0)
+            p += splat8(scratch.terms[i, b]) * share
+            v += splat8(scratch.terms[i, width + b]) * share
+        store8(along[b], 0, p)
+        store8(along[n + b], 0, v)
     return exchanged_over(problem, tables, scratch)
+
+
+@merged
+def _exchange_of_rates(problem, tables, energy_tables, scratch, count, span):
+    """The same without tones and coupling, where velocities are enough: those of eight blocks at a time."""
+    series, weights, width = energy_tables.series, tables.gauss[1], tables.block_k_c.shape[1]
+    gains, losses = splat8(0.0), splat8(0.0)
+    for i in range(0, width, WIDTH):
+        a, b, c, d = splat8(0.0), splat8(0.0), splat8(0.0), splat8(0.0)
+        e, f, g, h = splat8(0.0), splat8(0.0), splat8(0.0), splat8(0.0)
+        for k in range(count):
+            term = splat8(scratch.values[k]) * load8(scratch.terms[k], width + i)
+            a += splat8(series[k, 0]) * term
+            b += splat8(series[k, 1]) * term
+            c += splat8(series[k, 2]) * term
+            d += splat8(series[k, 3]) * term
+            e += splat8(series[k, 4]) * term
+            f += splat8(series[k, 5]) * term
+            g += splat8(series[k, 6]) * term
+            h += splat8(series[k, 7]) * term
+        damped = _sum_of_eight(weights, (a * a, b * b, c * c, d * d, e * e, f * f, g * g, h * h))
+        losses += load8(tables.block_k_c[1], i) * damped
+        for load in range(tables.power_rows.shape[0]):
+            signal = scratch.between[PACE + 1 + problem.gap.size + load]
+            store8(scratch.trial, 0, load8(weights, 0) * load8(signal, 0))
+            gains += load8(energy_tables.power[load], i) * _sum_of_eight(scratch.trial, (a, b, c, d, e, f, g, h))
+    return sum8(gains), span * sum8(losses)
+
+
+@inlined
+def _sum_of_eight(weights, values):
+    """Weighted sum of a block's values at Gauss's eight points."""
+    a, b, c, d, e, f, g, h = values
+    outer = splat8(weights[0]) * a + splat8(weights[7]) * h
+    near = splat8(weights[1]) * b + splat8(weights[6]) * g
+    between = splat8(weights[2]) * c + splat8(weights[5]) * f
+    return outer + near + between + splat8(weights[3]) * d + splat8(weights[4]) * e
 
 
 @inlined

@@ -47,6 +47,7 @@ class EnergyTables(NamedTuple):
     closed: Annotated[float, "number"]  # whether there are forms for flight
     spacing: Annotated[float, "number"]  # s, of the last step in the tables: a cell, or the time between outputs
     driver: Annotated[Any, "int d"]  # columns of the state that are drivers, see the module
+    power: Annotated[Any, "L, N8"]  # input power = signal × power row, from v
     plain: Annotated[Any, "l, 3, N8"]  # damping = Σ rows × (p², p v, v²)
     rows: Annotated[Any, "l, 6*J+d, 4*N8"]  # work, then damping, from p, then v, per unit of a signal or driver
     pairs: Annotated[Any, "l, 6*J, pairs"]  # the same from the signals, 2 × 6J padded
@@ -67,7 +68,7 @@ ENERGY_TABLES = packed_type(EnergyTables)
 def _empty(kept: float, node_sets: int) -> EnergyTables:
     """Tables without forms; ``kept`` is 1 if there is a balance."""
     none, nothing, contact = np.zeros(0, dtype=np.int64), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0, 0))
-    flight = kept, 0.0, 0.0, none, nothing, nothing, nothing
+    flight = kept, 0.0, 0.0, none, np.zeros((0, 0)), nothing, nothing, nothing
     kind, longest, sums = np.zeros(node_sets, dtype=np.int64), np.zeros(1), np.zeros((0, 0, 0, 0))
     return EnergyTables(*flight, _SERIES, kind, 0.0, longest, contact, contact, none, sums, sums)
 
@@ -81,8 +82,10 @@ def energy_tables_for(problem: Problem, tables: Tables, spacing: float) -> Packe
     if not (_coupled(tables) or any(part[:, :own].any() for part in (problem.push, problem.load, problem.read_rate))):
         energy_tables = _contact_part(energy_tables, problem, tables)
     driver = np.flatnonzero(_drives(problem, tables))
+    power = np.zeros((len(problem.load), padded(len(problem.k))))
+    power[:, : len(problem.k)] = tables.power_rows[:, len(problem.k) :]
     step = problem.table_dt[0] if len(problem.table_dt) else spacing  # cells are crossed whole even without forms
-    energy_tables = energy_tables._replace(spacing=step)
+    energy_tables = energy_tables._replace(power=power, spacing=step)
     size, signals = 2 * len(problem.k), len(problem.table_dt)
     if (len(tables.flight_step) + 1) * (len(driver) + 6 * signals) * 2 * padded(size) <= _MOST_NUMBERS:
         energy_tables = _flight_part(energy_tables, problem, tables, driver)

@@ -221,20 +221,21 @@ def exchanged_over(problem, tables, scratch):
     n, own, rows = problem.k.size, int(tables.own_blocks), tables.loss_rows
     weights, pace = load8(tables.gauss[1], 0), load8(scratch.between[PACE], 0)
     for load in range(tables.power_rows.shape[0]):
+        signal = load8(scratch.between[PACE + 1 + problem.gap.size + load], 0)
+        if own < n:
+            combine(scratch.along, tables.signal_rows[load], 2 * n, None, scratch.trial)
+            signal += pace * load8(scratch.trial, 0)
         combine(scratch.along, tables.power_rows[load], 2 * n, None, scratch.trial)
-        combine(scratch.along, tables.signal_rows[load], 2 * n, None, scratch.clipped)
-        signal = load8(scratch.between[PACE + 1 + problem.gap.size + load], 0) + pace * load8(scratch.clipped, 0)
         gain += weights * signal * load8(scratch.trial, 0)
     for r in range(rows.shape[0]):
         if rows.shape[0] > own:  # damping that couples the blocks
             combine(scratch.along, rows[r], 2 * n, None, scratch.trial)
+            value = load8(scratch.trial, 0)
         else:
             value = splat8(rows[r, n + r]) * load8(scratch.along[n + r], 0)
             for k in range(own, n):
                 value += splat8(rows[r, k]) * load8(scratch.along[k], 0)
                 value += splat8(rows[r, n + k]) * load8(scratch.along[n + k], 0)
-            store8(scratch.trial, 0, value)
-        value = load8(scratch.trial, 0)
         loss += weights * pace * value * value
     return sum8(gain), sum8(loss)
 
