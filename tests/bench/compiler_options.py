@@ -36,8 +36,11 @@ _NO_PARTS = (
     ("parts.py", "for place in places:", "for place in ():"),
 )
 _MOSTLY_NOT_MERGED = """
+ARRAYS = "pair_response", "force_of", "motion_of", "push_of", "slider_of", "turned_of"
+
+
 def merged(function):  # an array can be returned by what is merged only
-    return njit(**_INNER, inline="always" if function.__name__ == "pair_response" else "never")(function)
+    return njit(**_INNER, inline="always" if function.__name__ in ARRAYS else "never")(function)
 """
 OPTIONS = {  # file, what is there, what is there instead
     "merged": (("decorators.py", 'merged = njit(**_INNER, inline="always")', _MOSTLY_NOT_MERGED),),
