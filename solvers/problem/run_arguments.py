@@ -110,13 +110,13 @@ def _joined(n: int, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
 
 def output_times(duration: float, dt: Any) -> Array | None:
     """Output times of a sampling, or those given; None for none. Few of an even sampling are shared, read-only."""
-    if type(duration) is float and type(dt) is float and 0.0 < dt * _FEW_SAMPLES > duration:
+    if type(duration) is float and (dt is None or (type(dt) is float and dt * _FEW_SAMPLES > duration)):
         return _few_times(duration, dt)
     return _output_times(duration, dt)
 
 
 @lru_cache(maxsize=16)
-def _few_times(duration: float, dt: float) -> Array | None:
+def _few_times(duration: float, dt: float | None) -> Array | None:
     """The same, kept."""
     times = _output_times(duration, dt)
     if times is not None:

@@ -3,11 +3,12 @@
     nice -n 5 python tests/bench/compiler_options.py merged force nrt alias align parts tuples [--against TREE]
 
 A copy of the packages with one option switched off and this tree each get a process of their own, compile for a
-minute, one after the other, and then run the twelve starts of `reference` in turns, with 2, 10 and 30 modes, and three
-modes under noise. Printed are medians over the starts of the ratios of shortest processor times, so that other work on
-the machine matters little, and whether all ends are the same bit for bit. ``--against`` compares this tree with
-another one instead, ``--cases RK4:2 Newmark:10 --rounds 20`` by runs of other methods, name and modes. Without packed
-arguments (``tuples``) parts cannot be called at addresses: compare with ``parts``.
+minute, one after the other, and then run the twelve starts of `reference` in turns, with 2, 10 and 30 modes, three
+modes under noise, and 2 and 10 modes with 100 samples and their energy balance (``2s``, ``10s``). Printed are medians
+over the starts of the ratios of shortest processor times, so that other work on the machine matters little, and whether
+all ends are the same bit for bit. ``--against`` compares this tree with another one instead, ``--cases RK4:2 Newmark:10
+--rounds 20`` by runs of other methods, name and modes. Without packed arguments (``tuples``) parts cannot be called at
+addresses: compare with ``parts``.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from typing import Any
 
 HOME = Path(__file__).resolve().parent.parent.parent
 PACKAGES = "fembeam", "contacts", "reduction", "solvers"
-CASES = ["2", "10", "30", "noise"]
+CASES = ["2", "10", "30", "noise", "2s", "10s"]
 ROUNDS = 200
 SETTINGS = {"DormandPrince": {"rtol": 1e-8}, "HenonRK2": {"dt_flight": 2e-6, "dt_contact": 1e-6}}
 _NO_PARTS = (
@@ -75,7 +76,7 @@ def runs_of(case: str) -> list[Callable[[], Any]]:
     """The runs of one case; each returns a number of its end."""
     import numpy as np
     import peers
-    from reference import problem
+    from reference import DURATION, problem
 
     import contacts
     import fembeam
@@ -87,6 +88,11 @@ def runs_of(case: str) -> list[Callable[[], Any]]:
         setting = SETTINGS.get(name, {"dt": 1e-5 if of.n < 10 else 1e-6})
         run = peers.constant_step(of, {"kind": getattr(solvers, name), **setting})
         return [lambda start=start: run(start)[0] for start in of.starts[:4]]
+    if case.endswith("s"):
+        of, dt = problem(int(case[:-1])), DURATION / 100
+        return [
+            lambda z=z: solvers.integrate(of.system, *np.split(z, 2), DURATION, dt).q[-1, 0] for z in of.starts[:12]
+        ]
     if case != "noise":
         of = problem(int(case))
         run = peers.exponential(of, {"rtol": 1e-8})

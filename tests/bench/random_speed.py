@@ -26,7 +26,7 @@ import solvers.exponential.method
 from fembeam.study import ensemble, stationary
 
 METHOD = solvers.Exponential(1e-6, ledger=False)
-RELEASING = [(solvers.exponential.method, "advance"), (scipy.fft, "irfft"), (np.fft, "rfft")]
+RELEASING = [(solvers.exponential.method.Engine, "march"), (scipy.fft, "irfft"), (np.fft, "rfft")]
 
 
 def paper_model():
