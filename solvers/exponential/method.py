@@ -210,7 +210,10 @@ class Engine:
 
     def sample(self, times: Array | None) -> None:
         """Make room for outputs at times; None if the end alone is kept."""
-        self.workspace.sample(times, self.duration)
+        if times is not None:
+            self.workspace.sample(times, self.duration)
+        elif self.workspace.times is not None:
+            self.workspace.forget_outputs()
 
     def record(self, **arrays: Array) -> None:
         """Replace arrays of the state that outputs go to: ``log``, ``event_record``."""
@@ -219,8 +222,8 @@ class Engine:
     def release(self) -> None:
         """Leave the workspace to another run; this run's state must not be read any more."""
         if not self.workspace.state.event_record.size:
-            if self.workspace.state.out.size > _KEPT:
-                self.workspace.sample(None, self.duration)
+            if self.workspace.state is not self.workspace.ready or self.workspace.state.out.size > _KEPT:
+                self.workspace.forget_outputs()
             self.prepared.spare_workspaces.append(self.workspace)
 
     def start(self) -> None:

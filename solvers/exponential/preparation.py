@@ -63,8 +63,9 @@ class Workspace:
         n = rest.size // 2
         self.p, self.v = self.state.x[:blocks], self.state.x[n : n + blocks]  # of the structure's own blocks
         self.replace(log=new_log(len(self.state.segment)))
-        self.times: Array | None = None  # of the outputs there is room for
         self.first = self.state, self.block[layout.size :].copy()  # and the addresses of its arrays
+        self.times: Array | None = None  # of the outputs there is room for
+        self.ready = self.state  # as a run begins, its list of events short
 
     def begin(self, z: Array, duration: float, rtol: float) -> None:
         """The state of a run at t = 0 from the coordinates of the structure's own blocks."""
@@ -76,14 +77,17 @@ class Workspace:
         self.p += z[: self.p.size]
         self.v += z[self.p.size :]
 
-    def sample(self, times: Array | None, duration: float) -> None:
-        """Make room for outputs at times, or for the end alone; room for the same times is used again."""
-        if self.times is times:
-            return
-        self.state, self.block[self.layout.size :] = self.first
-        self.times = times
-        if times is not None:
+    def sample(self, times: Array, duration: float) -> None:
+        """Make room for outputs at times; room for the same times is used again."""
+        if self.times is not times:
+            self.forget_outputs()
             self.replace(**output_arrays(times, duration, self.state.x.size))
+            self.times, self.ready = times, self.state
+
+    def forget_outputs(self) -> None:
+        """Remove the room for outputs, so that the next run keeps its end only, and a short list of events."""
+        self.state, self.block[self.layout.size :] = self.first
+        self.times, self.ready = None, self.state
 
     def replace(self, **arrays: Array) -> None:
         """Replace arrays of the state by others."""
