@@ -145,6 +145,22 @@ def test_run_started_from_the_progress_of_another_is_apart():
     assert all(same(run, inner[0]) for run in inner)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_room_for_outputs_is_used_again_for_the_same_samples_only(seed):
+    rng, used = np.random.default_rng(seed), paper_scene().reduce(2).system
+    samplings, kept = [None, 1e-3, 7e-4, np.linspace(0.0, 0.04, 9), np.array([0.01, 0.013])], []
+    for _ in range(12):
+        duration, sampling, start = rng.choice([0.05, 0.06]), samplings[rng.integers(5)], STARTS[rng.integers(3)]
+        asked = start[:2], start[2:], float(duration), sampling
+        kept.append((integrate(used, *asked), integrate(paper_scene().reduce(2).system, *asked)))
+    for found, alone in kept:  # none is changed by those after it
+        assert same(found, alone)
+        assert np.array_equal(found.t, alone.t)
+        assert np.array_equal(found.energy.input, alone.energy.input, equal_nan=True)
+    kept[0][0].t[:] = -1.0  # belongs to the caller
+    assert all(found.t[0] >= 0.0 for found, _ in kept[1:])
+
+
 def test_arguments_are_left_alone(paper):
     q0, q_dot0 = STARTS[1][:2].copy(), STARTS[1][2:].copy()
     integrate(paper, q0, q_dot0, 0.05, 1e-3)
