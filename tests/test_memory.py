@@ -11,6 +11,7 @@ from contacts import Hertz, KelvinVoigt, Polynomial
 from contacts.memory import BoucWen, Coulomb, Iwan, Jenkins, WaltonBraun
 from fembeam import Harmonic
 from solvers import Contact, DormandPrince, Exponential, Parameter, System, integrate, orbit
+from solvers.sensitivities import sensitivity
 
 OMEGA, ZETA = [1.0, 3.7, 9.0], [0.01, 0.01, 0.02]
 
@@ -124,6 +125,30 @@ def test_tangent_over_many_borders(laws):
     wanted.append(end(parameter.ahead, x, duration)[0] - end(parameter.behind, x, duration)[0])
     wanted = np.transpose(wanted) / (2.0 * step)
     assert abs(found - wanted).max() < 3e-7 * max(1.0, abs(wanted).max())
+
+
+OF_SIZE = {  # laws whose motion of another size is the same but for the unit of length
+    "Jenkins": lambda size: Jenkins(50.0, 0.4 * size),
+    "Coulomb": lambda size: Coulomb(0.4 * size, 50.0, 0.5 * size, 0.1),
+    "Iwan": lambda size: Iwan((30.0, 20.0, 10.0), (0.1 * size, 0.2 * size, 0.3 * size)),
+    "BoucWen": lambda size: BoucWen(50.0, 0.2, 1.0, 30.0 / size, 20.0 / size),
+    "WaltonBraun": lambda size: WaltonBraun(40.0, 90.0),
+}
+
+
+@pytest.mark.parametrize("name", OF_SIZE)
+def test_tangents_do_not_depend_on_the_unit_of_length(name):
+    x, found = np.array([0.03, -0.01, 0.4, 0.2]), []
+    for size in (1.0, 1e-9, 1e6):
+        contact = element(OF_SIZE[name](size), -1.0, 0.3)
+        system = System(np.eye(2), np.diag([0.2, 0.3]), np.array([[40.0, -15.0], [-15.0, 60.0]]), [contact])
+        run = end(system, size * x, 2.0, 1e-10, tangent=True)[1]
+        q, q_dot = np.split(size * x, 2)
+        found.append((run.memory_tangent, sensitivity(system, q, q_dot, 2.0, method=Exponential(1e-10)).matrix))
+        assert len(run.transitions) > 4
+    for pair in found[1:]:
+        for one, of_one in zip(pair, found[0], strict=True):
+            assert abs(one - of_one).max() < 1e-7 * abs(of_one).max()
 
 
 def test_tangent_by_the_slider():

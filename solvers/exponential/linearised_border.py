@@ -9,6 +9,7 @@ differences, those of m the law's own.
 from __future__ import annotations
 
 from solvers.compiled.kernels import (
+    abs_dot,
     acceleration_of,
     add_push,
     call_force,
@@ -21,6 +22,7 @@ from solvers.compiled.kernels import (
     inner,
     merged,
     rhs,
+    row_of,
     rubs,
 )
 from solvers.compiled.state import LAST_EVENT, T
@@ -28,7 +30,8 @@ from solvers.exponential.circles.derivative import change_of, is_parameter
 from solvers.exponential.circles.friction_derivative import pass_slider
 
 _LEFT_BEHIND = 1e-6  # margin, in units of its terms, below which its border is not reached but left behind
-_SHARE, _LEAST = 1e-7, 1e-10  # steps of differences: relative, and least, in the unit of the number; margins may bend
+_SHARE, _SMALL = 1e-7, 1e-8  # steps of differences, relative to the number, and at least to its terms; margins bend
+_UNKNOWN, _TRIALS = 1e-10, 4  # step from which that of a latched number, of unknown size, is found in so many trials
 _JUMP = 1e4  # ratio of the slopes of both sides from which one is that of a jump
 
 
@@ -54,25 +57,40 @@ def _slope(behind, here, ahead, step):
     return before if abs(after) > _JUMP * abs(before) else 0.5 * (before + after)
 
 
+@inlined
+def _step(number, size):
+    """Step of the differences by a number, which may be zero, whose terms have a size."""
+    return max(_SHARE * abs(number), _SMALL * size if size > 0.0 else _UNKNOWN)
+
+
 @merged
 def _slopes_of_margin(run, s, j, delta, rate, out):
-    """∂b/∂δ, ∂b/∂δ̇ and ∂b/∂L by differences."""
-    problem = run.problem
+    """∂b/∂δ, ∂b/∂δ̇ and ∂b/∂L by differences; by L, of an unknown unit, with steps that change b as those before."""
+    problem, n2, r = run.problem, 2 * run.problem.k.size, row_of(run.problem, s)
     width, most = problem.parameters.shape[1], problem.latched.shape[1]
     row = run.derivatives.renewed[most * (2 + most) : most * (2 + most) + width]
     copy(problem.parameters[s], row, width)
     here = _margin(run, problem, s, j, delta, rate, row)
-    step = max(_SHARE * abs(delta), _LEAST)
+    step = _step(delta, abs_dot(problem.read[r], run.past.x, n2))
     ahead = _margin(run, problem, s, j, delta + step, rate, row)
     out[0] = _slope(_margin(run, problem, s, j, delta - step, rate, row), here, ahead, step)
-    step = max(_SHARE * abs(rate), _LEAST)
+    change = abs(out[0] * step)
+    step = _step(rate, abs_dot(problem.read_rate[r], run.past.x, n2))
     ahead = _margin(run, problem, s, j, delta, rate + step, row)
     out[1] = _slope(_margin(run, problem, s, j, delta, rate - step, row), here, ahead, step)
+    change = max(change, abs(out[1] * step))
     for i in range(most):
         place, out[2 + i] = problem.latched[s, i], 0.0
         if place < 0:
             continue
-        known, step = row[place], max(_SHARE * abs(row[place]), _LEAST)
+        known, step = row[place], _UNKNOWN
+        for _ in range(_TRIALS if change > 0.0 else 0):
+            row[place] = known + step
+            found = abs(_margin(run, problem, s, j, delta, rate, row) - here)
+            if not (found > 2.0 * change or 0.0 < found < 0.5 * change):
+                break
+            step *= change / found
+        step = max(_SHARE * abs(known), step)
         row[place] = known + step
         ahead = _margin(run, problem, s, j, delta, rate, row)
         row[place] = known - step

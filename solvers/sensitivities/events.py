@@ -160,7 +160,8 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
     s, border, (d_delta, d_rate, rate, acceleration) = int(row[at.ELEMENT]), int(row[at.GUARD]), motion
     law: Any = flow.system.contacts[s].law
     place = border, float(row[at.DELTA]), float(row[at.RATE])
-    by = laws.margin_slopes(law, acting.rows[s], *place, acting.entry_rate[s])
+    sizes = np.abs(flow.motion.at(t)) @ np.abs(flow.system.contacts[s].rows[0])
+    by = laws.margin_slopes(law, acting.rows[s], *place, acting.entry_rate[s], sizes)
     known = flow.latched[s]
     d_margin = by[0] * d_delta + by[1] * d_rate + by[2:] @ known
     d_margin[flow.own] += flow.over_laws(

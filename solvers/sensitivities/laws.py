@@ -12,7 +12,8 @@ from solvers.problem import Array, renew
 _REALS = ctypes.c_void_p
 _KNOWN = ctypes.c_int64, _REALS, _REALS, ctypes.c_double, _REALS
 _ONE, _THREE = ctypes.CFUNCTYPE(None, *_KNOWN, _REALS), ctypes.CFUNCTYPE(None, *_KNOWN, *[_REALS] * 3)
-_SHARE, _LEAST = 1e-7, 1e-10  # relative and least step in differences of margins, which are nearly linear
+_SHARE, _SMALL = 1e-7, 1e-8  # steps of differences, relative to the number, and at least to its terms; margins bend
+_UNKNOWN, _TRIALS = 1e-10, 4  # step from which that of a latched number, of unknown size, is found in so many trials
 
 
 def _pointers(*arrays: Array) -> list[int]:
@@ -78,8 +79,14 @@ def margin(law: Any, row: Array, border: int, delta: float, rate: float, entry_r
     return float(out[border, 0])
 
 
-def margin_slopes(law: Any, row: Array, border: int, delta: float, rate: float, entry_rate: float) -> Array:
-    """Derivatives (2 + l,) of a margin by δ, δ̇ and the latched numbers, by differences."""
+def margin_slopes(
+    law: Any, row: Array, border: int, delta: float, rate: float, entry_rate: float, sizes: Array
+) -> Array:
+    """Derivatives (2 + l,) of a margin by δ, δ̇ and the latched numbers, by differences.
+
+    ``sizes`` (2,) are those of the terms of δ and δ̇. Latched numbers, of unknown units, have steps that change the
+    margin as those of the motion.
+    """
     places = list(law.memory)
     at = np.array([delta, rate, *row[places]])
 
@@ -88,11 +95,17 @@ def margin_slopes(law: Any, row: Array, border: int, delta: float, rate: float, 
         other[places] = x[2:]
         return margin(law, other, border, float(x[0]), float(x[1]), entry_rate)
 
-    found = np.zeros(at.size)
-    for i, step in enumerate(np.maximum(_SHARE * np.abs(at), _LEAST)):
-        unit = np.zeros(at.size)
-        unit[i] = step
-        found[i] = (value(at + unit) - value(at - unit)) / (2.0 * step)
+    here, change, found = value(at), 0.0, np.zeros(at.size)
+    for i, unit in enumerate(np.eye(at.size)):
+        step = _SMALL * sizes[i] if i < 2 and sizes[i] > 0.0 else _UNKNOWN
+        for _ in range(_TRIALS if i >= 2 and change > 0.0 else 0):
+            by_step = abs(value(at + step * unit) - here)
+            if not (by_step > 2.0 * change or 0.0 < by_step < 0.5 * change):
+                break
+            step *= change / by_step
+        step = max(step, _SHARE * abs(at[i]))
+        found[i] = (value(at + step * unit) - value(at - step * unit)) / (2.0 * step)
+        change = max(change, abs(found[i] * step)) if i < 2 else change
     return found
 
 
