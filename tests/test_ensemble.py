@@ -48,7 +48,7 @@ def peaks(model):
 
 def slow_peaks(model):
     """The same, slow enough to be killed in the middle; hangs after so many calls when told to."""
-    time.sleep(0.1)
+    time.sleep(float(os.environ.get("PAUSE", "0.02")))
     os.environ["CALLS"] = str(calls() + 1)  # no variable of this module: it would belong to the checkpoint
     if calls() > int(os.environ.get("HANG_AFTER", "1000")):
         time.sleep(600.0)
@@ -243,9 +243,10 @@ def wait_for(condition, seconds=200.0):
     return None
 
 
-def test_two_dask_workers_one_killed(tmp_path, alone):
+def test_two_dask_workers_one_killed(tmp_path, alone, monkeypatch):
     distributed = pytest.importorskip("distributed", reason="the extra 'cluster' is not installed")
     path = tmp_path / "kept.npz"
+    monkeypatch.setenv("PAUSE", "0.1")  # some are left when one is killed
     options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None, "local_directory": str(tmp_path)}
     with distributed.LocalCluster(**options) as cluster, distributed.Client(cluster) as client:
         pids = list(client.run(os.getpid).values())
