@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from problems import paper_scene
 
 import fembeam as fb
 import solvers
@@ -14,16 +15,10 @@ from fembeam.study.execution import executors
 from fembeam.study.execution.checkpoint import Checkpoint
 from solvers.exponential.method import Engine as Engine
 
-SCENE = fb.Scene(
-    beam=fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
-    supports=[fb.Clamped(0.0)],
-    stops=[fb.Stop(0.24445, law=Hertz(2.1e8))],
-    damping=fb.ModalDamping(0.02),
-    base=fb.BandNoise(std=2.5e-4, band=(0.0, 1226.6), seed=1),
-)
+SCENE = paper_scene(fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1), 0.02, Hertz(2.1e8), masses=())
 MODEL = SCENE.reduce(modes=2)
 DRIVE = {"base": fb.Harmonic(5e-4, 150.0), "damping": fb.ModalDamping(0.1)}  # settles into one orbit, |μ| = 0.6
-DRIVEN = fb.Scene(**{**vars(SCENE), **DRIVE}).reduce(modes=2)
+DRIVEN = replace(SCENE, **DRIVE).reduce(modes=2)
 ORBIT = DRIVEN.orbit()
 
 

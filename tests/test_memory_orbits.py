@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from oscillators import Tone, from_phase, state_after, state_at_zero
+from problems import paper_scene
 from scipy.optimize import root
 
 import fembeam as fb
@@ -346,14 +347,8 @@ def test_phases_that_come_and_go_are_located():
 
 
 def test_branch_of_a_beam_with_friction_is_saved_and_gone_on_with(tmp_path):
-    scene = fb.Scene(
-        beam=fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
-        supports=[fb.Clamped(0.0)],
-        elements=[fb.Element(0.2, Jenkins(300.0, 0.1))],
-        damping=fb.ModalDamping([0.02, 0.01]),
-        base=fb.Harmonic(amplitude=1e-3, omega=250.0),
-    )
-    model = scene.reduce(modes=2)
+    slider = fb.Element(0.2, Jenkins(300.0, 0.1))
+    model = paper_scene(fb.Harmonic(1e-3, 250.0), masses=(), stops=(), elements=[slider]).reduce(modes=2)
     start = model.orbit()
     assert "forgets" in str(start)
     assert len(start.transitions) >= 4

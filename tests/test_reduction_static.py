@@ -1,13 +1,15 @@
 """Residual shapes, Craig–Bampton, Guyan, truncation by frequency and mass; models of scenes made with them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from problems import PAPER_BEAM, STEEL
+from problems import STEEL, paper_scene
 
 import reduction
 import solvers
 from contacts import Hertz, KelvinVoigt
-from fembeam.beams import Beam, ModalDamping, Rayleigh, Section
+from fembeam.beams import Beam, Rayleigh, Section
 from fembeam.excitation import Harmonic
 from fembeam.model import reduce as reducing
 from fembeam.scene import Clamped, LumpedMass, PointForce, Scene, Stop
@@ -203,15 +205,7 @@ def test_modes_next_to_one_left_out_settle():
 
 
 def struck(law=None, damping=0.01, **changes):
-    parts = {
-        "beam": PAPER_BEAM,
-        "supports": [Clamped(0.0)],
-        "masses": [LumpedMass(0.24445, 25.4e-3, inertia=3.0e-6)],
-        "stops": [Stop(0.24445, law or Hertz(2.1e8))],
-        "damping": ModalDamping(damping),
-        **changes,
-    }
-    return Scene(**parts)
+    return replace(paper_scene(zeta=damping, law=law or Hertz(2.1e8)), **{"base": None, **changes})
 
 
 def test_models_with_static_shapes():
@@ -244,8 +238,7 @@ def test_pseudo_modes_are_damped_as_higher_modes():
     ratios = struck(damping=[0.03, 0.02, 0.01]).reduce(1, residual=True).zeta
     np.testing.assert_allclose(ratios, [0.03, 0.02])
     rayleigh = struck(damping=0.0, ).reduce(1, residual=True)  # fmt: skip
-    scene = struck()
-    model = Scene(**{**scene.__dict__, "damping": Rayleigh(2.0, 1e-5)}).reduce(1, residual=True)
+    model = replace(struck(), damping=Rayleigh(2.0, 1e-5)).reduce(1, residual=True)
     np.testing.assert_allclose(2 * model.zeta * model.omega, 2.0 + 1e-5 * rayleigh.omega**2, rtol=1e-9)
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from oscillators import Tone
+from problems import TIP, paper_scene
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, Iwan, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
@@ -340,15 +341,8 @@ PLACE = 0.2
 
 
 def scene(**other):
-    parts = {
-        "beam": fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
-        "supports": [fb.Clamped(0.0)],
-        "masses": [fb.LumpedMass(0.24445, mass=25.4e-3, inertia=3.0e-6)],
-        "stops": [fb.Stop(0.24445, Hysteretic(2.1e8, damping_factor=0.5), gap=1e-4, side="below", name="valve")],
-        "damping": fb.ModalDamping([0.02, 0.01]),
-        "base": fb.Harmonic(amplitude=1e-3, omega=195.0),
-    }
-    return fb.Scene(**{**parts, **other})
+    valve = fb.Stop(TIP, Hysteretic(2.1e8, damping_factor=0.5), gap=1e-4, side="below", name="valve")
+    return paper_scene(**{"stops": [valve], **other})
 
 
 @pytest.fixture(scope="module")
@@ -446,9 +440,8 @@ def test_an_orbit_with_a_slider():
 
 def test_chaos_is_told():
     """Between two elastic stops small changes grow over and over."""
-    rattling = scene(
-        stops=[fb.Stop(0.24445, Hertz(2.1e8), 1e-4, side) for side in ("below", "above")], base=fb.Harmonic(3e-3, 195.0)
-    )
+    stops = [fb.Stop(TIP, Hertz(2.1e8), 1e-4, side) for side in ("below", "above")]
+    rattling = scene(stops=stops, base=fb.Harmonic(3e-3, 195.0))
     run = rattling.reduce(modes=2).simulate(0.12)
     with pytest.warns(UserWarning, match="small changes of the start grow by"):
         run.sensitivity("stops[0].gap")
