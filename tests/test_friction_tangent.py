@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from differences import central, end_of, jacobian
 from oscillators import Tone
 from scipy.optimize import fsolve
 from test_friction import EYE, SHARP, disc, pulled, wall
@@ -17,15 +18,7 @@ FINE = Exponential(1e-11)
 
 def by_differences(system, q, q_dot, duration, step=1e-6, memory=None):
     """The derivative of the end by the start, by central differences of the independent method."""
-    x, columns = np.concatenate((q, q_dot)), []
-    for i in range(x.size):
-        ends = []
-        for sign in (1.0, -1.0):
-            moved = x.copy()
-            moved[i] += sign * step
-            ends.append(integrate(system, *np.split(moved, 2), duration, method=SHARP, memory=memory).end[: x.size])
-        columns.append((ends[0] - ends[1]) / (2.0 * step))
-    return np.array(columns).T
+    return jacobian(end_of(system, duration, SHARP, memory=memory), np.concatenate((q, q_dot)), step, central)
 
 
 RUNS = {

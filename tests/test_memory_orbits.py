@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from differences import central, jacobian
 from oscillators import Tone, from_phase, state_after, state_at_zero
 from problems import paper_scene
 from scipy.optimize import root
@@ -196,15 +197,13 @@ def differenced(found, step=1e-6):
     """Derivative of the return map by the real numbers of the state, central."""
     later, x = from_phase(found), found.whole
     whole = [i for i in range(len(x)) if i < 2 * found.system.size or x[i] != round(x[i])]
-    columns = []
-    for i in whole:
-        ends = []
-        for side in (1.0, -1.0):
-            moved = x.copy()
-            moved[i] += side * step
-            ends.append(state_after(later, moved, found.period, Exponential(1e-12))[whole])
-        columns.append((ends[0] - ends[1]) / (2.0 * step))
-    return np.transpose(columns)
+
+    def end(numbers):
+        moved = x.copy()
+        moved[whole] = numbers
+        return state_after(later, moved, found.period, Exponential(1e-12))[whole]
+
+    return jacobian(end, x[whole], step, central)
 
 
 PAIR = element(Jenkins(50.0, 0.1), -1.0, -0.5, 0.3), element(Jenkins(30.0, 0.08), -0.2, 0.9, -0.5)

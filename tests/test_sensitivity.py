@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from differences import five_points
 from oscillators import Tone
 from problems import TIP, paper_scene
 
@@ -105,12 +106,6 @@ CASES = {
     "structure": (lambda p: beam(stiffer=p), 1.0),
     "direction": (lambda p: beam(turn=p - 1.0), 1.0),
 }
-
-
-def five_points(function, step):
-    """Central differences of fourth order."""
-    a, b, c, d = (np.asarray(function(k * step)) for k in (-2, -1, 1, 2))
-    return (8.0 * (c - b) - (d - a)) / (12.0 * step)
 
 
 def test_a_sum_with_a_part_that_is_cut_at_zero():
