@@ -7,6 +7,7 @@ import pickle
 import numpy as np
 import pytest
 from problems import force_of
+from refusals import refused
 
 from contacts import (
     PUBLISHED,
@@ -489,18 +490,13 @@ def test_a_law_that_pulls_at_rest_is_refused():
         sticky(k=1e4)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: law(3.0), "decorates a plain function"),
-        (lambda: law(derivative=3.0)(lambda delta, delta_dot, entry_rate: delta), "derivative of law .* got 3.0"),
-        (lambda: law(lambda delta, delta_dot, entry_rate, *more: delta), r"plain arguments only, got '\*more'"),
-        (lambda: law(lambda delta, delta_dot, entry_rate=1.0: delta), "have no default"),
-    ],
+test_odd_signatures_and_values_are_refused = refused(
+    (lambda: law(3.0), "decorates a plain function"),
+    (lambda: law(derivative=3.0)(lambda delta, delta_dot, entry_rate: delta), "derivative of law .* got 3.0"),
+    (lambda: law(lambda delta, delta_dot, entry_rate, *more: delta), r"plain arguments only, got '\*more'"),
+    (lambda: law(lambda delta, delta_dot, entry_rate=1.0: delta), "have no default"),
+    error=TypeError,
 )
-def test_odd_signatures_and_values_are_refused(make, message):
-    with pytest.raises(TypeError, match=message):
-        make()
 
 
 def test_the_line_that_cannot_be_compiled_is_named():

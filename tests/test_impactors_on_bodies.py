@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 from structures import beam_structure, space_truss
 
 import fembeam as fb
@@ -129,7 +130,8 @@ law = { kind = "hertz", stiffness = 1e8 }
     assert file_of(text).scene.impactors == (fb.Impactor(("A-B", 0.3), **BALL, direction="y"),)
 
 
-@pytest.mark.parametrize(("make", "says"), [
+# Where a direction is missing, or none that the place has.
+test_refused = refused(
     (lambda: framed("B"), r"needs a direction, got None in impactors\[0\].*add direction='x' or so.* has x, y, rz"),
     (lambda: framed("B", direction="z"), "must move along z; it has x, y, rz"),
     (lambda: framed("B", direction="rz"), "direction of an impactor must be no rotation, got 'rz' in Impactor at 'B'"),
@@ -138,8 +140,4 @@ law = { kind = "hertz", stiffness = 1e8 }
     (lambda: framed(("A-B", 0.5), direction="y"), "0.4"),
     (lambda: fb.Scene(fb.Beam(0.4, STEEL), [fb.Clamped(0.0)], impactors=[fb.Impactor(0.3, **BALL, direction="y")]),
      "direction is for bodies that are not a Beam"),
-])  # fmt: skip
-def test_refused(make, says):
-    """Where a direction is missing, or none that the place has."""
-    with pytest.raises(ValueError, match=says):
-        make()
+)  # fmt: skip

@@ -5,6 +5,7 @@ import pickle
 
 import numpy as np
 import pytest
+from refusals import refused
 from test_memory_laws import asked, borders, forces, renewal_slopes, renewed, with_memory
 
 from contacts import Border, Iwan, Jenkins, Polynomial, Segment, WaltonBraun, memory_law
@@ -256,31 +257,23 @@ MISTAKES = [
 ]
 
 
-@pytest.mark.parametrize(("make", "said"), MISTAKES)
-def test_mistakes_get_a_sentence(make, said):
-    with pytest.raises(ValueError, match=said):
-        make()
+test_mistakes_get_a_sentence = refused(*MISTAKES)
 
 
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (made(slip=Segment(bad_arguments)), "must take the same arguments, but 'pull' takes .* and 'bad_arguments'"),
-        (
-            lambda: memory_law("mine", {"a": Segment(bad_arguments)}, LATCHED),
-            "must take .delta, delta_dot, way, slider, par",
-        ),
-        (
-            made(stick=Segment(no_number, Border(left, "slip", let_go))),
-            "law with memory 'no_number' .* cannot be compiled",
-        ),
-        (lambda: friction(stiffness=1.0), "law 'friction': missing a required argument: 'limit'"),
-        (lambda: friction(stiffness=1.0, limit=1.0, mass=2.0), "law 'friction': unexpected 'mass'"),
-    ],
+test_functions_that_do_not_fit = refused(
+    (made(slip=Segment(bad_arguments)), "must take the same arguments, but 'pull' takes .* and 'bad_arguments'"),
+    (
+        lambda: memory_law("mine", {"a": Segment(bad_arguments)}, LATCHED),
+        "must take .delta, delta_dot, way, slider, par",
+    ),
+    (
+        made(stick=Segment(no_number, Border(left, "slip", let_go))),
+        "law with memory 'no_number' .* cannot be compiled",
+    ),
+    (lambda: friction(stiffness=1.0), "law 'friction': missing a required argument: 'limit'"),
+    (lambda: friction(stiffness=1.0, limit=1.0, mass=2.0), "law 'friction': unexpected 'mass'"),
+    error=TypeError,
 )
-def test_functions_that_do_not_fit(make, said):
-    with pytest.raises(TypeError, match=said):
-        make()
 
 
 def raising(delta, delta_dot, way, slider, stiffness, limit):

@@ -9,6 +9,7 @@ import pytest
 from differences import five_points
 from oscillators import Tone
 from problems import TIP, paper_scene
+from refusals import refused
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, Iwan, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
@@ -305,13 +306,11 @@ def test_a_start_on_the_surface_into_the_stop(damping):
     np.testing.assert_allclose(found, [0.9 * (1.0 - math.cos(0.7 * w)), 0.9 * w * math.sin(0.7 * w)], rtol=1e-9)
 
 
-def test_refusals_of_systems():
-    with pytest.raises(ValueError, match="slope is infinite"):
-        sensitivity(ball(law=Viscoelastic.tsuji(2e7, 0.6, 0.3)), [0.0], [SPEED], 0.5)
-    with pytest.raises(ValueError, match="duration must be positive"):
-        sensitivity(ball(), [0.0], [SPEED], -1.0)
-    with pytest.raises(ValueError, match="no such value"):
-        Nearby.of(lambda value: _refuse(), 1.0, 1e-3)
+test_refusals_of_systems = refused(
+    (lambda: sensitivity(ball(law=Viscoelastic.tsuji(2e7, 0.6, 0.3)), [0.0], [SPEED], 0.5), "slope is infinite"),
+    (lambda: sensitivity(ball(), [0.0], [SPEED], -1.0), "duration must be positive"),
+    (lambda: Nearby.of(lambda value: _refuse(), 1.0, 1e-3), "no such value"),
+)
 
 
 def _refuse():

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusals import refused_by
 
 import fembeam as fb
 import solvers
@@ -515,23 +516,19 @@ def test_memory_of_many_modes():
     assert correlation_time(light) == pytest.approx(1e7 / light.omega[0], rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"duration": -1.0}, "duration"),
-        ({"dt": 0.0}, "dt"),
-        ({"dt": 1.0}, "64 samples"),
-        ({"until": 2.0}, "until must be"),
-        ({"discard": -1.0}, "discard"),
-        ({"duration": 1.0}, "duration must be at least 3.5"),
-        ({"bins": {"x": [0.0, 1.0]}}, "bins names 'x', which is not watched; there are tip u, mid-beam u"),
-        ({"levels": {"x": 0.0}}, "levels names 'x'"),
-    ],
+test_bad_input = refused_by(
+    lambda arguments: stationary(
+        cantilever(1, base=fb.BandNoise(1e-4, (0.0, 600.0))), **{"duration": 10.0, "dt": 2e-3, **arguments}
+    ),
+    ({"duration": -1.0}, "duration"),
+    ({"dt": 0.0}, "dt"),
+    ({"dt": 1.0}, "64 samples"),
+    ({"until": 2.0}, "until must be"),
+    ({"discard": -1.0}, "discard"),
+    ({"duration": 1.0}, "duration must be at least 3.5"),
+    ({"bins": {"x": [0.0, 1.0]}}, "bins names 'x', which is not watched; there are tip u, mid-beam u"),
+    ({"levels": {"x": 0.0}}, "levels names 'x'"),
 )
-def test_bad_input(arguments, message):
-    model = cantilever(1, base=fb.BandNoise(1e-4, (0.0, 600.0)))
-    with pytest.raises(ValueError, match=message):
-        stationary(model, **{"duration": 10.0, "dt": 2e-3, **arguments})
 
 
 def test_bad_models():

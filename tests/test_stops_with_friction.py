@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from refusals import refused_by
 
 import fembeam as fb
 import solvers
@@ -332,18 +333,14 @@ def test_scene_files(file_of):
     assert "mu" in str(json_schema()["$defs"]["kind such as coulomb"])
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"friction": 0.3}, "friction must be a Friction"),
-        ({"friction": None, "radius": 0.01}, "radius is for an annular stop with friction"),
-        ({"radius": 0.0}, "radius must be finite and positive"),
-        ({"clearance": 0.0}, "clearance must be finite and positive"),
-    ],
+test_bad_annular_stops_are_refused = refused_by(
+    lambda options: fb.AnnularStop(**{"z": 0.4, "law": LAW, "clearance": 2e-4, "friction": RUB, **options}),
+    ({"friction": 0.3}, "friction must be a Friction"),
+    ({"friction": None, "radius": 0.01}, "radius is for an annular stop with friction"),
+    ({"radius": 0.0}, "radius must be finite and positive"),
+    ({"clearance": 0.0}, "clearance must be finite and positive"),
+    error=(ValueError, TypeError),
 )
-def test_bad_annular_stops_are_refused(options, message):
-    with pytest.raises((ValueError, TypeError), match=message):
-        fb.AnnularStop(**{"z": 0.4, "law": LAW, "clearance": 2e-4, "friction": RUB, **options})
 
 
 @pytest.mark.parametrize(
