@@ -63,9 +63,8 @@ def test_momentum_is_conserved_to_rounding_between_free_bodies(law):
 
 def test_impactor_from_below_is_the_mirror_image():
     def scene(side):
-        return fb.Scene(
-            fb.Beam(0.4, STEEL), [fb.Clamped(0.0)], impactors=[fb.Impactor(0.3, 0.05, side * 2.0, HERTZ, 1e-4)]
-        )
+        ball = fb.Impactor(0.3, 0.05, side * 2.0, HERTZ, 1e-4)
+        return fb.Scene(fb.Beam(0.4, STEEL), [fb.Clamped(0.0)], impactors=[ball])
 
     above, below = (scene(side).reduce(4).simulate(0.01, 1e-4) for side in (-1, 1))
     np.testing.assert_allclose(below.displacement(0.4), -above.displacement(0.4), atol=1e-13)
@@ -164,9 +163,8 @@ def test_ball_on_beam_converges_with_modes():
 
 def test_two_free_beams_collide_and_keep_their_momentum():
     other = fb.Scene(fb.Beam(0.3, STEEL))
-    scene = fb.Scene(
-        fb.Beam(0.4, STEEL), bodies=[other], stops=[fb.Stop(0.15, HERTZ, gap=1e-4, side="above", on=(1, 0.2))]
-    )
+    stop = fb.Stop(0.15, HERTZ, gap=1e-4, side="above", on=(1, 0.2))
+    scene = fb.Scene(fb.Beam(0.4, STEEL), bodies=[other], stops=[stop])
     model = scene.reduce(6)
     start = model.state(velocity=[lambda z: 0.5 + 0 * z, lambda z: -0.5 + 0 * z])
     run = model.simulate(0.01, 1e-4, start=start)
@@ -221,9 +219,7 @@ def test_numbers_of_contacts_follow_the_bodies(tmp_path):
 def test_indentation_rate_of_a_stop_between_two_beams_is_that_of_both():
     other = fb.Scene(fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], damping=fb.ModalDamping(0.02))
     stop = fb.Stop(0.5, HERTZ, gap=1e-4, on=(1, 0.5))
-    scene = fb.Scene(
-        fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], stops=[stop], bodies=[other], base=fb.Harmonic(1e-3, 150.0)
-    )
+    scene = fb.Scene(fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], stops=[stop], bodies=[other], base=fb.Harmonic(1e-3, 150))
     model = scene.reduce(2)
     run = model.simulate(0.1, 1e-5, start=model.state(velocity=lambda z: -2.0 * z**2))
     assert len(run.contacts)

@@ -184,9 +184,8 @@ def test_processes_killed_while_they_compile(package):
     environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": ""}
     known = "{} {} {}\n".format(*(2.0 * x + 1.0 for x in (1.0, 2.0, 3.0)))
     pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True}
-    each = [
-        subprocess.Popen([sys.executable, "-c", code], cwd=package.parent, env=environment, **pipes) for _ in range(3)
-    ]
+    command = [sys.executable, "-c", code]
+    each = [subprocess.Popen(command, cwd=package.parent, env=environment, **pipes) for _ in range(3)]
     for number, one in enumerate(each[:2]):
         one.stdout.readline()
         time.sleep(0.05 * number)

@@ -456,17 +456,15 @@ def test_a_given_derivative_is_used_and_checked():
             return delta
 
 
-@pytest.mark.parametrize(
-    ("power", "exponent"), [(1.0, 1.0), (1.25, 1.25), (1.5, 1.5), (1.507, 1.507), (2.0, 2.0), (3.0, 3.0)]
-)
-def test_the_leading_exponent_is_found(power, exponent):
+@pytest.mark.parametrize("power", [1.0, 1.25, 1.5, 1.507, 2.0, 3.0])
+def test_the_leading_exponent_is_found(power):
     @law
     def found(delta, delta_dot, entry_rate, p, more=0.0):
         return 1e6 * delta**p + more * delta ** (p + 0.5)
 
-    assert found(p=power).exponent == pytest.approx(exponent, abs=1e-4)
+    assert found(p=power).exponent == pytest.approx(power, abs=1e-4)
     if power % 0.25 == 0.0:
-        assert found(p=power, more=1e9).exponent == exponent
+        assert found(p=power, more=1e9).exponent == power
 
 
 def test_an_undeclared_jump_is_refused():
@@ -582,9 +580,7 @@ def test_clamp_may_be_a_bool_of_numpy():
     assert KelvinVoigt(1e5, 1.0, clamp=np.True_).clamp
 
 
-@pytest.mark.parametrize(
-    "of", [Hertz(3e8), Hysteretic(2e8, 0.7), Hysteretic(5e4, 0.3, exponent=1.0), KelvinVoigt(1e5, 30.0)]
-)
+@pytest.mark.parametrize("of", [Hertz(3e8), Hysteretic(2e8, 0.7), Hysteretic(5e4, 0.3, 1.0), KelvinVoigt(1e5, 30.0)])
 def test_the_formula_of_inlined_laws_is_their_kernel(of):
     K, p, a, c = of.inlined
     d, v, rate = np.linspace(0.0, 1e-3, 7)[1:], np.linspace(-0.6, 0.5, 6)[:, None], 0.4

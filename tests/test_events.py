@@ -320,9 +320,8 @@ def test_preloaded_rest_at_static_equilibrium_lasts(method):
     # K q = K_s (p - q)^1.5
     law, stiffness, preload = Hysteretic(1e8, 0.5), 1e4, 1e-4
     q = brentq(lambda x: stiffness * x - law.stiffness * (preload - x) ** 1.5, 0.0, preload, xtol=1e-20, rtol=1e-15)
-    run = integrate(
-        System([[1.0]], [[5.0]], [[stiffness]], [Contact([1.0], law, -preload)]), [q], [0.0], 2.0, 0.1, method
-    )
+    system = System([[1.0]], [[5.0]], [[stiffness]], [Contact([1.0], law, -preload)])
+    run = integrate(system, [q], [0.0], 2.0, 0.1, method)
     np.testing.assert_allclose(run.q[:, 0], q, rtol=1e-10)
     assert np.isnan(run.contacts.t_out).tolist() == [True]
     assert run.contacts.impulse[0] == pytest.approx(2.0 * stiffness * q, rel=1e-9)

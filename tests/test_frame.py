@@ -36,9 +36,8 @@ def test_rows_between_nodes(place, seed):
     frame = space_l(turned(seed))
     whole, split = frame.assembled(elements=2), frame.assembled(elements=4, places=[("B-C", place)])
     loads = [made.rows("C").toarray()[2] + 0.1 * made.rows("C").toarray()[4] for made in (whole, split)]
-    found = [
-        made.rows(("B-C", place)) @ static(made, load, "A") for made, load in zip((whole, split), loads, strict=True)
-    ]
+    pairs = zip((whole, split), loads, strict=True)
+    found = [made.rows(("B-C", place)) @ static(made, load, "A") for made, load in pairs]
     # rounding of u: eps times the condition 5e5 of K scaled to a diagonal of 1
     assert np.allclose(found[0], found[1], rtol=0, atol=1.2e-10 * np.abs(found[1]).max())
     unit = split.rows(("B-C", place))
@@ -139,9 +138,8 @@ test_refused = refused(
 def test_released_node():
     """All members released at a node leave it free, unless a support or an inertia holds it."""
     nodes = {"A": (0, 0), "B": (1, 0), "C": (2, 0)}
-    frame = fb.Frame(
-        nodes, [fb.Member("A", "B", STEEL, release="end rz"), fb.Member("B", "C", STEEL, release="start rz")]
-    )
+    ends = fb.Member("A", "B", STEEL, release="end rz"), fb.Member("B", "C", STEEL, release="start rz")
+    frame = fb.Frame(nodes, ends)
     with pytest.raises(ValueError, match="'B' moves along 'rz'"):
         frame.check_held({"A": ("x", "y")}, "Scene")
     frame.check_held({"B": ("rz",)}, "Scene")

@@ -776,9 +776,8 @@ def test_a_stick_just_before_the_force_falls_to_zero(v_t):
     law, push, v_n = KelvinVoigt(38516.70853165049, 26.079317489340514), 5.542014178595589, 0.1
     system = wall(law, 0.3403823395619191, 56412.948068841135, mass=1.0)
     pushed = replace(system, loads=[([0.0, 1.0], fb.Harmonic(push, 0.0))])
-    first, second = (
-        integrate(pushed, [-1e-6, 0.0], [v_n, v_t], 0.032, None, method) for method in (Exponential(1e-9), SHARP)
-    )
+    start = [-1e-6, 0.0], [v_n, v_t], 0.032, None
+    first, second = (integrate(pushed, *start, method) for method in (Exponential(1e-9), SHARP))
     assert first.contacts.t_out.shape == second.contacts.t_out.shape == (1,)
     np.testing.assert_allclose(first.q_dot[-1], second.q_dot[-1], rtol=1e-7)
     assert len(first.transitions.t) <= len(second.transitions.t) + 4

@@ -85,9 +85,7 @@ def test_of_a_settled_response_against_differences():
 def test_of_a_settled_friction_damper():
     """By the limit of its slider, which remembers."""
     damper = fb.Element(0.5, Jenkins(2e3, 1.0), name="damper")
-    scene = rod(
-        forces=[fb.PointForce(0.5, fb.Harmonic(1.0, 215.0))], elements=[damper], damping=fb.ModalDamping([0.01])
-    )
+    scene = rod(forces=[fb.PointForce(0.5, fb.Harmonic(1, 215))], elements=[damper], damping=fb.ModalDamping([0.01]))
     trial, x = trial_of(scene, ["elements[damper].law.limit"], [Amplitude(z=0.5), "rms"], SETTLED, modes=1)
     np.testing.assert_allclose(gradient(trial, x), differences(trial, x), rtol=5e-3)
 

@@ -44,10 +44,9 @@ def test_in_the_plane_two_numbers_will_do():
 def test_free_fall():
     """A free frame falls along the vector, after signals and a base motion are listed."""
     frame = fb.Frame.polyline({"A": (0, 0), "B": (1.0, 0)}, fb.Section.rectangle(2.1e11, 7850.0, 0.02, 0.01))
+    scene = fb.Scene(frame, gravity=(3.0, -9.81, 0.0), base={"x": fb.Harmonic(0.0, 1.0)})
     with pytest.warns(UserWarning, match="rigid-body modes appear"):
-        run = (
-            fb.Scene(frame, gravity=(3.0, -9.81, 0.0), base={"x": fb.Harmonic(0.0, 1.0)}).reduce(3).simulate(0.2, [0.2])
-        )
+        run = scene.reduce(3).simulate(0.2, [0.2])
     assert run.displacement("B", "x")[0] == pytest.approx(0.5 * 3.0 * 0.04, rel=1e-9)
     assert run.displacement("B", "y")[0] == pytest.approx(-0.5 * 9.81 * 0.04, rel=1e-9)
 

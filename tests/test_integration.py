@@ -260,9 +260,7 @@ def test_ledger_input_is_the_work_of_the_loads():
 
 
 def test_ledger_closes_with_coupled_damping():
-    system = coupled_dashpot(
-        [Contact([0.0, 0.0, 1.0], Hysteretic(1e7, 0.8))], [([1.0, 0.0, 0.0], fb.Harmonic(5.0, 60.0))]
-    )
+    system = coupled_dashpot([Contact([0.0, 0.0, 1.0], Hysteretic(1e7, 0.8))], [([1, 0, 0], fb.Harmonic(5.0, 60.0))])
     energy = integrate(system, [0, 0, 0], [0.0, 0.0, -1.0], 0.5, 1e-2, DormandPrince(1e-12)).energy
     assert energy.damping[-1] > 0.1 * energy.stored.max()
     assert np.abs(energy.residual).max() < 1e-11 * energy.stored.max()

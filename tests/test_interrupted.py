@@ -93,9 +93,8 @@ def test_an_interrupted_branch_goes_on_as_if_it_had_not_been(interrupt):
 
 NOISE = fb.BandNoise(std=3e-4, band=(0.0, 1226.6), seed=3)
 TWO_TONES = fb.Multisine([4e-4, 3e-4], [108.0, 171.0], [0.0, 0.4])
-RECORD = fb.Record(
-    np.arange(0.0, 30.0, 0.01), 20.0 * np.sin(40.0 * np.arange(0.0, 30.0, 0.01)), quantity="acceleration"
-)
+TIMES = np.arange(0.0, 30.0, 0.01)
+RECORD = fb.Record(TIMES, 20.0 * np.sin(40.0 * TIMES), quantity="acceleration")
 
 
 @pytest.mark.parametrize(("base", "segments", "every"), [(NOISE, 16, 3), (TWO_TONES, 2, 1), (RECORD, 1, 1)])

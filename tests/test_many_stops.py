@@ -36,9 +36,8 @@ def run(stops, signals, few, monkeypatch, laws=LAWS, **options):
     """From a start that brings several stops together, with tables up to so many stops."""
     monkeypatch.setattr(block_tables, "FEW", few)
     start = 1.0 / np.arange(1, MODES + 1) ** 3
-    return integrate(
-        tube(stops, signals, laws=laws), 2e-5 * start, 0.3 * start, 0.05, method=Exponential(1e-9), **options
-    )
+    system = tube(stops, signals, laws=laws)
+    return integrate(system, 2e-5 * start, 0.3 * start, 0.05, method=Exponential(1e-9), **options)
 
 
 def same(one, other, tolerance):

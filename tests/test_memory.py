@@ -164,9 +164,8 @@ def test_a_landing_off_by_rounding_is_not_passed_again(rtol):
 def test_equal_sliders_let_go_together_in_a_step_that_begins_as_they_stick(stiffness, rtol):
     """Margins that begin at zero, rise and fall to zero again within one step: five sliders do what their sum does."""
     law = Iwan([stiffness / 5] * 5, [0.06] * 5)
-    run = integrate(
-        System([[1.0]], [[0.02]], [[1.0]], [element(law, -1.0)]), [0.0], [1.7], 10.0, method=Exponential(rtol)
-    )
+    system = System([[1.0]], [[0.02]], [[1.0]], [element(law, -1.0)])
+    run = integrate(system, [0.0], [1.7], 10.0, method=Exponential(rtol))
     rows = run.transitions
     instants = np.unique(rows.t)
     assert len(rows) == 5 * len(instants) >= 40
@@ -183,9 +182,8 @@ def test_a_free_mass_pressed_at_rest_takes_few_steps(rtol):
     rest = integrate(system, [0.028], [0.0], 3.0, method=DormandPrince(1e-10))
     assert abs(rest.q_dot[-1, 0]) < 1e-10
     latched = [numbers if numbers.size else None for numbers in rest.memory]
-    run = integrate(
-        system, rest.q[-1], rest.q_dot[-1], 0.03, method=Exponential(rtol), memory=latched, progress=few_steps()
-    )
+    start, method = (rest.q[-1], rest.q_dot[-1]), Exponential(rtol)
+    run = integrate(system, *start, 0.03, method=method, memory=latched, progress=few_steps())
     assert run.cost.steps < 20_000
     assert abs(run.q - rest.q).max() < 1e-12
 
@@ -204,9 +202,7 @@ def test_a_yielding_stop_beside_a_spring():
     """What is lost is the area of the yielding part's loop, F² (1/k₁ - 1/k₂)/2, F its largest force."""
     contact = Contact([1.0], WaltonBraun(1e4, 4e4, set="forgotten") + KelvinVoigt(5e3, 0.0))
     assert contact.always  # without being told
-    run = integrate(
-        System([[2.0]], [[0.0]], [[0.0]], [contact]), [1e-3], [-0.5], 0.2, dt=1e-2, method=Exponential(1e-10)
-    )
+    run = integrate(System([[2.0]], [[0.0]], [[0.0]], [contact]), [1e-3], [-0.5], 0.2, 1e-2, method=Exponential(1e-10))
     force = 1e4 * 0.5 * np.sqrt(2.0 / 1.5e4)
     lost = 0.5 * force**2 * (1e-4 - 0.25e-4)
     assert abs(run.q_dot[-1, 0] - np.sqrt(0.25 - lost)) < 1e-8

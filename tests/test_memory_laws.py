@@ -234,9 +234,8 @@ def test_a_sum_renews_each_part_by_itself():
 
 def test_laws_without_memory_have_none():
     for law in (Hertz(1e8), Hertz(1e8) + KelvinVoigt(1e6, 1.0)):
-        addresses = [
-            getattr(law, f"{name}_address") for name in ("borders", "renew", "memory_gradient", "renew_gradient")
-        ]
+        names = "borders", "renew", "memory_gradient", "renew_gradient"
+        addresses = [getattr(law, f"{name}_address") for name in names]
         assert (law.memory, law.borders, law.events, addresses) == ((), 0, (), [0] * 4)
         assert law.one_sided
     assert not (KelvinVoigt(1e6, 1.0) + Polynomial([1.0])).one_sided

@@ -19,9 +19,8 @@ def frequencies(beam):
 
 
 def written(path, points, lines, **options):
-    points = np.column_stack([np.asarray(points, dtype=float).reshape(len(points), -1), np.zeros((len(points), 2))])[
-        :, :3
-    ]
+    points = np.asarray(points, dtype=float).reshape(len(points), -1)
+    points = np.column_stack([points, np.zeros((len(points), 2))])[:, :3]
     cells = lines if isinstance(lines[0], tuple) else [("line", np.array(lines))]
     meshio.Mesh(points, cells, **options).write(path)
     return path

@@ -99,9 +99,8 @@ def test_derivatives_of_any_size_of_motion(size):
     d = [0.8e-4 * size, 0.3e-4 * size]
     by_delta, by_peak = np.array([3.0, -2.0])[:, None] * 2e4 * np.array([0.8, 0.3]) ** [[2], [3]]
     np.testing.assert_allclose(asked(law, "gradient", 3, d, [0.0, 0.0], law.parameters)[0], by_delta, rtol=1e-8)
-    np.testing.assert_allclose(
-        asked(law, "memory_gradient_address", 2, d, [0.0, 0.0], law.parameters)[1], by_peak, rtol=1e-8
-    )
+    found = asked(law, "memory_gradient_address", 2, d, [0.0, 0.0], law.parameters)[1]
+    np.testing.assert_allclose(found, by_peak, rtol=1e-8)
 
 
 def test_it_travels_and_tells_of_itself():

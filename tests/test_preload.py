@@ -74,9 +74,8 @@ def test_a_taper_between_equal_sections_is_none():
 def test_taper_of_circles_is_a_cone():
     cone = fb.Taper(fb.Section.circle(1.0, 1.0, 2.0), fb.Section.circle(1.0, 1.0, 1.0))
     middle, circle = cone.profile(0.3), fb.Section.circle(1.0, 1.0, 1.7)
-    assert (float(middle.A), float(middle.I), float(middle.fibre)) == pytest.approx(
-        (circle.A, circle.I, 0.85), rel=1e-14
-    )
+    found = [float(one) for one in (middle.A, middle.I, middle.fibre)]
+    assert found == pytest.approx([circle.A, circle.I, 0.85], rel=1e-14)
 
 
 test_taper_refuses_two_materials = refused(

@@ -132,9 +132,8 @@ def test_against_differences_of_runs(name):
     def run(step):
         return integrate(make(value + step), START[:2], START[2:], duration, t, Exponential(1e-12))
 
-    found = sensitivity(
-        make(value), START[:2], START[2:], duration, t, Nearby.of(make, value, 1e-4 * value), method=FINE
-    )
+    nearby = Nearby.of(make, value, 1e-4 * value)
+    found = sensitivity(make(value), START[:2], START[2:], duration, t, nearby, method=FINE)
     step = 2e-5 * value
     runs = {k * step: run(k * step) for k in (-2, -1, 1, 2)}
     expected = five_points(lambda h: np.hstack((runs[h].q, runs[h].q_dot)), step)

@@ -284,9 +284,8 @@ def test_impacts_by_batch_are_those_of_the_log():
 def test_a_contact_that_one_segment_hands_to_the_next_began_once(monkeypatch):
     """Under tones: what always presses never enters, and with memory segments are cut wherever they end."""
     pressed = cantilever(1, base=fb.Harmonic(2e-4, 160.0), stops=[fb.Stop(0.3, law=KelvinVoigt(1e5, 10.0), gap=-1e-3)])
-    slider = replace(
-        pressed.scene, elements=[fb.Element(0.3, Jenkins(1e5, 2.0))], stops=[fb.Stop(0.5, KelvinVoigt(1e5, 50.0))]
-    )
+    parts = {"elements": [fb.Element(0.3, Jenkins(1e5, 2.0))], "stops": [fb.Stop(0.5, KelvinVoigt(1e5, 50.0))]}
+    slider = replace(pressed.scene, **parts)
     for model in (pressed, slider.reduce(modes=1)):
         whole = stationary(model, 8.0, 1e-3, discard=1.0)
         with monkeypatch.context() as short:

@@ -160,9 +160,8 @@ def differences(a: dict[str, Any], b: dict[str, Any], measure: dict[str, Any], p
     found = {}
     for name in ("q", "q_dot"):
         m = len(b[name])
-        apart, size = (
-            np.abs(x).reshape(len(x), parts, -1).max(axis=(0, 2)) for x in (a[name][-m:] - b[name], measure[name])
-        )
+        both = a[name][-m:] - b[name], measure[name]
+        apart, size = (np.abs(x).reshape(len(x), parts, -1).max(axis=(0, 2)) for x in both)
         if name == "q_dot":  # of what is at rest at the samples
             fast = np.resize(measure["fast"].max(initial=0.0), parts) if parts == 1 else measure["fast"]
             size[: len(fast)] = np.maximum(size[: len(fast)], fast)
