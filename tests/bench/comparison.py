@@ -302,6 +302,19 @@ def main(judge: Callable[[int], tuple[str, Verdict]]) -> None:
     sys.exit(report(judged(judge, count, first, processes), count) > 0)
 
 
+def told_apart(found: Iterator[tuple[str, list[str], int]], what: str, most: int | None = None) -> int:
+    """Print what differs, at most so many lines of each, and how many there were of what kind; returns how many do."""
+    kinds: Counter[str] = Counter()
+    for words, wrong, contacts in found:
+        kinds["contacts"] += contacts
+        passed = wrong and wrong[0].split(":")[0] in ("ill-conditioned", "the reference failed", "refused")
+        kinds[wrong[0].split(":")[0] if passed else "differ" if wrong else "agree"] += 1
+        if wrong and wrong != ["ill-conditioned"]:
+            print(words, *wrong[:most], sep="\n    ", flush=True)
+    print(f"{what}: {dict(kinds)}")
+    return kinds["differ"]
+
+
 def report(found: Iterator[tuple[str, Verdict]], count: int) -> int:
     """Print failures as they come, then how large the errors were; returns the number of failures."""
     kinds: Counter[str] = Counter()
