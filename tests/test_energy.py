@@ -295,9 +295,7 @@ def test_the_ledger_leaves_the_motion_alone(law, signal):
     system = System.modal([20.0, 130.0, 900.0], 0.02, [Contact([1.0, 0.6, 0.4], law)], [([1.0, 0.4, 0.2], signal)])
     start = [0.0, 0.0, 0.0], [-0.5, 0.0, 0.0]
     for dt in (2e-5, 1e-3):
-        with_it, without = (
-            integrate(system, *start, 0.2, dt, Exponential(1e-8, ledger=kept)) for kept in (True, False)
-        )
+        with_it, without = (integrate(system, *start, 0.2, dt, Exponential(1e-8, ledger=one)) for one in (True, False))
         np.testing.assert_array_equal(with_it.q, without.q)
         np.testing.assert_array_equal(with_it.contacts.t_out, without.contacts.t_out)
         assert with_it.cost.steps == without.cost.steps

@@ -30,9 +30,7 @@ METHODS = pytest.mark.parametrize("method", [Exponential(1e-10), DormandPrince(1
 def heavy(laws, gaps=None):
     """A heavy mass on a spring, with elements and stops."""
     always = [not isinstance(law, (Hysteretic, WaltonBraun, PiecewiseLinear)) for law in laws]
-    contacts = [
-        Contact([-1.0], law, gap or 0.0, a) for law, a, gap in zip(laws, always, gaps or [0.0] * 9, strict=False)
-    ]
+    contacts = [Contact([-1.0], law, g or 0.0, a) for law, a, g in zip(laws, always, gaps or [0.0] * 9, strict=False)]
     return System([[HEAVY]], [[0.0]], [[HEAVY * OMEGA**2]], contacts)
 
 

@@ -46,9 +46,7 @@ def alone(system, q, q_dot, duration, method):
     for start in zip(q, q_dot, strict=True):
         run = integrate(system, *start, duration, method=method, check=False)
         log, stops = run.contacts, range(len(system.contacts))
-        peaks = [
-            [part[log.stop == s].max(initial=0.0) for s in stops] for part in (log.peak_indentation, log.peak_force)
-        ]
+        peaks = [[p[log.stop == s].max(initial=0.0) for s in stops] for p in (log.peak_indentation, log.peak_force)]
         yield run.q[-1], run.q_dot[-1], run.t[-1], run.status, len(log), *peaks
 
 

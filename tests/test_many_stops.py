@@ -44,9 +44,7 @@ def same(one, other, tolerance):
     """End, log and, if there are any, samples and tangent, each relative to its largest number."""
     assert len(one.contacts.t_in) == len(other.contacts.t_in) > 8
     pairs = [(one.q, other.q), (one.q_dot, other.q_dot), (one.contacts.stop, other.contacts.stop)]
-    pairs += [
-        (getattr(one.contacts, name), getattr(other.contacts, name)) for name in ("t_in", "peak_force", "impulse")
-    ]
+    pairs += [(getattr(one.contacts, n), getattr(other.contacts, n)) for n in ("t_in", "peak_force", "impulse")]
     if one.tangent is not None:
         pairs.append((one.tangent, other.tangent))
     for a, b in pairs:

@@ -79,9 +79,7 @@ def test_a_disk_that_spins_fast():
     mass = SECTION.line_mass * LENGTH
     disk = fb.Disk("B", 0.25 * mass, diametral=0.003 * mass * LENGTH**2, polar=0.006 * mass * LENGTH**2)
     stiffness = 3.0 * SECTION.bending_stiffness / LENGTH**3
-    springs = [
-        fb.Spring(end, share * stiffness, direction=way) for end, share in (("A", 20), ("B", 400)) for way in "xy"
-    ]
+    springs = [fb.Spring(at, share * stiffness, direction=way) for at, share in (("A", 20), ("B", 400)) for way in "xy"]
     shaft = fb.Frame.straight(LENGTH, SECTION, bending_only=True)
     few, many = (fb.Scene(shaft, [], masses=[disk], springs=springs).campbell([15e3], modes) for modes in (2, 24))
     np.testing.assert_allclose(few.signed, many.signed[:, :2], rtol=5e-6)

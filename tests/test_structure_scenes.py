@@ -393,9 +393,7 @@ def test_reactions_know_where_the_damping_of_a_structure_acts(motion):
     supports = [fb.Fixed(0, "x", motion=motion), fb.Fixed(4, "x")]
     scene = fb.Scene(fb.Structure(K, M, C, labels), supports, forces=[fb.PointForce(3, force, "x")], base=base)
     run = scene.reduce(modes="all").simulate(0.5, 1e-3)
-    u, v, a = (
-        np.array([read(i, "x") for i in range(5)]) for read in (run.displacement, run.velocity, run.acceleration)
-    )
+    u, v, a = (np.array([ask(i, "x") for i in range(5)]) for ask in (run.displacement, run.velocity, run.acceleration))
     if base:
         a = a + base["x"].derivative(2)(run.t)
     held = K @ u + C @ v + M @ a

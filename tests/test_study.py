@@ -168,9 +168,7 @@ def test_half_width_of_paired_differences():
     rng = np.random.default_rng(1)
     common, covered = rng.normal(10.0, 3.0, (400, 8)), 0
     for x in common:  # what realisations share cancels; the true relative difference is 1 % of the mean
-        one, other = (
-            measure.Measured(values, 1, 0.0, 0.0, 1.0, 1.0) for values in (x + 0.1 + rng.normal(0, 0.05, 8), x)
-        )
+        one, other = (measure.Measured(found, 1, 0.0, 0.0, 1.0, 1.0) for found in (x + 0.1 + rng.normal(0, 0.05, 8), x))
         error, width = difference(one, other)
         covered += abs(error - 0.1 / x.mean()) < width
     assert abs(covered / 400 - 0.95) < 4 * np.sqrt(0.95 * 0.05 / 400)
