@@ -139,16 +139,14 @@ def linear_stop():
     return solvers.System([[100.0]], [[0.0]], [[1e4]], [solvers.Contact([1.0], PiecewiseLinear([1e6]))])
 
 
-def paper_scene(base=None, zeta=(0.02, 0.01), law=None):
-    """The clamped beam with a tip mass over an elastic stop; base None is 1 mm at 195 rad/s."""
-    return fb.Scene(
-        beam=PAPER_BEAM,
-        supports=[fb.Clamped(0.0)],
-        masses=[fb.LumpedMass(TIP, mass=25.4e-3, inertia=3.0e-6)],
-        stops=[fb.Stop(TIP, law=PAPER_LAW if law is None else law)],
-        damping=fb.ModalDamping(zeta),
-        base=fb.Harmonic(amplitude=1e-3, omega=195.0) if base is None else base,
-    )
+def paper_scene(base=None, zeta=(0.02, 0.01), law=None, **parts):
+    """The clamped beam with a tip mass over an elastic stop, or other parts; base None is 1 mm at 195 rad/s."""
+    own = {
+        "masses": [fb.LumpedMass(TIP, mass=25.4e-3, inertia=3.0e-6)],
+        "stops": [fb.Stop(TIP, law=PAPER_LAW if law is None else law)],
+        "base": fb.Harmonic(amplitude=1e-3, omega=195.0) if base is None else base,
+    }
+    return fb.Scene(PAPER_BEAM, [fb.Clamped(0.0)], damping=fb.ModalDamping(zeta), **{**own, **parts})
 
 
 def two_sided_scene(gap=2e-4, law=None, mid_gap=None):
@@ -157,8 +155,7 @@ def two_sided_scene(gap=2e-4, law=None, mid_gap=None):
     stops = [fb.Stop(TIP, law, gap, "below"), fb.Stop(TIP, law, gap, "above")]
     if mid_gap is not None:
         stops.append(fb.Stop(0.13, Hertz(2.1e8), mid_gap, "below"))
-    scene = paper_scene()
-    return fb.Scene(scene.beam, scene.supports, scene.masses, stops=stops, damping=scene.damping, base=scene.base)
+    return paper_scene(stops=stops)
 
 
 def coupled_dashpot(contacts=(), loads=()):

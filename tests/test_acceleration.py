@@ -54,7 +54,7 @@ def test_it_is_the_slope_of_the_velocity_through_contacts_dashpots_and_forces():
         forces=[fb.PointForce(0.15, fb.Harmonic(2.0, 80.0))],
         gravity=9.81,
     )
-    run = rig.reduce(modes=3, residual=True).simulate(0.1, 2e-7)
+    run = rig.reduce(modes=3, residual=True).simulate(0.06, 2e-7)
     step, z = run.t[1], 0.2
     velocity, acceleration = run.velocity(z), run.acceleration(z)
     slope = (velocity[2:] - velocity[:-2]) / (2 * step)

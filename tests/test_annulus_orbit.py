@@ -91,9 +91,8 @@ def test_grazing_of_the_circle_against_the_linear_amplitude():
 
 @pytest.mark.parametrize("outer", [False, True])
 def test_derivatives_of_an_indentation_are_those_of_differences(outer):
-    contact = Contact(
-        [[1.0, 0.2], [-0.3, 0.8]], KelvinVoigt(1e3, 0.0), 0.5, map="annulus", centre=(0.1, 0.2), outer=outer
-    )
+    rows, law = [[1.0, 0.2], [-0.3, 0.8]], KelvinVoigt(1e3, 0.0)
+    contact = Contact(rows, law, 0.5, map="annulus", centre=(0.1, 0.2), outer=outer)
     q, v, step = np.array([0.7, -0.4]), np.array([0.3, 1.1]), 1e-6
     delta, rate, by_q, rate_by_q = contact.motion(q, v)
     assert delta == contact.indentation(q)

@@ -3,7 +3,7 @@
 import tomllib
 
 import numpy as np
-import pytest
+from refusals import refused_files
 from test_cli import check_against
 
 import fembeam as fb
@@ -113,7 +113,9 @@ z = 0
     assert scene.stops[0].coordinate.to == (1, 0.5)
 
 
-@pytest.mark.parametrize(("old", "new", "says"), [
+# What is wrong, with its table and line.
+test_refused = refused_files(
+    LEGS,
     ('to = [1, "A"]', 'to = [1, "AA"]', "'A' is the nearest there is, got 'AA' in joints.0."),
     ('to = [1, "A"]', 'too = [1, "A"]', r":\d+: ..joints.. number 1: unknown key 'too'; did you mean 'to'"),
     ("modes = 4, ", "", r"number 2 .frame. reduced: the key 'modes' is missing"),
@@ -124,11 +126,7 @@ z = 0
     ("like = {", "nothing = {", r"unknown key 'nothing' .valid: beam, structure, frame, like"),
     ("[bodies.frame]", "[bodies.like]", "number 2 like: unknown key 'nodes'"),
     ("turned = [0, 0,", "turned = [0,", "like turned: rotation must be three finite numbers"),
-])  # fmt: skip
-def test_refused(file_of, old, new, says):
-    """What is wrong, with its table and line."""
-    with pytest.raises(ValueError, match=says):
-        file_of(LEGS.replace(old, new))
+)  # fmt: skip
 
 
 def test_the_schema():

@@ -105,7 +105,7 @@ def test_processes_compile_one_after_the_other(package):
     pipes: Any = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     first, second = (
         subprocess.Popen([sys.executable, "-c", code + tell], cwd=package.parent, env=environment, **pipes)
-        for code in (held, "import time; input(); import solvers.one; ")
+        for code in (held, "import numba, time; input(); import solvers.one; ")
     )
     with first, second:
         assert first.stdout.readline() == "1\n"  # it has the lock
@@ -113,7 +113,7 @@ def test_processes_compile_one_after_the_other(package):
         assert ran(own, package.parent, NUMBA_CACHE_DIR="")[0] == ["1.0"]  # code of others does not wait
         second.stdin.write("\n")
         second.stdin.flush()
-        time.sleep(2.0)
+        time.sleep(1.0)
         end = first.communicate("\n")[0]
         assert float(second.communicate()[0]) > float(end)
 
@@ -184,9 +184,8 @@ def test_processes_killed_while_they_compile(package):
     environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": ""}
     known = "{} {} {}\n".format(*(2.0 * x + 1.0 for x in (1.0, 2.0, 3.0)))
     pipes: Any = {"stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL, "text": True}
-    each = [
-        subprocess.Popen([sys.executable, "-c", code], cwd=package.parent, env=environment, **pipes) for _ in range(3)
-    ]
+    command = [sys.executable, "-c", code]
+    each = [subprocess.Popen(command, cwd=package.parent, env=environment, **pipes) for _ in range(3)]
     for number, one in enumerate(each[:2]):
         one.stdout.readline()
         time.sleep(0.05 * number)

@@ -295,9 +295,7 @@ def test_the_ledger_leaves_the_motion_alone(law, signal):
     system = System.modal([20.0, 130.0, 900.0], 0.02, [Contact([1.0, 0.6, 0.4], law)], [([1.0, 0.4, 0.2], signal)])
     start = [0.0, 0.0, 0.0], [-0.5, 0.0, 0.0]
     for dt in (2e-5, 1e-3):
-        with_it, without = (
-            integrate(system, *start, 0.2, dt, Exponential(1e-8, ledger=kept)) for kept in (True, False)
-        )
+        with_it, without = (integrate(system, *start, 0.2, dt, Exponential(1e-8, ledger=one)) for one in (True, False))
         np.testing.assert_array_equal(with_it.q, without.q)
         np.testing.assert_array_equal(with_it.contacts.t_out, without.contacts.t_out)
         assert with_it.cost.steps == without.cost.steps
@@ -401,9 +399,7 @@ def test_a_stop_that_pulls_under_a_tone_is_not_refused(omega, damping):
 def test_runs_in_broken_steps_are_refused(broken):
     """Wrong by 1e-4 in what forces do by the end of a contact step, or in the free motion until then."""
     law = Hysteretic(1e6, 0.4)
-    system = System.modal(
-        [11.0, 67.0], 0.01, [Contact([-1.0, 1.2], law, 0.01)], [([1.0, -1.2], fb.Harmonic(30.0, 14.0))]
-    )
+    system = System.modal([11, 67], 0.01, [Contact([-1.0, 1.2], law, 0.01)], [([1.0, -1.2], fb.Harmonic(30.0, 14.0))])
     arguments = system, [0.0, 0.0], [-0.8, 0.9], 1.0, 0.01, Exponential(1e-8)
     assert len(integrate(*arguments).contacts) >= 3
     table = getattr(prepared_run(*arguments, False).engine.prepared.tables.value, broken)

@@ -485,9 +485,8 @@ def test_start_at_rest_on_the_stop_is_no_contact_whatever_the_rounding():
     """The load pulls away at once; data moved by a rounding must not log a contact of no duration."""
     system, rng = paper(10), np.random.default_rng(0)
     for _ in range(20):
-        direction, k = (
-            x * (1.0 + 4e-14 * rng.standard_normal(10)) for x in (system.contacts[0].direction, np.diag(system.K))
-        )
+        own = system.contacts[0].direction, np.diag(system.K)
+        direction, k = (x * (1.0 + 4e-14 * rng.standard_normal(10)) for x in own)
         moved = System(system.M, system.C, np.diag(k), [Contact(direction, PAPER_LAW)], system.loads)
         assert at_rest(moved, 0.03, Exponential(1e-6)).contacts.t_in.min(initial=1.0) > 1e-3
 

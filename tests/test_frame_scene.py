@@ -92,9 +92,7 @@ def rigid_motions(made, position):
     names = ("x", "y", "z", "rx", "ry", "rz")
     at = np.array([position(place) for place, _ in made.labels])
     turning = [np.hstack([np.cross(axis, at), np.tile(axis, (len(at), 1))]) for axis in np.eye(3)]
-    turned_ = [
-        [one[i, names.index(c)] if c in names else 0.0 for i, (_, c) in enumerate(made.labels)] for one in turning
-    ]
+    turned_ = [[t[i, names.index(c)] if c in names else 0.0 for i, (_, c) in enumerate(made.labels)] for t in turning]
     return np.column_stack([made.translations, np.array(turned_).T])
 
 

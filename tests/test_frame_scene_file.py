@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import refused_files
 from test_frame_files import written
 
 import fembeam as fb
@@ -85,7 +86,9 @@ def test_the_pipe_of_the_examples():
     assert list(scene.motions) == ["x", "y", "z"]
 
 
-@pytest.mark.parametrize(("old", "new", "says"), [
+# What is wrong, in which table.
+test_refused = refused_files(
+    PORTAL,
     ("nodes = { A = [0, 0]", "nods = { A = [0, 0]", r"\[frame\].*nods"),
     ('nodes = ["D", "C"]', 'nodes = ["D", "E"]', r"\[frame\]: member 'D-E' must join nodes of the frame; 'D' is"),
     ('nodes = ["D", "C"]', 'nodes = ["D"]', r"\[\[frame.members\]\] number 2.*a chain of more"),
@@ -93,11 +96,7 @@ def test_the_pipe_of_the_examples():
     ('release = "end rz"', 'relase = "end rz"', r"number 2.*relase"),
     ('at = "A"', 'at = "F"', "must be a node of the frame"),
     ("[frame]", "[beam]\nlength = 1.0\n[frame]", r"one of the tables \[beam\] and \[frame\]"),
-])  # fmt: skip
-def test_refused(file_of, old, new, says):
-    """What is wrong, in which table."""
-    with pytest.raises(ValueError, match=says):
-        file_of(PORTAL.replace(old, new, 1))
+)  # fmt: skip
 
 
 OUTPUTS = """

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from differences import central, end_of, jacobian
 from oscillators import Tone
 from scipy.optimize import fsolve
 from test_friction import EYE, SHARP, disc, pulled, wall
@@ -17,15 +18,7 @@ FINE = Exponential(1e-11)
 
 def by_differences(system, q, q_dot, duration, step=1e-6, memory=None):
     """The derivative of the end by the start, by central differences of the independent method."""
-    x, columns = np.concatenate((q, q_dot)), []
-    for i in range(x.size):
-        ends = []
-        for sign in (1.0, -1.0):
-            moved = x.copy()
-            moved[i] += sign * step
-            ends.append(integrate(system, *np.split(moved, 2), duration, method=SHARP, memory=memory).end[: x.size])
-        columns.append((ends[0] - ends[1]) / (2.0 * step))
-    return np.array(columns).T
+    return jacobian(end_of(system, duration, SHARP, memory=memory), np.concatenate((q, q_dot)), step, central)
 
 
 RUNS = {
@@ -145,9 +138,8 @@ def test_the_tangent_where_a_slip_ends_because_the_rate_of_N_jumps(changed, q, q
         omega = np.sqrt(4e5 / 0.08)
         assert ended == pytest.approx(1e-3 / 0.8 + np.arcsin(1e-4 * omega / 0.8) / omega, rel=1e-9)
     ends = [integrate(changed(d), q, q_dot, duration, method=SHARP).end[:4] for d in (step, -step)]
-    expected = np.column_stack(
-        [by_differences(changed(0.0), q, q_dot, duration, 1e-7), (ends[0] - ends[1]) / (2.0 * step)]
-    )
+    by_start = by_differences(changed(0.0), q, q_dot, duration, 1e-7)
+    expected = np.column_stack([by_start, (ends[0] - ends[1]) / (2.0 * step)])
     assert np.all(abs(run.tangent - expected).max(axis=0) < 1e-6 * abs(expected).max(axis=0))
 
 

@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from refusals import refused
 from scipy.stats import binom, chi2
 
 from contacts import BoucWen, Hertz, Iwan, Jenkins, identify_loop
@@ -247,25 +248,19 @@ def test_it_prints():
 FORCE = DAMPER.along(PATH)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "options", "error", "said"),
-    [
-        ((PATH, FORCE, Hertz), {}, TypeError, "law of identify_loop must be Jenkins, Iwan or BoucWen"),
-        ((PATH, FORCE, DAMPER), {}, TypeError, "the class, got Jenkins"),
-        ((PATH, FORCE, Jenkins), {"parts": 2}, ValueError, "parts of identify_loop belongs to Iwan, got 2 for Jenkins"),
-        ((PATH, FORCE, Iwan), {"n": 2}, ValueError, "n of identify_loop belongs to BoucWen"),
-        ((PATH, FORCE, Iwan), {"parts": 0}, ValueError, "must be a whole number from 1 to 20, got 0"),
-        ((PATH, FORCE, BoucWen), {"n": 3}, ValueError, "must be 1 or 2, got 3"),
-        ((PATH, FORCE), {"confidence": 0.0}, ValueError, r"confidence must lie in \(0, 1\)"),
-        ((PATH, FORCE[:-1]), {}, ValueError, "record 1 has 600 samples of delta and 599 of force"),
-        (([PATH], [FORCE, FORCE]), {}, ValueError, "force has 2 records, delta has 1"),
-        ((np.full(600, np.nan), FORCE), {}, ValueError, "delta of record 1 must be a finite vector, got nan"),
-        ((["a"] * 600, FORCE), {}, ValueError, "delta of record 1 must be a number, got"),
-        ((0.0 * PATH, FORCE), {}, ValueError, "delta of record 1 does not move"),
-        ((PATH, 0.0 * FORCE), {}, ValueError, "there is no loop"),
-        ((PATH[:7], FORCE[:7]), {}, ValueError, "the records have 7 samples, at least 8 are needed"),
-    ],
+test_bad_records_are_refused = refused(
+    (lambda: identify_loop(PATH, FORCE, Hertz), "law of identify_loop must be Jenkins, Iwan or BoucWen", TypeError),
+    (lambda: identify_loop(PATH, FORCE, DAMPER), "the class, got Jenkins", TypeError),
+    (lambda: identify_loop(PATH, FORCE, Jenkins, parts=2), "parts of identify_loop belongs to Iwan, got 2 for Jenkins"),
+    (lambda: identify_loop(PATH, FORCE, Iwan, n=2), "n of identify_loop belongs to BoucWen"),
+    (lambda: identify_loop(PATH, FORCE, Iwan, parts=0), "must be a whole number from 1 to 20, got 0"),
+    (lambda: identify_loop(PATH, FORCE, BoucWen, n=3), "must be 1 or 2, got 3"),
+    (lambda: identify_loop(PATH, FORCE, confidence=0.0), r"confidence must lie in \(0, 1\)"),
+    (lambda: identify_loop(PATH, FORCE[:-1]), "record 1 has 600 samples of delta and 599 of force"),
+    (lambda: identify_loop([PATH], [FORCE, FORCE]), "force has 2 records, delta has 1"),
+    (lambda: identify_loop(np.full(600, np.nan), FORCE), "delta of record 1 must be a finite vector, got nan"),
+    (lambda: identify_loop(["a"] * 600, FORCE), "delta of record 1 must be a number, got"),
+    (lambda: identify_loop(0.0 * PATH, FORCE), "delta of record 1 does not move"),
+    (lambda: identify_loop(PATH, 0.0 * FORCE), "there is no loop"),
+    (lambda: identify_loop(PATH[:7], FORCE[:7]), "the records have 7 samples, at least 8 are needed"),
 )
-def test_bad_records_are_refused(arguments, options, error, said):
-    with pytest.raises(error, match=said):
-        identify_loop(*arguments, **options)

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from problems import paper_scene
 
 import fembeam as fb
 import solvers
@@ -14,16 +15,10 @@ from fembeam.study.execution import executors
 from fembeam.study.execution.checkpoint import Checkpoint
 from solvers.exponential.method import Engine as Engine
 
-SCENE = fb.Scene(
-    beam=fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
-    supports=[fb.Clamped(0.0)],
-    stops=[fb.Stop(0.24445, law=Hertz(2.1e8))],
-    damping=fb.ModalDamping(0.02),
-    base=fb.BandNoise(std=2.5e-4, band=(0.0, 1226.6), seed=1),
-)
+SCENE = paper_scene(fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1), 0.02, Hertz(2.1e8), masses=())
 MODEL = SCENE.reduce(modes=2)
 DRIVE = {"base": fb.Harmonic(5e-4, 150.0), "damping": fb.ModalDamping(0.1)}  # settles into one orbit, |μ| = 0.6
-DRIVEN = fb.Scene(**{**vars(SCENE), **DRIVE}).reduce(modes=2)
+DRIVEN = replace(SCENE, **DRIVE).reduce(modes=2)
 ORBIT = DRIVEN.orbit()
 
 
@@ -98,9 +93,8 @@ def test_an_interrupted_branch_goes_on_as_if_it_had_not_been(interrupt):
 
 NOISE = fb.BandNoise(std=3e-4, band=(0.0, 1226.6), seed=3)
 TWO_TONES = fb.Multisine([4e-4, 3e-4], [108.0, 171.0], [0.0, 0.4])
-RECORD = fb.Record(
-    np.arange(0.0, 30.0, 0.01), 20.0 * np.sin(40.0 * np.arange(0.0, 30.0, 0.01)), quantity="acceleration"
-)
+TIMES = np.arange(0.0, 30.0, 0.01)
+RECORD = fb.Record(TIMES, 20.0 * np.sin(40.0 * TIMES), quantity="acceleration")
 
 
 @pytest.mark.parametrize(("base", "segments", "every"), [(NOISE, 16, 3), (TWO_TONES, 2, 1), (RECORD, 1, 1)])

@@ -30,9 +30,7 @@ METHODS = pytest.mark.parametrize("method", [Exponential(1e-10), DormandPrince(1
 def heavy(laws, gaps=None):
     """A heavy mass on a spring, with elements and stops."""
     always = [not isinstance(law, (Hysteretic, WaltonBraun, PiecewiseLinear)) for law in laws]
-    contacts = [
-        Contact([-1.0], law, gap or 0.0, a) for law, a, gap in zip(laws, always, gaps or [0.0] * 9, strict=False)
-    ]
+    contacts = [Contact([-1.0], law, g or 0.0, a) for law, a, g in zip(laws, always, gaps or [0.0] * 9, strict=False)]
     return System([[HEAVY]], [[0.0]], [[HEAVY * OMEGA**2]], contacts)
 
 
@@ -191,9 +189,8 @@ def test_losses_of_stops_are_those_of_their_log():
     laws = [Hysteretic(2.1e6, 0.4), WaltonBraun(1e4, 4e4, "forgotten")]
     run = swing(laws, 3, Exponential(1e-10), [1e-3, 5e-4])
     for stop in (0, 1):
-        assert run.losses.loss[stop] == pytest.approx(
-            run.contacts.energy_loss[run.contacts.stop == stop].sum(), rel=1e-9
-        )
+        logged = run.contacts.energy_loss[run.contacts.stop == stop]
+        assert run.losses.loss[stop] == pytest.approx(logged.sum(), rel=1e-9)
     deepest = X - 5e-4
     assert run.losses.loss[1] == pytest.approx(3 * 0.5 * 1e4 * deepest**2 * 0.75, rel=2e-8)
     middle = swing(laws, 0.25, Exponential(1e-10), [1e-3, 5e-4])  # at rest in contact: what was lost on the way in

@@ -36,18 +36,15 @@ def run(stops, signals, few, monkeypatch, laws=LAWS, **options):
     """From a start that brings several stops together, with tables up to so many stops."""
     monkeypatch.setattr(block_tables, "FEW", few)
     start = 1.0 / np.arange(1, MODES + 1) ** 3
-    return integrate(
-        tube(stops, signals, laws=laws), 2e-5 * start, 0.3 * start, 0.05, method=Exponential(1e-9), **options
-    )
+    system = tube(stops, signals, laws=laws)
+    return integrate(system, 2e-5 * start, 0.3 * start, 0.05, method=Exponential(1e-9), **options)
 
 
 def same(one, other, tolerance):
     """End, log and, if there are any, samples and tangent, each relative to its largest number."""
     assert len(one.contacts.t_in) == len(other.contacts.t_in) > 8
     pairs = [(one.q, other.q), (one.q_dot, other.q_dot), (one.contacts.stop, other.contacts.stop)]
-    pairs += [
-        (getattr(one.contacts, name), getattr(other.contacts, name)) for name in ("t_in", "peak_force", "impulse")
-    ]
+    pairs += [(getattr(one.contacts, n), getattr(other.contacts, n)) for n in ("t_in", "peak_force", "impulse")]
     if one.tangent is not None:
         pairs.append((one.tangent, other.tangent))
     for a, b in pairs:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from differences import central, end_of, jacobian
 from sliders import Slider
 from test_own_memory import OWN
 
@@ -28,9 +29,8 @@ def beam(*contacts, omega=1.3, load=1.5):
 
 def end(system, x, duration, rtol=1e-12, **more):
     """Final [q, q̇] of a run without output."""
-    n = system.size
-    run = integrate(system, x[:n], x[n:], duration, method=Exponential(rtol), **more)
-    return np.concatenate((run.q[-1], run.q_dot[-1])), run
+    run = integrate(system, *np.split(x, 2), duration, method=Exponential(rtol), **more)
+    return run.end[: x.size], run
 
 
 @pytest.mark.parametrize(("spring", "stiffness", "limit"), [(1.0, 50.0, 0.05), (4.0, 4.0, 0.3), (1.0, 2000.0, 0.02)])
@@ -118,12 +118,9 @@ def test_tangent_over_many_borders(laws):
     assert len(run.transitions) > 15
     parameter = Parameter(beam(*contacts, omega=1.3 - step), beam(*contacts, omega=1.3 + step), step)
     found = end(beam(*contacts), x, duration, tangent=parameter)[1].tangent
-    wanted = [
-        (end(beam(*contacts), x + step * e, duration)[0] - end(beam(*contacts), x - step * e, duration)[0])
-        for e in np.eye(6)
-    ]
-    wanted.append(end(parameter.ahead, x, duration)[0] - end(parameter.behind, x, duration)[0])
-    wanted = np.transpose(wanted) / (2.0 * step)
+    by_start = jacobian(end_of(beam(*contacts), duration), x, step, central)
+    by_omega = central(lambda h: end_of(beam(*contacts, omega=1.3 + h), duration)(x), step)
+    wanted = np.column_stack((by_start, by_omega))
     assert abs(found - wanted).max() < 3e-7 * max(1.0, abs(wanted).max())
 
 
@@ -192,9 +189,8 @@ def test_a_landing_off_by_rounding_is_not_passed_again(rtol):
 def test_equal_sliders_let_go_together_in_a_step_that_begins_as_they_stick(stiffness, rtol):
     """Margins that begin at zero, rise and fall to zero again within one step: five sliders do what their sum does."""
     law = Iwan([stiffness / 5] * 5, [0.06] * 5)
-    run = integrate(
-        System([[1.0]], [[0.02]], [[1.0]], [element(law, -1.0)]), [0.0], [1.7], 10.0, method=Exponential(rtol)
-    )
+    system = System([[1.0]], [[0.02]], [[1.0]], [element(law, -1.0)])
+    run = integrate(system, [0.0], [1.7], 10.0, method=Exponential(rtol))
     rows = run.transitions
     instants = np.unique(rows.t)
     assert len(rows) == 5 * len(instants) >= 40
@@ -211,9 +207,8 @@ def test_a_free_mass_pressed_at_rest_takes_few_steps(rtol):
     rest = integrate(system, [0.028], [0.0], 3.0, method=DormandPrince(1e-10))
     assert abs(rest.q_dot[-1, 0]) < 1e-10
     latched = [numbers if numbers.size else None for numbers in rest.memory]
-    run = integrate(
-        system, rest.q[-1], rest.q_dot[-1], 0.03, method=Exponential(rtol), memory=latched, progress=few_steps()
-    )
+    start, method = (rest.q[-1], rest.q_dot[-1]), Exponential(rtol)
+    run = integrate(system, *start, 0.03, method=method, memory=latched, progress=few_steps())
     assert run.cost.steps < 20_000
     assert abs(run.q - rest.q).max() < 1e-12
 
@@ -232,9 +227,7 @@ def test_a_yielding_stop_beside_a_spring():
     """What is lost is the area of the yielding part's loop, F² (1/k₁ - 1/k₂)/2, F its largest force."""
     contact = Contact([1.0], WaltonBraun(1e4, 4e4, set="forgotten") + KelvinVoigt(5e3, 0.0))
     assert contact.always  # without being told
-    run = integrate(
-        System([[2.0]], [[0.0]], [[0.0]], [contact]), [1e-3], [-0.5], 0.2, dt=1e-2, method=Exponential(1e-10)
-    )
+    run = integrate(System([[2.0]], [[0.0]], [[0.0]], [contact]), [1e-3], [-0.5], 0.2, 1e-2, method=Exponential(1e-10))
     force = 1e4 * 0.5 * np.sqrt(2.0 / 1.5e4)
     lost = 0.5 * force**2 * (1e-4 - 0.25e-4)
     assert abs(run.q_dot[-1, 0] - np.sqrt(0.25 - lost)) < 1e-8

@@ -6,7 +6,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from differences import central, jacobian
 from oscillators import Tone, from_phase, state_after, state_at_zero
+from problems import paper_scene
 from scipy.optimize import root
 
 import fembeam as fb
@@ -195,15 +197,13 @@ def differenced(found, step=1e-6):
     """Derivative of the return map by the real numbers of the state, central."""
     later, x = from_phase(found), found.whole
     whole = [i for i in range(len(x)) if i < 2 * found.system.size or x[i] != round(x[i])]
-    columns = []
-    for i in whole:
-        ends = []
-        for side in (1.0, -1.0):
-            moved = x.copy()
-            moved[i] += side * step
-            ends.append(state_after(later, moved, found.period, Exponential(1e-12))[whole])
-        columns.append((ends[0] - ends[1]) / (2.0 * step))
-    return np.transpose(columns)
+
+    def end(numbers):
+        moved = x.copy()
+        moved[whole] = numbers
+        return state_after(later, moved, found.period, Exponential(1e-12))[whole]
+
+    return jacobian(end, x[whole], step, central)
 
 
 PAIR = element(Jenkins(50.0, 0.1), -1.0, -0.5, 0.3), element(Jenkins(30.0, 0.08), -0.2, 0.9, -0.5)
@@ -346,14 +346,8 @@ def test_phases_that_come_and_go_are_located():
 
 
 def test_branch_of_a_beam_with_friction_is_saved_and_gone_on_with(tmp_path):
-    scene = fb.Scene(
-        beam=fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
-        supports=[fb.Clamped(0.0)],
-        elements=[fb.Element(0.2, Jenkins(300.0, 0.1))],
-        damping=fb.ModalDamping([0.02, 0.01]),
-        base=fb.Harmonic(amplitude=1e-3, omega=250.0),
-    )
-    model = scene.reduce(modes=2)
+    slider = fb.Element(0.2, Jenkins(300.0, 0.1))
+    model = paper_scene(fb.Harmonic(1e-3, 250.0), masses=(), stops=(), elements=[slider]).reduce(modes=2)
     start = model.orbit()
     assert "forgets" in str(start)
     assert len(start.transitions) >= 4

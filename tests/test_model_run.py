@@ -100,9 +100,8 @@ def test_moving_mass_of_rigid_bodies_at_supports(frame):
 
 def test_static_point_force_bends_the_beam_by_its_flexibility():
     # u(tip) = Σ φ_i²/ω_i² F; a slow overdamped settling reaches it
-    scene = replace(
-        paper_scene(zeta=(1.0, 1.0)), base=None, stops=[], forces=[fb.PointForce(TIP, fb.Harmonic(0.5, 0.0))]
-    )
+    force = fb.PointForce(TIP, fb.Harmonic(0.5, 0.0))
+    scene = replace(paper_scene(zeta=(1.0, 1.0)), base=None, stops=[], forces=[force])
     model = scene.reduce(2)
     run = model.simulate(0.5, [0.5])
     exact = 0.5 * np.sum(model.phi(TIP) ** 2 / model.omega**2)

@@ -10,9 +10,8 @@ from fembeam.inspection.units import doubts
 LAW = KelvinVoigt(1e4, 1.0)
 STEEL = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
 ELBOW = fb.Frame.polyline({"A": (0, 0), "B": (1, 0), "C": (1, 1)}, STEEL)
-TRAIN = fb.Structure(
-    1e3 * np.array([[2.0, -1.0], [-1.0, 1.0]]), np.diag([0.1, 0.3]), labels=[("gear", "rz"), ("wheel", "rz")]
-)
+K = 1e3 * np.array([[2.0, -1.0], [-1.0, 1.0]])
+TRAIN = fb.Structure(K, np.diag([0.1, 0.3]), labels=[("gear", "rz"), ("wheel", "rz")])
 TURNED = fb.PointMoment("wheel", fb.Harmonic(5.0, 40.0), direction="rz")
 
 

@@ -136,15 +136,8 @@ def test_the_table_branch(tmp_path, capsys):
 @pytest.mark.parametrize("phase", [1.0, 2.0, 3.0])
 def test_what_is_read_off_an_orbit_takes_loads_at_its_own_times(phase):
     """An orbit whose law latches the entry rate begins where its stop is open, which need not be t = 0."""
-    scene = fb.Scene(
-        fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
-        supports=[fb.Clamped(0.0)],
-        masses=[fb.LumpedMass(TIP, 0.0254)],
-        stops=[fb.Stop(TIP, Hysteretic.lankarani_nikravesh(1e4, restitution=0.5))],
-        damping=fb.ModalDamping(0.02),
-        base=fb.Harmonic(1e-3, 90.0, phase=phase),
-    )
-    orbit = scene.reduce(modes=2).orbit()
+    law, mass = Hysteretic.lankarani_nikravesh(1e4, restitution=0.5), fb.LumpedMass(TIP, 0.0254)
+    orbit = paper_scene(fb.Harmonic(1e-3, 90.0, phase=phase), 0.02, law, masses=[mass]).reduce(modes=2).orbit()
     run, step = orbit.run, orbit.run.t[1]
     frame = run.displacement(TIP, absolute=True) - run.displacement(TIP)
     expected = 1e-3 * np.cos(90.0 * (run.t + orbit.found.phase) + phase)

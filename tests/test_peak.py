@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from problems import ROD, ROD_FILE
+from refusals import refused_by
 from scipy.optimize import brentq, minimize_scalar
 from test_equivalent import jenkins
 
@@ -17,7 +18,7 @@ from fembeam.scene import with_value
 
 TIP = 0.5
 SPRING, LIMIT, ZETA = 2e3, 1.0, 0.01
-DAMPER, SPAN = "elements[damper].law.limit", (160.0, 270.0)
+DAMPER, SPAN = "elements[damper].law.limit", (185.0, 250.0)
 
 
 def driven(*elements, force=1.0, zeta=ZETA, omega=200.0, **parts):
@@ -141,7 +142,7 @@ def test_a_hardening_curve_that_overhangs():
     """Duffing: F φ²/2ζω₀ω on the backbone, of one harmonic, just before a fold."""
     force = 0.5
     model = driven(fb.Element(TIP, Polynomial([0.0, 0.0, 1e7])), zeta=0.01, force=force)
-    found = fb.study.peak(model, "omega", "forces[0].signal.amplitude", [0.45, force], (150.0, 250.0))
+    found = fb.study.peak(model, "omega", "forces[0].signal.amplitude", [0.45, force], (185.0, 225.0))
     one, phi = found.tops[1], model.phi(TIP)[0]
     assert one.amplitude == pytest.approx(force * phi**2 / (0.02 * model.omega[0] * one.at), rel=1e-2)
     assert one.at == pytest.approx(math.hypot(model.omega[0], math.sqrt(0.75e7) * phi * one.amplitude), rel=2e-3)
@@ -155,7 +156,7 @@ def test_two_stops():
     """The slope of a curve of peaks by the gap is that of its points."""
     stops = [fb.Stop(TIP, KelvinVoigt(3e3, 2.0), 1e-3, side, name=side) for side in ("below", "above")]
     model = driven(stops=stops, zeta=0.02, force=0.5)
-    found = fb.study.peak(model, "omega", "stops[below].gap", [0.998e-3, 1.002e-3], (150.0, 300.0))
+    found = fb.study.peak(model, "omega", "stops[below].gap", [0.998e-3, 1.002e-3], (195.0, 240.0))
     assert found.over == "stops[below].gap"
     assert np.mean(found.slope) == pytest.approx(np.diff(found.amplitude)[0] / 4e-6, rel=1e-3)
 
@@ -211,20 +212,14 @@ def test_the_table_peak(tmp_path, file_of):
         file_of(FILE.replace("zeta[0]", "zeta[7]"))
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"over": "elements[dampr].law.limit"}, "did you mean"),
-        ({"over": "omega"}, "another number"),
-        ({"values": [2.0, 1.0]}, "ascending"),
-        ({"values": [1.0]}, "two or more"),
-        ({"values": [1.0, math.nan]}, "finite"),
-        ({"span": (3.0, 2.0)}, "span must be two values"),
-        ({"span": (170.0, 180.0)}, "widen the span"),
-        ({"z": 0.7}, "z"),
-    ],
+test_bad_input = refused_by(
+    lambda change: fb.study.peak(damped(), "omega", **{"over": DAMPER, "values": [1.0, 2.0], "span": SPAN, **change}),
+    ({"over": "elements[dampr].law.limit"}, "did you mean"),
+    ({"over": "omega"}, "another number"),
+    ({"values": [2.0, 1.0]}, "ascending"),
+    ({"values": [1.0]}, "two or more"),
+    ({"values": [1.0, math.nan]}, "finite"),
+    ({"span": (3.0, 2.0)}, "span must be two values"),
+    ({"span": (186.0, 190.0)}, "widen the span"),
+    ({"z": 0.7}, "z"),
 )
-def test_bad_input(change, said):
-    arguments = {"over": DAMPER, "values": [1.0, 2.0], "span": SPAN, **change}
-    with pytest.raises(ValueError, match=said):
-        fb.study.peak(damped(), "omega", **arguments)

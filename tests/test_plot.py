@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from problems import PAPER_BEAM
+from problems import PAPER_BEAM, TIP, paper_scene
 
 import fembeam as fb
 from contacts import (
@@ -34,13 +34,8 @@ from fembeam.results import files as report
 
 @pytest.fixture(scope="module")
 def run():
-    scene = fb.Scene(
-        beam=PAPER_BEAM,
-        supports=[fb.Clamped(0.0)],
-        stops=[fb.Stop(0.24445, law=Hertz(2.1e8)), fb.Stop(0.2, law=Hertz(2.1e8), gap=1e-3, side="above")],
-        damping=fb.ModalDamping(0.02),
-        base=fb.BandNoise(2e-4, (0.0, 1226.6), seed=3),
-    )
+    stops = [fb.Stop(TIP, law=Hertz(2.1e8)), fb.Stop(0.2, law=Hertz(2.1e8), gap=1e-3, side="above")]
+    scene = paper_scene(fb.BandNoise(2e-4, (0.0, 1226.6), seed=3), 0.02, masses=(), stops=stops)
     return scene.reduce(2).simulate(2.0, 1e-3)
 
 

@@ -269,9 +269,8 @@ def test_held_dofs_of_abaqus_are_left_out_of_both(tmp_path, layout):
     held = K.copy()
     held[1, :] = held[:, 1] = 0.0
     held[1, 1] = 1e36
-    path, mass = (
-        written(tmp_path, f"job_{name}.mtx", abaqus(matrix, layout)) for name, matrix in (("K", held), ("M", M))
-    )
+    both = ("K", held), ("M", M)
+    path, mass = (written(tmp_path, f"job_{name}.mtx", abaqus(matrix, layout)) for name, matrix in both)
     given, free = read_matrices(path), [0, 2, 3]
     check(given, K[np.ix_(free, free)], None if layout == "coordinate" else tuple(LABELS[i] for i in free))
     assert given.held == ((1,) if layout == "coordinate" else (LABELS[1],))

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from problems import PAPER_BEAM, PAPER_LAW
+from problems import paper_scene
 
 import fembeam as fb
 from fembeam.results import files
@@ -15,13 +15,7 @@ from fembeam.results import html_page as html
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Results of a run of 20 s, and a study's text with a long sentence."""
-    scene = fb.Scene(
-        beam=PAPER_BEAM,
-        supports=[fb.Clamped(0.0)],
-        stops=[fb.Stop(0.24445, law=PAPER_LAW)],
-        damping=fb.ModalDamping(0.05),
-        base=fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1),
-    )
+    scene = paper_scene(fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1), 0.05, masses=())
     place = tmp_path_factory.mktemp("results")
     files.write(scene.reduce(2).simulate(20.0, 1e-3), place, discard=1.0)
     (place / "study.txt").write_text("modes  value\n1      0.5\n\n" + "IN DOUBT: " + "many words " * 30 + "\n")

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import refused_by
 from scipy.signal import StateSpace, lsim
 
 import fembeam as fb
@@ -148,22 +149,17 @@ def test_floor_spectrum_is_that_of_the_absolute_acceleration():
         hit.reduce(3).simulate(2.0, 2e-3).floor_spectrum(0.4, [50.0])
 
 
-@pytest.mark.parametrize(
-    ("changed", "message"),
-    [
-        ({"t": [0.0, 1.0]}, "one length"),
-        ({"t": [0.0, 1.0, 2.5]}, "equal steps"),
-        ({"t": [0.0, np.nan, 2.0]}, "t must be finite"),
-        ({"acceleration": [0.0, np.inf, 1.0]}, "acceleration must be finite"),
-        ({"omega": None}, "omega or periods"),
-        ({"periods": [1.0]}, "omega or periods"),
-        ({"omega": [1.0, 0.0]}, "omega must be positive"),
-        ({"omega": None, "periods": [-1.0]}, "periods must be positive"),
-        ({"zeta": 1.0}, "zeta must be"),
-        ({"zeta": [0.1, np.nan]}, "zeta must be"),
-    ],
+GIVEN = {"t": [0.0, 1.0, 2.0], "acceleration": [0.0, 1.0, 0.0], "omega": [1.0]}
+test_bad_input = refused_by(
+    lambda changed: fb.response_spectrum(**{**GIVEN, **changed}),
+    ({"t": [0.0, 1.0]}, "one length"),
+    ({"t": [0.0, 1.0, 2.5]}, "equal steps"),
+    ({"t": [0.0, np.nan, 2.0]}, "t must be finite"),
+    ({"acceleration": [0.0, np.inf, 1.0]}, "acceleration must be finite"),
+    ({"omega": None}, "omega or periods"),
+    ({"periods": [1.0]}, "omega or periods"),
+    ({"omega": [1.0, 0.0]}, "omega must be positive"),
+    ({"omega": None, "periods": [-1.0]}, "periods must be positive"),
+    ({"zeta": 1.0}, "zeta must be"),
+    ({"zeta": [0.1, np.nan]}, "zeta must be"),
 )
-def test_bad_input(changed, message):
-    given = {"t": [0.0, 1.0, 2.0], "acceleration": [0.0, 1.0, 0.0], "omega": [1.0], **changed}
-    with pytest.raises(ValueError, match=message):
-        fb.response_spectrum(**given)

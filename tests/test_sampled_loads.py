@@ -142,9 +142,7 @@ def test_a_stop_at_rest_on_its_surface_beside_one_that_is_pressed(omega, phase):
     tones = fb.Multisine([1.0, 1.0, 1.0], omega * np.array([1.0, 1.7, 2.3]), phase)
     stops = [Contact([1.0], Hertz(1e3)), Contact([1.0], Hertz(1e3), gap=-0.1)]
     system = System.modal([2.0], [0.01], stops, [([1.0], tones), ([1.0], fb.Step(0.1, 0.5, 0.3))])
-    here, there = (
-        integrate(system, [0.0], [0.0], 0.5, method=method(1e-10)) for method in (Exponential, DormandPrince)
-    )
+    here, there = (integrate(system, [0.0], [0.0], 0.5, method=make(1e-10)) for make in (Exponential, DormandPrince))
     np.testing.assert_allclose([here.q, here.q_dot], [there.q, there.q_dot], rtol=1e-7)
 
 

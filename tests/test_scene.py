@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from problems import PAPER_BEAM
+from refusals import refused
 
 import fembeam as fb
 import reduction
@@ -285,16 +286,10 @@ SCENES_REFUSED = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("make", "message"), PARTS_REFUSED)
-def test_parts_are_refused(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
+test_parts_are_refused = refused(*PARTS_REFUSED)
 
 
-@pytest.mark.parametrize(("make", "message"), SCENES_REFUSED)
-def test_scenes_and_their_matrices_are_refused(make, message):
-    with pytest.raises((ValueError, TypeError), match=message):
-        make()
+test_scenes_and_their_matrices_are_refused = refused(*SCENES_REFUSED, error=(ValueError, TypeError))
 
 
 def test_stop_pushes_towards_the_beam():

@@ -115,9 +115,7 @@ def texts_of(figure):
 def boxes(figure):
     """Extents of all texts in inches."""
     renderer = FigureCanvasAgg(figure).get_renderer()
-    return [
-        text.get_window_extent(renderer).transformed(figure.dpi_scale_trans.inverted()) for text in texts_of(figure)
-    ]
+    return [one.get_window_extent(renderer).transformed(figure.dpi_scale_trans.inverted()) for one in texts_of(figure)]
 
 
 def patches(figure, name, kind=None):

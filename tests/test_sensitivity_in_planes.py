@@ -5,10 +5,11 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from differences import five_points
 from oscillators import Tone
 from test_friction import EYE, SHARP, wall
 from test_friction_tangent import CHANGES, RUNS
-from test_sensitivity import FINE, OF_CONTACTS, five_points
+from test_sensitivity import FINE, OF_CONTACTS
 from test_stops_with_friction import TUBE
 
 import fembeam as fb

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from differences import central, end_of, jacobian
 from problems import STEEL
 
 import fembeam as fb
@@ -232,14 +233,9 @@ def test_tangent_through_a_cut_force_is_that_of_differences(made):
     system = System.modal([60.0, 400.0], 0.02, [Contact(row, made, 1e-4)], [load])
     start = np.array([0.0, 0.0, -1.0, 0.3])
 
-    def end(x):
-        solution = integrate(system, x[:2], x[2:], 0.02, method=Exponential(1e-12))
-        return np.concatenate((solution.q[-1], solution.q_dot[-1]))
-
     found = integrate(system, start[:2], start[2:], 0.02, method=Exponential(1e-10), tangent=True)
     assert len(found.contacts) >= 1
-    steps = 1e-6 * np.array([1e-2, 1e-2, 1.0, 1.0])
-    differences = np.array([(end(start + h) - end(start - h)) / (2.0 * h.sum()) for h in np.diag(steps)]).T
+    differences = jacobian(end_of(system, 0.02), start, [1e-8, 1e-8, 1e-6, 1e-6], central)
     scale = np.abs(differences).max(axis=0)
     assert np.all(np.abs(found.tangent - differences) < 1e-5 * scale)
 

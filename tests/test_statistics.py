@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import refused
 
 from fembeam.excitation import BandNoise
 from fembeam.statistics import Estimate, Moments, moments, pdf, psd
@@ -158,29 +159,23 @@ def test_samples_are_left_alone():
     assert np.array_equal(x, kept)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: psd([1.0] * 5, 0.1), "psd needs at least 8 samples, got 5"),
-        (lambda: psd([1.0] * 9 + [math.nan], 0.1), "psd: samples must be finite, got nan at index 9"),
-        (lambda: psd(np.ones((4, 4)), 0.1), r"one dimension, got shape \(4, 4\)"),
-        (lambda: psd(white(0, 64), 0.0), r"psd: dt \(s\) must be finite above 0, got 0.0"),
-        (lambda: psd(white(0, 64), math.inf), r"psd: dt \(s\) must be finite above 0, got inf"),
-        (lambda: psd(white(0, 64), 0.1, segment=65), "segment must be a whole number of samples from 8 to 64, got 65"),
-        (lambda: psd(white(0, 64), 0.1, segment=16.0), "segment must be a whole number"),
-        (lambda: psd(white(0, 64), 0.1, overlap=1.0), r"overlap must lie in \[0, 1\), got 1.0"),
-        (lambda: psd(white(0, 64), 0.1).variance_in(3.0, 1.0), r"variance_in needs lo < hi in rad/s, got \(3.0, 1.0\)"),
-        (lambda: pdf([1.0]), "pdf needs at least 2 samples, got 1"),
-        (lambda: pdf([1.0, math.nan]), "pdf: samples must be finite, got nan at index 1"),
-        (lambda: pdf([2.0, 2.0]), "pdf: all 2 samples equal 2, which has no density"),
-        (lambda: pdf([1.0, 2.0], bins=0), "bins must be a whole number of at least 1, or edges, got 0"),
-        (lambda: pdf([1.0, 2.0], bins=[0.0, 1.5]), r"edges \[0, 1.5\] leave out samples, which span \[1, 2\]"),
-        (lambda: pdf([1.0, 2.0], bins=[3.0, 0.0]), "edges of bins must increase strictly"),
-        (lambda: moments([1.0]), "moments needs at least 2 samples, got 1"),
-        (lambda: moments([[1.0, 2.0], [math.inf, 0.0]]), "samples must be finite, got inf at index 2"),
-        (lambda: moments("abc"), "samples must be real numbers, got .abc. in moments"),
-    ],
+test_bad_statistics = refused(
+    (lambda: psd([1.0] * 5, 0.1), "psd needs at least 8 samples, got 5"),
+    (lambda: psd([1.0] * 9 + [math.nan], 0.1), "psd: samples must be finite, got nan at index 9"),
+    (lambda: psd(np.ones((4, 4)), 0.1), r"one dimension, got shape \(4, 4\)"),
+    (lambda: psd(white(0, 64), 0.0), r"psd: dt \(s\) must be finite above 0, got 0.0"),
+    (lambda: psd(white(0, 64), math.inf), r"psd: dt \(s\) must be finite above 0, got inf"),
+    (lambda: psd(white(0, 64), 0.1, segment=65), "segment must be a whole number of samples from 8 to 64, got 65"),
+    (lambda: psd(white(0, 64), 0.1, segment=16.0), "segment must be a whole number"),
+    (lambda: psd(white(0, 64), 0.1, overlap=1.0), r"overlap must lie in \[0, 1\), got 1.0"),
+    (lambda: psd(white(0, 64), 0.1).variance_in(3.0, 1.0), r"variance_in needs lo < hi in rad/s, got \(3.0, 1.0\)"),
+    (lambda: pdf([1.0]), "pdf needs at least 2 samples, got 1"),
+    (lambda: pdf([1.0, math.nan]), "pdf: samples must be finite, got nan at index 1"),
+    (lambda: pdf([2.0, 2.0]), "pdf: all 2 samples equal 2, which has no density"),
+    (lambda: pdf([1.0, 2.0], bins=0), "bins must be a whole number of at least 1, or edges, got 0"),
+    (lambda: pdf([1.0, 2.0], bins=[0.0, 1.5]), r"edges \[0, 1.5\] leave out samples, which span \[1, 2\]"),
+    (lambda: pdf([1.0, 2.0], bins=[3.0, 0.0]), "edges of bins must increase strictly"),
+    (lambda: moments([1.0]), "moments needs at least 2 samples, got 1"),
+    (lambda: moments([[1.0, 2.0], [math.inf, 0.0]]), "samples must be finite, got inf at index 2"),
+    (lambda: moments("abc"), "samples must be real numbers, got .abc. in moments"),
 )
-def test_bad_statistics(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()

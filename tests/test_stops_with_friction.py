@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from refusals import refused_by
 
 import fembeam as fb
 import solvers
@@ -157,9 +158,8 @@ def test_turning_the_loads_and_the_directions_turns_the_motion(tube):
 
 def test_with_hardly_a_coefficient_hardly_anything_rubs():
     scene = hole()
-    still, plain = (
-        replace(scene, stops=[replace(scene.stops[0], friction=rub)]) for rub in (fb.Friction(1e-9, 1e5), None)
-    )
+    rubs = fb.Friction(1e-9, 1e5), None
+    still, plain = (replace(scene, stops=[replace(scene.stops[0], friction=rub)]) for rub in rubs)
     one, other = (each.reduce(modes=4).simulate(0.03, 1e-4, solver=METHOD) for each in (still, plain))
     np.testing.assert_allclose(one.q, other.q, rtol=0.0, atol=1e-7 * np.abs(other.q).max())
     assert 0.0 < np.abs(one.friction()).max() <= 1.001e-9 * one.contacts.peak_force.max()
@@ -193,9 +193,8 @@ def test_an_inclined_shaft_twists_as_one_along_an_axis():
     pushes = [replace(one, direction=way) for one, way in zip(straight.forces, ways, strict=True)]
     stop = replace(straight.stops[0], directions=ways)
     inclined = replace(straight, beam=straight.beam.turned(rotation), stops=[stop], forces=pushes)
-    one, other = (
-        scene.reduce(modes=4, residual=True).simulate(0.06, 1e-4, solver=METHOD) for scene in (straight, inclined)
-    )
+    models = (scene.reduce(modes=4, residual=True) for scene in (straight, inclined))
+    one, other = (model.simulate(0.06, 1e-4, solver=METHOD) for model in models)
     assert np.abs(one.friction()).max() > 1.0
     np.testing.assert_allclose(other.friction(), one.friction(), rtol=0.0, atol=1e-5 * np.abs(one.friction()).max())
 
@@ -332,18 +331,14 @@ def test_scene_files(file_of):
     assert "mu" in str(json_schema()["$defs"]["kind such as coulomb"])
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"friction": 0.3}, "friction must be a Friction"),
-        ({"friction": None, "radius": 0.01}, "radius is for an annular stop with friction"),
-        ({"radius": 0.0}, "radius must be finite and positive"),
-        ({"clearance": 0.0}, "clearance must be finite and positive"),
-    ],
+test_bad_annular_stops_are_refused = refused_by(
+    lambda options: fb.AnnularStop(**{"z": 0.4, "law": LAW, "clearance": 2e-4, "friction": RUB, **options}),
+    ({"friction": 0.3}, "friction must be a Friction"),
+    ({"friction": None, "radius": 0.01}, "radius is for an annular stop with friction"),
+    ({"radius": 0.0}, "radius must be finite and positive"),
+    ({"clearance": 0.0}, "clearance must be finite and positive"),
+    error=(ValueError, TypeError),
 )
-def test_bad_annular_stops_are_refused(options, message):
-    with pytest.raises((ValueError, TypeError), match=message):
-        fb.AnnularStop(**{"z": 0.4, "law": LAW, "clearance": 2e-4, "friction": RUB, **options})
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 from scipy import linalg
 from scipy.integrate import solve_ivp
 from structures import BEAM, ELEMENTS, LAW, LENGTH, beam_structure, space_truss
@@ -222,7 +223,7 @@ def test_base_motion_of_three_components_against_scipy():
     grounded = [fb.Spring(node, 3e3, direction=c) for node in (1, 2, 3) for c in "xyz"]
     dashpots = [fb.Dashpot("top", 4.0, direction=(1.0, 1.0, 0.0))]
     scene = fb.Scene(truss, springs=grounded, dashpots=dashpots, stops=[stop], base=base)
-    run = scene.reduce(modes="all").simulate(0.25, 0.01)
+    run = scene.reduce(modes="all").simulate(0.15, 0.01)
 
     K = truss.K.toarray() + 3e3 * np.diag([1.0] * 9 + [0.0] * 3)
     M, r, w, d = truss.M.toarray(), np.kron(np.ones((4, 1)), np.eye(3)), np.zeros(12), np.zeros(12)
@@ -236,7 +237,7 @@ def test_base_motion_of_three_components_against_scipy():
         motion = np.array([shaken(t) for shaken in accelerations], dtype=float)
         return np.concatenate([v, inverse @ (-w * pushed - K @ u - 4.0 * d * (d @ v)) - r @ motion])
 
-    exact = solve_ivp(rate, (0.0, 0.25), np.zeros(24), "DOP853", run.t, rtol=1e-11, atol=1e-14, max_step=2e-4).y
+    exact = solve_ivp(rate, (0.0, 0.15), np.zeros(24), "DOP853", run.t, rtol=1e-11, atol=1e-14, max_step=2e-4).y
     assert len(run.contacts) > 3
     np.testing.assert_allclose(run.motion("top"), exact[9:12].T, rtol=0, atol=3e-6 * np.abs(exact[9:12]).max())
     moved = run.displacement("top", "z", absolute=True) - run.displacement("top", "z")
@@ -337,10 +338,7 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("make", "message"), BAD)
-def test_bad_input_is_refused_in_a_sentence(make, message):
-    with pytest.raises(ValueError, match=message):
-        make()
+test_bad_input_is_refused_in_a_sentence = refused(*BAD)
 
 
 def test_what_has_no_meaning_says_so(runs, tmp_path):
@@ -395,9 +393,7 @@ def test_reactions_know_where_the_damping_of_a_structure_acts(motion):
     supports = [fb.Fixed(0, "x", motion=motion), fb.Fixed(4, "x")]
     scene = fb.Scene(fb.Structure(K, M, C, labels), supports, forces=[fb.PointForce(3, force, "x")], base=base)
     run = scene.reduce(modes="all").simulate(0.5, 1e-3)
-    u, v, a = (
-        np.array([read(i, "x") for i in range(5)]) for read in (run.displacement, run.velocity, run.acceleration)
-    )
+    u, v, a = (np.array([ask(i, "x") for i in range(5)]) for ask in (run.displacement, run.velocity, run.acceleration))
     if base:
         a = a + base["x"].derivative(2)(run.t)
     held = K @ u + C @ v + M @ a

@@ -83,7 +83,7 @@ def test_runs_at_once_on_one_system_are_those_one_after_the_other():
         vectors = [vector for vector, _ in one.loads]
         return end(one.like(loads=list(zip(vectors, (*OTHERS[kind], shake), strict=True))), duration)
 
-    asked = [(duration, kind) for duration in (0.02, 0.03, 0.041) for kind in ("own", "tones", "own", "noise")] * 4
+    asked = [(duration, kind) for duration in (0.01, 0.015, 0.021) for kind in ("own", "tones", "own", "noise")] * 4
     wanted = {key: work(system(), *key) for key in set(asked)}
     shared = system()
     found = at_once(lambda *key: work(shared, *key), asked)

@@ -160,9 +160,8 @@ def differences(a: dict[str, Any], b: dict[str, Any], measure: dict[str, Any], p
     found = {}
     for name in ("q", "q_dot"):
         m = len(b[name])
-        apart, size = (
-            np.abs(x).reshape(len(x), parts, -1).max(axis=(0, 2)) for x in (a[name][-m:] - b[name], measure[name])
-        )
+        both = a[name][-m:] - b[name], measure[name]
+        apart, size = (np.abs(x).reshape(len(x), parts, -1).max(axis=(0, 2)) for x in both)
         if name == "q_dot":  # of what is at rest at the samples
             fast = np.resize(measure["fast"].max(initial=0.0), parts) if parts == 1 else measure["fast"]
             size[: len(fast)] = np.maximum(size[: len(fast)], fast)
@@ -301,6 +300,19 @@ def main(judge: Callable[[int], tuple[str, Verdict]]) -> None:
     """Judge [count] systems from [first seed] on with [processes], the arguments; exits with 1 after a failure."""
     count, first, processes = [*map(int, sys.argv[1:4]), *(500, 0, 2)[len(sys.argv) - 1 :]]
     sys.exit(report(judged(judge, count, first, processes), count) > 0)
+
+
+def told_apart(found: Iterator[tuple[str, list[str], int]], what: str, most: int | None = None) -> int:
+    """Print what differs, at most so many lines of each, and how many there were of what kind; returns how many do."""
+    kinds: Counter[str] = Counter()
+    for words, wrong, contacts in found:
+        kinds["contacts"] += contacts
+        passed = wrong and wrong[0].split(":")[0] in ("ill-conditioned", "the reference failed", "refused")
+        kinds[wrong[0].split(":")[0] if passed else "differ" if wrong else "agree"] += 1
+        if wrong and wrong != ["ill-conditioned"]:
+            print(words, *wrong[:most], sep="\n    ", flush=True)
+    print(f"{what}: {dict(kinds)}")
+    return kinds["differ"]
 
 
 def report(found: Iterator[tuple[str, Verdict]], count: int) -> int:

@@ -268,9 +268,7 @@ def cut(tables: Table, rng: Any) -> Table:
             body[kind] = [one for one in rows if there(one["at"])]
             rows = [one for one in rows if not there(one["at"])]
         ends = "at", "on", "to"
-        found[kind] = [
-            {**one, **{k: [1, one[k]] if there(one[k]) else one[k] for k in ends if k in one}} for one in rows
-        ]
+        found[kind] = [one | {k: [1, one[k]] if there(one[k]) else one[k] for k in ends if k in one} for one in rows]
     used = [one[k] for kind in PLACED for one in tables.get(kind, ()) for k in ("at", "on", "to") if k in one]
     if all(isinstance(at, str) for at in used if there(at)) and rng.random() < 0.6:
         own["reduced"] = {"nodes": sorted(beyond), "modes": 14}

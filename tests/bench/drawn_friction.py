@@ -66,9 +66,8 @@ class Drawer:
         """Small and large μ, springs much softer or stiffer than the contact."""
         mu = self.rng.choice([0.0, *10.0 ** self.rng.uniform([-3.0, -1.0, -1.0, 0.0], [-1.0, 0.0, 0.0, 1.0])])
         k = 9.0 / (row @ row) / time**2
-        return Friction(
-            float(mu), float(k * 10.0 ** self.rng.choice([self.rng.uniform(-1, 0.5), self.rng.uniform(-3, 2)]))
-        )
+        softer = self.rng.choice([self.rng.uniform(-1, 0.5), self.rng.uniform(-3, 2)])
+        return Friction(float(mu), float(k * 10.0**softer))
 
     def time(self) -> float:
         """How long a contact lasts."""
@@ -76,9 +75,8 @@ class Drawer:
 
     def gap(self) -> float:
         """A clearance of the size of the motion, or less."""
-        return float(
-            self.speed / self.low * self.rng.choice([self.rng.uniform(0.02, 1.0), 10.0 ** self.rng.uniform(-2, 0)])
-        )
+        share = self.rng.choice([self.rng.uniform(0.02, 1.0), 10.0 ** self.rng.uniform(-2, 0)])
+        return float(self.speed / self.low * share)
 
     def annulus(self) -> Contact:
         """A hole or a post, with friction or without."""
@@ -127,9 +125,8 @@ class Drawer:
         if kind < 0.4:
             return Contact(row, KelvinVoigt(k, self.rng.uniform(0.0, 0.1) * math.sqrt(k * mass)), always=True)
         if kind < 0.8:
-            return Contact(
-                row, Jenkins(k, k * self.speed / self.low * 10.0 ** self.rng.uniform(-1.5, 0.0)), always=True
-            )
+            limit = k * self.speed / self.low * 10.0 ** self.rng.uniform(-1.5, 0.0)
+            return Contact(row, Jenkins(k, limit), always=True)
         return Contact(row, draw_memory(self.rng, mass, self.speed, self.low), always=True)
 
     def loads(self, duration: float) -> tuple[list[Any], str]:

@@ -264,9 +264,7 @@ class Drawer:
         other, _, _ = self.structure(l2)
         other["stops"] = [{"z": 0.7 * l2, "gap": 0.5 * size, "side": "above", "law": self.law(k, deep, mass, rate)}]
         tables["bodies"] = [other]
-        z = self.u(0.35, 0.85)
-        tables["stops"].append(
-            {"z": z * L, "gap": 0.3 * size, "on": (1, 0.6 * l2), "law": self.law(k, deep, mass, rate)}
-        )
+        z, law = self.u(0.35, 0.85), self.law(k, deep, mass, rate)
+        tables["stops"].append({"z": z * L, "gap": 0.3 * size, "on": (1, 0.6 * l2), "law": law})
         if self.maybe(0.4, 4):
             tables["elements"].append({"z": 0.4 * L, "to": (1, 0.5 * l2), "law": self.element_law(0.2 * k, size, mass)})

@@ -5,32 +5,22 @@ python tests/bench/energy_cost.py [seconds] [rounds]     the paper's beam, dt = 
 
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from problems import paper_scene
+
 import fembeam as fb
 import solvers
-from contacts import Hysteretic
 
 BASES = {
     "noise": fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1),
     "tone": fb.Harmonic(1e-3, 195.0),
     "three tones": fb.Multisine((1e-3, 1e-4, 3e-5), (195.0, 390.0, 780.0)),
 }
-Z_STOP = 0.24445
-
-
-def beam(modes, base):
-    """The model of `examples/beam_stop.py` with so many modes."""
-    scene = fb.Scene(
-        beam=fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
-        supports=[fb.Clamped(0.0)],
-        masses=[fb.LumpedMass(Z_STOP, mass=25.4e-3, inertia=3.0e-6)],
-        stops=[fb.Stop(Z_STOP, law=Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5))],
-        damping=fb.ModalDamping([0.02, *[0.01] * (modes - 1)]),
-        base=base,
-    )
-    return scene.reduce(modes=modes)
 
 
 def compared(model, seconds, rounds):
@@ -50,7 +40,8 @@ def main(seconds=20.0, rounds=9):
     """One line per case."""
     for name, base in BASES.items():
         for modes in (2, 10, 30):
-            on, off, run = compared(beam(modes, base), seconds, rounds)
+            model = paper_scene(base, [0.02, *[0.01] * (modes - 1)]).reduce(modes)
+            on, off, run = compared(model, seconds, rounds)
             energy = run.energy
             scale = max(np.abs(energy.input).max(), energy.stored.max())
             print(

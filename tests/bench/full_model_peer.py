@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from reference import LENGTH, OMEGA, TIP, scene
+from reference import LENGTH, OMEGA, TIP, paper_scene
 
 import fembeam as fb
 from solvers import Exponential, GeneralizedAlpha, Newmark
@@ -43,7 +43,7 @@ METHODS = [
 
 def problem() -> fb.Scene:
     """The paper's scene with Rayleigh's damping; its base sets out without acceleration, as OpenSees expects it."""
-    return replace(scene(), damping=fb.Rayleigh(ALPHA, BETA), base=fb.Harmonic(1e-3, OMEGA, phase=-0.5 * math.pi))
+    return replace(paper_scene(), damping=fb.Rayleigh(ALPHA, BETA), base=fb.Harmonic(1e-3, OMEGA, phase=-0.5 * math.pi))
 
 
 class OpenSees:

@@ -75,9 +75,8 @@ def linear(drawn: Drawn, model: fb.Model, whole: Whole, most: float) -> Check:
     )
     yield "buckling", off(model.scene.buckling_load(), fine), 1e-5 + abs(coarse / fine - 1)
     w = np.array([0.31, 0.77, 1.9]) * max(whole.omega[whole.omega > 0].min(), 1e-3)
-    acting = [
-        (whole.vectors.T @ row, Acting(law, gap, None, True), gap) for row, gap, law, always in whole.contacts if always
-    ]
+    always = [contact[:3] for contact in whole.contacts if contact[3]]
+    acting = [(whole.vectors.T @ row, Acting(law, gap, None, True), gap) for row, gap, law in always]
     K, C = np.diag(whole.omega**2), whole.C.copy()
     for row, one, gap in acting:
         k, c = slopes(one, -gap)

@@ -12,10 +12,9 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
-from reference import OMEGA, scene
+from reference import OMEGA, paper_scene
 
 import fembeam as fb
 from fembeam.study.measure import cut
@@ -38,8 +37,8 @@ def settled_amplitude(run: Any) -> float:
 
 def studies() -> Iterator[tuple[str, fb.study.SpeedAccuracy]]:
     """(title, study), one after the other."""
-    model = scene().reduce(modes=2)
-    noisy = replace(scene(), base=fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1)).reduce(modes=2)
+    model = paper_scene().reduce(modes=2)
+    noisy = paper_scene(fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1)).reduce(modes=2)
     orbit = model.orbit(period=1)
     if not orbit.stable:
         raise SystemExit(f"no stable orbit: {orbit}")

@@ -18,12 +18,11 @@ import signal as clock
 import sys
 import tempfile
 import warnings
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from comparison import judged
+from comparison import judged, told_apart
 from drawn_frames import FrameDrawer, cut
 from model_tables import scene_file
 from scipy.linalg import eigh
@@ -161,15 +160,7 @@ def _kind(name: str) -> str:
 
 def main(count: int = 100, first: int = 0, processes: int = 1) -> int:
     """Run and print; returns the number of scenes that differ."""
-    kinds: Counter[str] = Counter()
-    for words, wrong, contacts in judged(judge, count, first, processes):
-        kinds["contacts"] += contacts
-        passed = wrong and wrong[0].split(":")[0] in ("ill-conditioned", "the reference failed", "refused")
-        kinds[wrong[0].split(":")[0] if passed else "differ" if wrong else "agree"] += 1
-        if wrong and wrong != ["ill-conditioned"]:
-            print(words, *wrong[:8], sep="\n    ", flush=True)
-    print(f"{count} frames: {dict(kinds)}")
-    return kinds["differ"]
+    return told_apart(judged(judge, count, first, processes), f"{count} frames", 8)
 
 
 if __name__ == "__main__":

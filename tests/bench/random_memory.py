@@ -222,9 +222,8 @@ def accelerations(scene: Scene, rows: Any) -> Any:
         return np.zeros(len(rows))
     before = np.diff(at, prepend=0.0)
     times = np.stack((at - 2e-3 * before, at - 1e-3 * before), axis=1)
-    motion = integrate(
-        *(scene.system, scene.q0, scene.q_dot0, scene.duration, times.ravel(), COARSER), memory=scene.memory
-    )
+    given = scene.system, scene.q0, scene.q_dot0, scene.duration, times.ravel(), COARSER
+    motion = integrate(*given, memory=scene.memory)
     gained = np.diff(motion.q_dot.reshape(len(at), 2, -1), axis=1)[:, 0] / (1e-3 * before[:, None])
     place = np.maximum(np.searchsorted(at, rows.t, side="right") - 1, 0)
     directions = np.array([contact.direction for contact in scene.system.contacts])

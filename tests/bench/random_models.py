@@ -19,12 +19,11 @@ from __future__ import annotations
 import math
 import sys
 import warnings
-from collections import Counter
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from comparison import judged
+from comparison import judged, told_apart
 from drawn_models import Drawer, Drawn
 from finite_elements import Whole
 from model_numbers import PROBES, Numbers, own_numbers, same_start, their_numbers
@@ -176,15 +175,7 @@ def compared(drawn: Drawn, model: fb.Model, seed: int) -> tuple[list[str], int]:
 
 def main(count: int = 100, first: int = 0, depth: int = 4, processes: int = 1) -> int:
     """Run and print; returns the number of scenes that differ."""
-    kinds: Counter[str] = Counter()
-    for words, wrong, contacts in judged(judge, count, first, processes, depth):
-        kinds["contacts"] += contacts
-        passed = wrong and wrong[0].split(":")[0] in ("ill-conditioned", "the reference failed", "refused")
-        kinds[wrong[0].split(":")[0] if passed else "differ" if wrong else "agree"] += 1
-        if wrong and wrong != ["ill-conditioned"]:
-            print(words, *wrong, sep="\n    ", flush=True)
-    print(f"{count} scenes of depth {depth}: {dict(kinds)}")
-    return kinds["differ"]
+    return told_apart(judged(judge, count, first, processes, depth), f"{count} scenes of depth {depth}")
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ ten periods. Two methods that share nothing but the equation find it, both in ex
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -24,19 +25,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from problems import PAPER_LAW as LAW
+from problems import TIP, paper_scene
+
 import fembeam as fb
 import solvers
-from contacts import Hysteretic
 
 FILE = Path(__file__).with_name("reference.npz")
 MODES = 2, 10, 30
 STARTS = 12
-TIP = 0.24445
 AMPLITUDE, OMEGA = 1e-3, 195.0
 DURATION = 10.0 * 2.0 * math.pi / OMEGA
 LENGTH = 1e-3  # m, the unit of all errors
-STIFFNESS = 2.1e8
-LAW = Hysteretic.lankarani_nikravesh(STIFFNESS, restitution=0.5)
+STIFFNESS = LAW.stiffness
 FACTOR = LAW.damping_factor
 RATE_FLOOR = LAW.entry_rate_floor
 LOAD = AMPLITUDE * OMEGA**2
@@ -220,21 +223,9 @@ def _root(values: NDArray, h: Long, sign: int) -> Long:
 # --- making the file -------------------------------------------------------------------------------------------------
 
 
-def scene() -> fb.Scene:
-    """A clamped beam with a tip mass over a stop, its base shaken by 1 mm at 195 rad/s."""
-    return fb.Scene(
-        beam=fb.Beam(0.2599, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)),
-        supports=[fb.Clamped(0.0)],
-        masses=[fb.LumpedMass(TIP, mass=25.4e-3, inertia=3.0e-6)],
-        stops=[fb.Stop(TIP, law=LAW)],
-        damping=fb.ModalDamping([0.02, 0.01]),
-        base=fb.Harmonic(AMPLITUDE, OMEGA),
-    )
-
-
 def unsolved(modes: int) -> Problem:
     """The problem with its starts, the tips not yet known."""
-    model = scene().reduce(modes)
+    model = paper_scene().reduce(modes)
     c, k = np.diag(model.system.C).copy(), np.diag(model.system.K).copy()
     empty = np.empty((0, 2 * modes))
     bare = Problem(k, c, model.participation, model.phi(TIP), empty, np.empty(0))

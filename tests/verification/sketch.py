@@ -27,11 +27,15 @@ def beam(axis, start, end, y=0.0, height=0.07):
     axis.add_patch(Rectangle((start, y - height / 2), end - start, height, fc="0.85", ec="0.15", lw=1.0))
 
 
+def _ways(start, end, width):
+    """The start, the way to the end, and the width across it."""
+    start, along = np.array(start, float), np.subtract(end, start)
+    return start, along, np.array([-along[1], along[0]]) / np.hypot(*along) * width
+
+
 def spring(axis, start, end, turns=5, width=0.07):
     """A spring between two points."""
-    start, end = np.array(start, float), np.array(end, float)
-    along = end - start
-    across = np.array([-along[1], along[0]]) / np.hypot(*along) * width
+    start, along, across = _ways(start, end, width)
     share = np.concatenate(([0.0], np.linspace(0.15, 0.85, 2 * turns + 1), [1.0]))
     swing = np.zeros(share.size)
     swing[2:-2:2], swing[3:-2:2] = 1.0, -1.0
@@ -40,9 +44,7 @@ def spring(axis, start, end, turns=5, width=0.07):
 
 def dashpot(axis, start, end, width=0.07):
     """A dashpot between two points."""
-    start, end = np.array(start, float), np.array(end, float)
-    along = end - start
-    across = np.array([-along[1], along[0]]) / np.hypot(*along) * width
+    start, along, across = _ways(start, end, width)
     for points in ([(0, 0), (0.5, 0)], [(0.5, -0.7), (0.5, 0.7)], [(0.68, 0), (1, 0)],
                    [(0.35, 1), (0.68, 1), (0.68, -1), (0.35, -1)]):  # fmt: skip
         line(axis, *np.array([start + a * along + b * across for a, b in points]).T, lw=1.0)
@@ -50,9 +52,7 @@ def dashpot(axis, start, end, width=0.07):
 
 def slider(axis, start, end, width=0.07):
     """A dry slider between two points."""
-    start, end = np.array(start, float), np.array(end, float)
-    along = end - start
-    across = np.array([-along[1], along[0]]) / np.hypot(*along) * width
+    start, along, across = _ways(start, end, width)
     for points in ([(0, 0), (0.6, 0)], [(0.6, -1), (0.6, 1)], [(0.66, -1), (0.66, 1)], [(0.66, 0), (1, 0)]):
         line(axis, *np.array([start + a * along + b * across for a, b in points]).T, lw=1.0)
 
