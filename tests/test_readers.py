@@ -538,5 +538,9 @@ def test_nodes(tmp_path):
         ValueError, match=r"line 1: expected GRID 7 in the basic system .*, got systems 0 and 3: turn them"
     ):
         read_nodes(written(tmp_path, "a.bdf", "GRID,7,,1.,2.,3.,3\n"))
+    usual = "GRID,7,,1.,2.,3.\nGRDSET,,,,,,4\n"  # of grids that name no systems, before it too
+    with pytest.raises(ValueError, match=r"line 1: expected GRID 7 in the basic system .*, got systems 0 and 4"):
+        read_nodes(written(tmp_path, "c.bdf", usual))
+    assert read_nodes(written(tmp_path, "c.bdf", usual.replace("3.\n", "3.,0\n"))) == {7: (1.0, 2.0, 3.0)}
     with pytest.raises(ValueError, match=r"line 2: expected node, x, y, z, got '5 a b c'"):
         read_nodes(written(tmp_path, "b.txt", "4 1 2 3\n5 a b c\n"))
