@@ -264,6 +264,20 @@ def test_abaqus(tmp_path, layout, part):
     check(given, labels=None if layout == "coordinate" else LABELS)
 
 
+def test_a_triangle_in_the_order_of_the_file_is_mirrored_whole(tmp_path):
+    """Another order of equations than that of nodes, and form 6 of DMIG, put entries on both sides of the diagonal."""
+    order = (2, 0, 3, 1)
+    turned, labels = K[np.ix_(order, order)], [LABELS[i] for i in order]
+    check(read_matrices(written(tmp_path, "K.mtx", abaqus(turned, "input", labels=labels))))
+    lines = ["DMIG,K,0,6,2,0"]
+    for i, j, value in entries(turned):
+        (node, c), (other, d) = labels[i], labels[j]
+        lines.append(f"DMIG,K,{other},{NAMES.index(d) + 1},,{node},{NAMES.index(c) + 1},{value!r}")
+    check(read_matrices(written(tmp_path, "K.pch", "\n".join(lines))))
+    lopsided = abaqus(K, "input", "all") + "3,1, 7,2, 1.0\n"
+    assert read_matrices(written(tmp_path, "L.mtx", lopsided)).matrix(None)[2, 0] == 0.0  # not symmetric, and left so
+
+
 @pytest.mark.parametrize("layout", ["input", "coordinate"])
 def test_held_dofs_of_abaqus_are_left_out_of_both(tmp_path, layout):
     held = K.copy()
@@ -523,5 +537,9 @@ def test_nodes(tmp_path):
         ValueError, match=r"line 1: expected GRID 7 in the basic system .*, got systems 0 and 3: turn them"
     ):
         read_nodes(written(tmp_path, "a.bdf", "GRID,7,,1.,2.,3.,3\n"))
+    usual = "GRID,7,,1.,2.,3.\nGRDSET,,,,,,4\n"  # of grids that name no systems, before it too
+    with pytest.raises(ValueError, match=r"line 1: expected GRID 7 in the basic system .*, got systems 0 and 4"):
+        read_nodes(written(tmp_path, "c.bdf", usual))
+    assert read_nodes(written(tmp_path, "c.bdf", usual.replace("3.\n", "3.,0\n"))) == {7: (1.0, 2.0, 3.0)}
     with pytest.raises(ValueError, match=r"line 2: expected node, x, y, z, got '5 a b c'"):
         read_nodes(written(tmp_path, "b.txt", "4 1 2 3\n5 a b c\n"))

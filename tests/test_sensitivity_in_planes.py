@@ -132,6 +132,31 @@ def test_the_derivative_by_a_parameter(name):
         np.testing.assert_allclose(getattr(found, derived), log[logged], rtol=0.0, atol=2e-6 * size, err_msg=logged)
 
 
+@pytest.mark.parametrize("name", ["spin", "post"])
+def test_where_the_angle_counts_from_changes_no_derivative(name):
+    """Axes turned so that the place crosses the angle at which a turn begins between any two events of its contacts."""
+    system, *start, duration = RUNS[name]
+    contact = system.contacts[0]
+
+    def by_clearance(axes):
+        turned = replace(contact, direction=axes @ contact.direction)
+
+        def make(d):
+            return changed(system, lambda _, d: replace(turned, gap=turned.gap + d), d)
+
+        return sensitivity(make(0.0), *start, duration, [duration], Nearby.of(make, 0.0, 1e-4), method=FINE)
+
+    found = by_clearance(np.eye(2))
+    log, times = found.solution.contacts, found.solution.transitions.t
+    times = np.sort(np.concatenate((log.t_in, times, log.t_out)))
+    x, y = contact.direction @ integrate(system, *start, duration, dt=times, method=FINE).q.T
+    angles = np.arctan2(y, x)
+    for angle in 0.5 * (angles[1:] + angles[:-1]):
+        axes = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        state = by_clearance(axes).states[-1]
+        np.testing.assert_allclose(state, found.states[-1], rtol=0.0, atol=1e-10 * abs(state).max())
+
+
 def test_a_law_that_pulls_as_it_opens():
     """The limit max(μN, 0) has a kink where N = 0, which is met to rounding."""
     system, start = wall(KelvinVoigt(4e5, 60.0)), ([-1e-3, 0.0], [0.8, 1.0])

@@ -46,7 +46,7 @@ def cross(flow: Flow, t: float, row: Array, acting: Acting, span: float, last: A
         return _latch_at_start(flow, t, s, acting), np.zeros(flow.columns)
     if flow.slider(s, acting) is not None and row[at.GUARD] >= 0.0:
         shift = np.zeros(flow.columns) if last is None else last
-        _renew_slider(flow, t, s, acting, following, shift)
+        _renew_slider(flow, t, row, acting, following, shift)
         flow.y -= np.outer(flow.push[s].T @ _friction_jump(flow, t, s, acting, following), shift)
         return following, shift
     rate, acceleration = flow.rates(t, s, acting)
@@ -96,12 +96,13 @@ def _latch_slider(flow: Flow, t: float, s: int, begun: Acting, shift: Array) -> 
     return begun
 
 
-def _renew_slider(flow: Flow, t: float, s: int, acting: Acting, following: Acting, shift: Array) -> None:
+def _renew_slider(flow: Flow, t: float, row: Array, acting: Acting, following: Acting, shift: Array) -> None:
     """Derivative of the place of a slider where stick begins, s = ξ - F_t/k_t.
 
     Where slip ends, the rate of s is zero, so that dt* does not matter, unless Ṅ jumps there, or N up, at a knot or an
     event of another element; then dt* is that of this event. Where N begins to grow from zero, dt* = -dN/Ṅ.
     """
+    s, xi = int(row[at.ELEMENT]), float(row[at.DELTA])
     flow.latched[s][:] = 0.0
     slider, before = flow.slider(s, following), flow.slider(s, acting)
     if slider is None or before is None or not slider.sticks:
@@ -111,14 +112,16 @@ def _renew_slider(flow: Flow, t: float, s: int, acting: Acting, following: Actin
         push, normal_rate, change = flow.at_instant(t, s, pushing)
         jumped = push > _LEFT_BEHIND * flow.size_of_force(t, s, pushing)
         moved = shift if jumped else -change / normal_rate
-        flow.latched[s][1] = flow.xi_change(t, s) + float(flow.motion_of(t, s).xi_rate[0]) * moved
+        flow.latched[s][1] = flow.xi_change(t, s, xi) + float(flow.motion_of(t, s).xi_rate[0]) * moved
         return
     numbers = slider.numbers
     _, normal_rate, normal_change = flow.at_instant(t, s, acting)
     normal = flow.force(t, s, acting)
     force, friction_by_normal = before.force(np.zeros(1), normal)[0], before.friction_by_normal(normal)[0]
     rate = float(flow.motion_of(t, s).xi_rate[0]) - friction_by_normal / numbers[STIFFNESS] * normal_rate
-    flow.latched[s][1] = flow.xi_change(t, s) - friction_by_normal / numbers[STIFFNESS] * normal_change + rate * shift
+    flow.latched[s][1] = (
+        flow.xi_change(t, s, xi) - friction_by_normal / numbers[STIFFNESS] * normal_change + rate * shift
+    )
     if numbers[MU]:
         one = flow.by.elements[s]
         changed = one.mu / numbers[MU] - one.stiffness / numbers[STIFFNESS]

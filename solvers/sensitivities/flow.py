@@ -12,6 +12,7 @@ a stretch are solved at once, then applied one after the other.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -118,11 +119,14 @@ class Flow:
         found[0][self.own] -= np.sign(self.system.contacts[s].circle) * self.by.elements[s].clearance
         return found
 
-    def xi_change(self, t: float, s: int) -> Array:
-        """dξ (m,) of an element with friction at fixed time."""
+    def xi_change(self, t: float, s: int, told: float | None = None) -> Array:
+        """dξ (m,) of an element with friction at fixed time; of ξ as it is ``told``, which may count more turns."""
         motion = self.motion_of(t, s)
         found, one = motion.xi_slopes[:, 0] @ self._rows_change(t, s)[0], self.by.elements[s]
-        found[self.own] += one.clearance * motion.angle[0] + one.surface * t
+        turn, angle = 2.0 * math.pi * abs(self.system.contacts[s].circle), motion.angle[0]
+        if turn and told is not None:
+            angle += 2.0 * math.pi * round((told - motion.xi[0]) / turn)
+        found[self.own] += one.clearance * angle + one.surface * t
         return np.asarray(found)
 
     def _rows_change(self, t: float, s: int) -> tuple[Array, Array]:

@@ -1,5 +1,5 @@
 """Abaqus *MATRIX OUTPUT (.mtx): the layouts MATRIX INPUT and LABELS (node, dof, node, dof, value) and COORDINATE (row,
-column, value, numbered from 1), with commas or blanks, whole or one triangle.
+column, value, numbered from 1), with commas or blanks, whole or each pair of symmetric entries once.
 
 Dofs held by boundary conditions stand with 1e36 on the diagonal. Internal nodes (Lagrange multipliers of hybrid
 elements and connectors) have negative labels: they make K indefinite and M singular, and are refused.

@@ -4,8 +4,8 @@
     DMIG*   KAAX                          11               3                  a column: grid, component
     *                     11               3 3.528000000D+08                  its entries: grid, component, value
 
-in fields of 8 columns, of 16 on lines marked by a star, or with commas. Form 6 has one triangle of a symmetric matrix.
-Nine decimals are punched: frequencies come out to about 1e-9.
+in fields of 8 columns, of 16 on lines marked by a star, or with commas. Form 6 has each pair of symmetric entries
+once, in either triangle. Nine decimals are punched: frequencies come out to about 1e-9.
 """
 
 from __future__ import annotations

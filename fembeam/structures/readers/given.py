@@ -88,11 +88,16 @@ def _are_numbers(words: list[str], count: int) -> bool:
 
 
 def assembled(rows: Any, columns: Any, values: Any, size: int, symmetric: bool = True) -> sparse.csr_matrix:
-    """A square matrix from entries; where they are of one triangle only, the other is its mirror image."""
+    """A square matrix from entries; where each pair of dofs stands once, in either triangle, it is mirrored.
+
+    Which triangle an entry is in depends on the order of the dofs, and a file may have another one than ours.
+    """
     rows, columns, values = np.asarray(rows, dtype=int), np.asarray(columns, dtype=int), np.asarray(values, dtype=float)
     one = sparse.csr_matrix((values, (rows, columns)), shape=(size, size))
-    lower, upper = np.any(rows > columns), np.any(rows < columns)
-    return one if not symmetric or (lower and upper) else (one + one.T - sparse.diags(one.diagonal())).tocsr()
+    off = rows != columns
+    apart = sparse.csr_matrix((np.ones(np.count_nonzero(off)), (rows[off], columns[off])), shape=(size, size))
+    twice = apart.multiply(apart.T).nnz > 0
+    return one if not symmetric or twice else (one + one.T - sparse.diags(one.diagonal())).tocsr()
 
 
 def numbered(found: Sequence[Label] | set[Label]) -> dict[Label, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 from fembeam.structures.readers.given import real, wrong
@@ -60,10 +61,29 @@ def _below_keyword(path: Path, lines: list[str]) -> dict[int | str, Place]:
 
 
 def _grids(path: Path, lines: list[str]) -> dict[int | str, Place]:
-    """GRID cards: id, system of the place, x, y, z, system of the displacements; only the basic system (0) is known."""
+    """GRID cards: id, system of the place, x, y, z, system of the displacements; only the basic system (0) is known.
+
+    A GRDSET card has the systems of those that name none.
+    """
     found: dict[int | str, Place] = {}
+    usual = next((words for _, words in _cards(lines, "GRDSET")), [""] * 6)
+    for number, words in _cards(lines, "GRID"):
+        try:
+            node, at = int(words[0]), [real(word) if word else 0.0 for word in words[2:5]]
+        except ValueError:
+            raise wrong(path, f"line {number}", "GRID, id, system, x, y, z", repr(lines[number - 1][:60])) from None
+        of_place, of_motion = (words[i] or usual[i] or "0" for i in (1, 5))
+        if of_place != "0" or of_motion != "0":
+            raise wrong(path, f"line {number}", f"GRID {node} in the basic system for place and displacements",
+                        f"systems {of_place} and {of_motion}: turn them before the export")  # fmt: skip
+        found[node] = (at[0], at[1], at[2])
+    return found
+
+
+def _cards(lines: list[str], name: str) -> Iterator[tuple[int, list[str]]]:
+    """(line, fields behind the name, six at least) of the cards of a name."""
     for number, line in enumerate(lines, 1):
-        if line[:8].split(",")[0].strip().upper().rstrip("*") != "GRID":
+        if line[:8].split(",")[0].strip().upper().rstrip("*") != name:
             continue
         if "," in line:
             words = [word.strip() for word in line.split(",")[1:]]
@@ -72,13 +92,4 @@ def _grids(path: Path, lines: list[str]) -> dict[int | str, Place]:
             words = [part[i : i + 16].strip() for part in (line, more) for i in range(8, 72, 16)]
         else:
             words = [line[i : i + 8].strip() for i in range(8, 72, 8)]
-        words += [""] * (6 - len(words))
-        try:
-            node, at = int(words[0]), [real(word) if word else 0.0 for word in words[2:5]]
-        except ValueError:
-            raise wrong(path, f"line {number}", "GRID, id, system, x, y, z", repr(line[:60])) from None
-        if words[1] not in ("", "0") or words[5] not in ("", "0"):
-            raise wrong(path, f"line {number}", f"GRID {node} in the basic system for place and displacements",
-                        f"systems {words[1] or 0} and {words[5] or 0}: turn them before the export")  # fmt: skip
-        found[node] = (at[0], at[1], at[2])
-    return found
+        yield number, words + [""] * (6 - len(words))
