@@ -15,7 +15,7 @@ import fembeam as fb
 from contacts import PUBLISHED, Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Tabulated, Viscoelastic, law
 from solvers import Contact, System
 
-SAMPLED_FROM = 100_000  # the first seed of `draw_sampled`; what one below stands for has stayed
+SAMPLED_FROM, RESTING_FROM = 100_000, 200_000_000  # first seeds of both kinds; what one below stands for has stayed
 
 
 @law(exponent=1.5)
@@ -256,11 +256,42 @@ def draw_sampled(rng: np.random.Generator) -> Scene:
     return Scene(System(np.eye(n), C, np.diag(omega**2), [Contact(row, made, gap)], loads), q0, q_dot0, duration, words)
 
 
+def draw_resting(rng: np.random.Generator) -> Scene:
+    """A mass, free but for gravity, and up to three modes that it pulls along: it falls, lies, is pushed by loads.
+
+    Its stop has no gap or a small one; there may be a second one that is pressed. Loads may come in pairs that cancel
+    but for rounding.
+    """
+    n, low, speed = int(rng.integers(1, 5)), 10.0 ** rng.uniform(0.5, 2.0), 10.0 ** rng.uniform(-2.0, 0.5)
+    omega = low * np.concatenate(([0.0], 10.0 ** rng.uniform(0.0, 1.3, n - 1)))
+    size, gravity, words = speed / low, -speed * low * 10.0 ** rng.uniform(-1.0, 0.5), f"n={n} weight"
+    down, C = np.concatenate(([1.0], rng.uniform(-0.5, 0.5, n - 1))), np.diag(0.02 * omega)
+    time = 10.0 ** rng.uniform(-2.0, -0.5) / low
+    gap = size * float(rng.choice([0.0, 0.0, rng.uniform(0.0, 0.3)]))
+    contacts, loads = [Contact(down, draw_law(rng, 1.0, speed, time), gap)], [(gravity * down, fb.Harmonic(1.0, 0.0))]
+    if n > 1 and rng.random() < 0.5:
+        row = np.concatenate(([0.0], rng.standard_normal(n - 1)))
+        contacts.append(Contact(row, draw_law(rng, 1.0 / (row @ row), speed, time), -size * rng.uniform(0.0, 0.5)))
+    for _ in range(rng.integers(0, 3)):
+        signal, kind = draw_signal(rng, speed * low * 10.0 ** rng.uniform(-1.5, 0.3), low)
+        row, angle = rng.standard_normal(n), rng.uniform(0.0, 2.0 * math.pi)
+        alone = rng.random() < 0.5
+        loads.append((row if alone else math.cos(angle) * row, signal))
+        if not alone:
+            loads.append((math.sin(angle - 0.5 * math.pi) * row, signal))
+        words += f" {kind}" if alone else f" {kind} cancelled"
+    q0, q_dot0 = np.zeros(n), np.zeros(n)
+    if rng.random() < 0.7:
+        q0[0], q_dot0[0] = rng.choice([0.0, rng.uniform(0.0, size)]), speed * rng.choice([0.0, rng.standard_normal()])
+    system = System(np.eye(n), C, np.diag(omega**2), contacts, loads)
+    return Scene(system, q0, q_dot0, rng.uniform(2.0, 10.0) / low, words)
+
+
 def draw(seed: int) -> tuple[Scene, float]:
-    """The scene of a seed and the tolerance to run it with; all loads are sampled from `SAMPLED_FROM` on."""
+    """The scene of a seed and the tolerance to run it with; kinds go by its range, see `random_scenes`."""
     rng = np.random.default_rng(seed)
     kind = (draw_structure, draw_structure, draw_parts, draw_pair)[rng.integers(4)]
-    kind = draw_sampled if seed >= SAMPLED_FROM else kind
+    kind = draw_resting if seed >= RESTING_FROM else draw_sampled if seed >= SAMPLED_FROM else kind
     rtol = float(rng.choice([1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-8, 1e-9, 1e-10, 1e-11]))
     scene = on_a_border(seed, kind(rng))
     laws = ", ".join(_told(c) for c in scene.system.contacts)
