@@ -37,6 +37,25 @@ def differences(scene, path, step, read, sides=(-2, -1, 1, 2), weights=(1 / 12, 
     return sum(weight * one for weight, one in zip(weights, values, strict=True)) / step
 
 
+@pytest.mark.parametrize("path", ["y.amplitude", "y.omega", "y.phase", "rx.phase"])
+def test_numbers_of_a_support_that_moves_change_the_start_that_follows_it(path):
+    """At rest the structure has the place and the speed of its supports at t = 0."""
+    motion = {"y": fb.Harmonic(1e-3, 70.0, 0.4), "rx": fb.Harmonic(2e-3, 50.0)}
+    scene = fb.Scene(
+        fb.Beam(0.5, BAR),
+        [fb.Clamped(0.0, motion=motion), fb.Pinned(0.5)],
+        stops=[fb.Stop(0.3, KelvinVoigt(1e5, 20.0), gap=2e-4)],
+        damping=fb.ModalDamping(0.02),
+    )
+    path, options = f"supports[0].motion.{path}", {"modes": 3, "duration": 0.1, "dt": 1e-3}
+    run = simulated(scene, **options)
+    found = run.sensitivity(path)
+    assert len(run.contacts)
+    for read in (lambda one: one.displacement(0.3), lambda one: one.velocity(0.3)):
+        by_differences = differences(scene, path, 1e-4 * (value_of(scene, path) or 0.1), read, **options)
+        np.testing.assert_allclose(read(found), by_differences, rtol=0.0, atol=1e-5 * np.abs(by_differences).max())
+
+
 @pytest.mark.parametrize("element", [Coulomb(0.3, 1e4), BoucWen(1e4, 0.2, 1.0, 2e3, 1e3)])
 def test_a_force_that_peaks_where_an_element_turns(element):
     """One mode turns at once in the stop and in the element, so that the largest force lies on the element's event."""

@@ -297,10 +297,15 @@ class _Varied:
             ) from None
 
     def start(self, x: Vector) -> Vector | None:
-        """Derivative of the start: of rest that of rest, else zero in coordinates."""
-        if self.models is None or not np.array_equal(x, self.model.rest()):
+        """Derivative of the start: of rest that of rest, which follows supports that move, else zero in coordinates."""
+        if not np.array_equal(x, self.model.rest()):
             return None
-        return self.models.derivative(lambda one: one.rest())
+        if self.models is not None:
+            return self.models.derivative(lambda one: one.rest())
+        if not (is_of_signal(self.path) and len(self.model.following)):
+            return None
+        step = SIGNAL * (abs(self.value) or UNIT)
+        return self._near(lambda value: self.model.under(self._scene(value)).rest(), step).derivative(lambda one: one)
 
 
 def _is_knot(path: str) -> bool:

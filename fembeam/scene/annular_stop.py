@@ -1,4 +1,4 @@
-"""A circular clearance: a place in a hole, or a ring around a post; its force acts along two directions.
+"""A circular clearance: a place in a hole, or beside a post; its force acts along two directions.
 
 d = (W_1 u, W_2 u) - centre,    r = |d|,    δ = r - c,    force on the place -N(δ, δ̇) d/r
 """
@@ -41,7 +41,7 @@ class AnnularStop(ScenePart):
     law : of the force N for δ > 0, any of `contacts` without memory.
     clearance : c in m, > 0: the hole's radius less that of a round tube or shaft in it.
     centre : of the circle, m along both directions, from the undeflected place.
-    outer : the place stays outside of the circle: a ring around a post.
+    outer : the place stays outside of the circle, beside a post. A sleeve around a post moves within its clearance.
     on : what the circle sits on, (body, place) or a place of the same body; None: the frame. d is then the difference.
     directions : two displacements at right angles, names or vectors; None: the two global axes across the member that
         the place is on, where that lies along the third.
@@ -86,7 +86,7 @@ class AnnularStop(ScenePart):
         require(pair, "centre must be two finite numbers", self.centre, where, "give m along the two directions")
         object.__setattr__(self, "centre", (float(given[0]), float(given[1])))
         require(isinstance(self.outer, (bool, np.bool_)), "outer must be True or False", self.outer, where,
-                "True is a ring around a post")  # fmt: skip
+                "True is a post beside the place")  # fmt: skip
         local_coordinate(self.z, "displacement", self.on, where, "on", "x")
         check_law(self.law, where)
         require(not getattr(self.law, "memory", ()), "law must have no memory", self.law, where,
