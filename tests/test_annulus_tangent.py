@@ -15,7 +15,7 @@ DURATION = 0.06
 
 
 def tube(law, *more, outer=False, gap=1e-3, centre=(1e-4, -2e-4)):
-    """Two modes in each of two planes, a hole, or a ring around a post, and two loads."""
+    """Two modes in each of two planes, a hole, or a post, and two loads."""
     omega = np.array([30.0, 33.0, 190.0, 209.0])
     rows = np.array([[1.0, 0.0, -0.8, 0.0], [0.0, 1.0, 0.0, -0.7]])
     loads = [([1.0, 0.6, -0.5, 0.0], Tone(3.0, 25.0)), ([0.0, 1.0, 0.0, 0.3], Tone(2.0, 41.0))]

@@ -91,7 +91,7 @@ class Contact:
     name : what logs call it; empty: "stop 0", "stop 1", … by its index.
     map : "line", "oblique" for one with friction, or "annulus" for a circular clearance.
     centre : (2,) m, of an annulus: where direction @ q is at its centre.
-    outer : of an annulus, whether the place is outside: a ring around a post of radius c.
+    outer : of an annulus, whether the place is outside, beside a post of radius c.
     friction : `Friction` of an oblique stop or an annulus, None for none.
     tangent : (n,) of an oblique stop: the way along its surface.
     rotation : (n,) of an annulus with friction: the row of φ, rad; None if it does not turn but by ``spin``.
