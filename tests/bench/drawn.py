@@ -293,9 +293,9 @@ def draw(seed: int) -> tuple[Scene, float]:
     kind = (draw_structure, draw_structure, draw_parts, draw_pair)[rng.integers(4)]
     kind = draw_resting if seed >= RESTING_FROM else draw_sampled if seed >= SAMPLED_FROM else kind
     rtol = float(rng.choice([1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-8, 1e-9, 1e-10, 1e-11]))
-    scene = (
-        kind(rng) if kind is draw_resting else on_a_border(seed, kind(rng))
-    )  # which lie on the surface by themselves
+    scene = kind(rng)
+    if kind is not draw_resting:  # which lies on its surface by itself
+        scene = on_a_border(seed, scene)
     laws = ", ".join(_told(c) for c in scene.system.contacts)
     scene.words = f"rtol {rtol:g} {scene.words}; stops {laws}"
     return scene, rtol
