@@ -344,6 +344,15 @@ def test_the_peak_of_friction_just_before_a_slip(method, k_t, v_t):
     assert run.friction.peak_friction[0] == pytest.approx(v_t * np.sqrt(k_t * 0.08), rel=1e-7)
 
 
+@every_method
+def test_a_spring_drawn_beyond_the_limit_at_the_start_gives_no_peak(method):
+    """It slips at once: on the way out |F_t| is largest at the start, μN = 0.25 · 4e5 · 1e-4 = 10 N, not k_t s = 30 N."""
+    start = [1e-4, 0.0], [-0.8, 0.1]
+    run = integrate(wall(Hertz(4e5, 1.0)), *start, 0.001, method=method, memory=[np.array([0.0, -1e-4])])
+    assert run.transitions.event[0] == "slip"
+    assert run.friction.peak_friction[0] == pytest.approx(10.0, rel=1e-10)
+
+
 def test_the_peak_of_friction_in_a_landing_on_the_way_out():
     """In stick |F_t| <= v_t √(k_t m), reached about where a linear law with a knot that changes nothing passes it."""
     law = PiecewiseLinear([4e5, 4e5], [2e-4])

@@ -59,6 +59,7 @@ _LONGER = 8.0  # factor of the time of extrapolation until it is clear whether a
 _ROOT_FOUND = 1e-6  # value of the polynomial, in units of the largest margin, that ends the search for its root
 _MOST_ILLINOIS = 6  # iterations for a root of the polynomial through the nodes
 _REST = 1e-14  # rate, in units of the reference speed, below which a rate at rest is rounding
+_INTERPOLATED = 4.0  # rounding of a margin at points around a node, in units of that at the nodes
 _WATCHED_BELOW = 0.2  # margin at a node, in units of the largest, below which the motion around the node is evaluated
 _CHECKED_BELOW = 0.5  # margin at an end of a landing, in the same units, below which a minimum inside is looked for
 _CLEAR = 0.03  # estimate of such a minimum, in the same units, that counts as positive
@@ -297,7 +298,7 @@ def _crossing_around(problem, tables, state, scratch, s, j, node_set, h, lowest)
         below[i] = -scratch.margin[S * j + i]
     deep, place = maximum_and_place(below, 1.0, scratch.clipped)
     _margins_at_nodes(problem, tables, state, scratch, s, node_set, h)
-    if deep <= scratch.noise[s, j]:
+    if deep <= _INTERPOLATED * scratch.noise[s, j]:
         return np.inf
     begin, end = tables.local_interval[node_set, lowest, 0], tables.local_interval[node_set, lowest, 1]
     sigma = begin + 0.5 * ((place if place > LOCAL[0] else LOCAL[1]) + 1.0) * (end - begin)

@@ -31,7 +31,7 @@ from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, T, acting_segment, be
 from solvers.compiled.sums import combine
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, force_of, motion_of, own_accelerance
 from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S
-from solvers.problem.friction import PEAK
+from solvers.problem.friction import MU, PEAK
 
 _MOST_NEWTON_STEPS = 6  # to a maximum
 _BELOW_PEAK = 0.95  # of a peak: if all node values are below, no higher maximum is between them
@@ -194,7 +194,8 @@ def state_peaks(problem, state, scratch, x):
             if rubs(problem, s):
                 slider = slider_of(problem, s)
                 force = slider_force(problem, s, state.segment[s], state.entry_rate[s], state.now[T], x)
-                slider[PEAK] = max(slider[PEAK], abs(force))
+                limit = slider[MU] * max(batch[2], 0.0)  # what a spring drawn beyond it at the start never exceeds
+                slider[PEAK] = max(slider[PEAK], min(abs(force), limit))
 
 
 @inner
