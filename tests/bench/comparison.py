@@ -120,6 +120,7 @@ def numbers_of(solution: Any, scene: Scene, size: float, duration: float) -> dic
     part = np.array([int(stop) for stop in log.stop[i]], dtype=int)
     between = np.zeros(part.max(initial=0) + 1)  # rates of each stop, met between the samples too
     np.maximum.at(between, part, np.maximum(fast, np.nan_to_num(np.abs(log.speed_out[i]))))
+    np.maximum.at(between, part, speed_from_rest(scene, part, force * depth))
     scale |= {"peak_force": force + _viscous_forces(scene, part, depth, log.speed_in[i], between[part])}
     scale |= {"impulse": force * length, "energy_loss": force * depth}
     rates = {"q": solution.q, "q_dot": solution.q_dot, "fast": between, "work": (force * depth).max(initial=0.0)}
@@ -128,10 +129,22 @@ def numbers_of(solution: Any, scene: Scene, size: float, duration: float) -> dic
         | {"stop": log.stop[i], "order": log.stop[i].tolist(), "scale": scale}
         | {name: getattr(log, name)[i] for name in NUMBERS}
     )
-    begun = found["t_in"] * found["speed_in"] <= rounding_of_surfaces(scene)[part]
+    at_rest = found["t_in"] * found["speed_in"] <= rounding_of_surfaces(scene)[part]
     for name in ("t_in", "speed_in"):  # of a start at rest on a surface: entered at once, or within its rounding
-        found[name] = np.where(begun, 0.0, found[name])
+        found[name] = np.where(at_rest, 0.0, found[name])
     return found
+
+
+def speed_from_rest(scene: Scene, part: Any, work: Any) -> Any:
+    """m/s: what presses a mass from rest into a linear stop, by ``work`` = F δ, gives it v = √(F δ/m)/2 on the way.
+
+    A start inside a stop is not moved by what it is pressed with: it counts as none.
+    """
+    with np.errstate(invalid="ignore"):
+        begun = np.array([c.motion(scene.q0, scene.q_dot0)[0] for c in scene.system.contacts])[part]
+    rows = [np.atleast_2d(scene.system.contacts[stop].rows)[0] for stop in part]
+    accelerance = np.array([row @ np.linalg.solve(scene.system.M, row) for row in rows])
+    return np.where(begun <= rounding_of_surfaces(scene)[part], 0.5 * np.sqrt(np.abs(work * accelerance)), 0.0)
 
 
 def _viscous_forces(scene: Scene, part: Any, depth: Any, entry: Any, fast: Any) -> Any:
