@@ -46,6 +46,7 @@ from solvers.problem.whole_runs import must_be_whole, whole_runs
 
 _SAMPLES = 64  # of a run that is made again for its balance
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
+_MOST_KEPT = 1 << 26  # bytes of sampled signals that are kept for other runs
 _NOTHING = np.empty(0)  # latched by a law without memory
 
 
@@ -192,11 +193,29 @@ def prepared_once(system: System, method: Any, duration: float) -> tuple[Forcing
     if known is None:
         check_maps(system, method)
         check_laws(system)
-        forcing = _kept_forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6))
+        fixed = all(_is_fixed(signal) for _, signal in system.loads)
+        forcing = _forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6), fixed)
         known = method.prepared(system, forcing, duration)
-        if forcing is system.kept.find("forcing"):  # of what cannot change, also if resonant tones are sampled
+        if fixed and forcing.table.nbytes <= _MOST_KEPT:
             system.kept.store(key, known)
     return known
+
+
+def _forcing(system: System, duration: float, rtol: float, fixed: bool) -> Forcing:
+    """Arrays of all signals; if these are ``fixed`` and made of tones, the same for every duration."""
+    kept: Forcing | None = system.kept.find("tones")
+    if kept is None:
+        kept = forcing_of([signal for _, signal in system.loads], duration, rtol)
+        if fixed and not kept.table_dt.size:
+            kept = system.kept.store("tones", kept)
+    return kept
+
+
+def _is_fixed(signal: Any) -> bool:
+    """Whether a signal cannot change: a frozen dataclass, whose arrays are read-only."""
+    options = getattr(type(signal), "__dataclass_params__", None)
+    arrays = [value for value in getattr(signal, "__dict__", {}).values() if isinstance(value, np.ndarray)]
+    return options is not None and options.frozen and not any(array.flags.writeable for array in arrays)
 
 
 def loads_taken(system: System, duration: float, t: Array, method: Any = None) -> dict[int, Array]:
@@ -210,18 +229,6 @@ def loads_taken(system: System, duration: float, t: Array, method: Any = None) -
 
         method = Exponential()
     return sampled_values(prepared_once(system, method, duration)[0], t)
-
-
-def _kept_forcing(system: System, duration: float, rtol: float) -> Forcing:
-    """Arrays of all signals; those of tones are kept, as long as no signal can have changed."""
-    kept: Forcing | None = system.kept.find("forcing")
-    if kept is None:
-        kept = forcing_of([signal for _, signal in system.loads], duration, rtol)
-        options = [getattr(type(signal), "__dataclass_params__", None) for _, signal in system.loads]
-        fixed = all(found is not None and found.frozen for found in options)
-        if fixed and not kept.table_dt.size:
-            kept = system.kept.store("forcing", kept)
-    return kept
 
 
 class _Run:

@@ -1,6 +1,7 @@
 """Loads given as node tables: their responses, several on unequal grids, and none passed over where all is at rest."""
 
 import math
+from dataclasses import dataclass
 from functools import cache, partial
 from itertools import combinations
 from types import SimpleNamespace
@@ -13,6 +14,7 @@ import fembeam as fb
 from contacts import Hertz, KelvinVoigt, Polynomial
 from solvers import RK4, Contact, DormandPrince, Exponential, System, integrate, integrate_many
 from solvers.exponential.phi_functions import signal_responses
+from solvers.integration import prepared_once
 
 REST = np.zeros(2)
 STEEL = fb.Section(E=2.1e11, rho=7800.0, A=1e-4, I=8.3e-10)
@@ -238,3 +240,36 @@ def test_a_short_pulse_of_a_plain_function_is_sampled():
         system = System([[1.0]], [[0.0]], [[0.0]], loads=[([1.0], lambda t, pulse=pulse: pulse(t))])
         end = integrate(system, [0.0], [0.0], 1.0, method=Exponential(1e-6))
         assert end.q_dot[0, 0] == pytest.approx(pulse.impulse, rel=1e-6)
+
+
+@dataclass(frozen=True)
+class Straight:
+    """A load that grows along a line; its slope can be changed as long as its array can be written to."""
+
+    slope: np.ndarray
+
+    def __call__(self, t):
+        return self.slope[0] * np.asarray(t)
+
+    def nodes(self, duration, _rtol):
+        return duration, np.array([[0.0, self.slope[0], 0.0], [self.slope[0] * duration, self.slope[0], 0.0]])
+
+
+def test_signals_that_cannot_change_are_sampled_once():
+    noise = System.modal([30.0], 0.01, [], [([1.0], fb.BandNoise(1.0, (0.0, 20.0), seed=3))])
+    first, again = (prepared_once(noise, Exponential(), 2.0) for _ in range(2))
+    assert again is first
+    assert prepared_once(noise, Exponential(), 3.0) is not first
+    assert prepared_once(noise, Exponential(1e-6), 2.0) is not first
+
+
+def test_a_signal_that_can_change_is_sampled_anew():
+    """q̈ = a t from rest: q = a t³/6."""
+    slope = np.array([6.0])
+    system = System.modal([0.0], 0.0, [], [([1.0], Straight(slope))])
+    ends = []
+    for slope[0] in (6.0, 12.0):
+        ends.append(integrate(system, [0.0], [0.0], 1.0).q[-1, 0])
+    assert ends == pytest.approx([1.0, 2.0], rel=1e-12)
+    slope.setflags(write=False)
+    assert prepared_once(system, Exponential(), 1.0) is prepared_once(system, Exponential(), 1.0)

@@ -188,15 +188,11 @@ class Engine:
         self, method: Exponential, system: System, z: Array, prepared: tuple[Forcing, Prepared], duration: float
     ) -> None:
         self.method, self.system, self.duration = method, system, duration
-        forcing, self.prepared = prepared
+        self.prepared = prepared[1]
         self.back, self.packed = self.prepared.back, self.prepared.problem
-        own: dict[str, Array] = {}
-        if forcing.table.size:
-            own = {"table": forcing.table, "table_start": forcing.table_start}
         if system.latches:  # laws latch numbers among their parameters
-            own["parameters"] = self.packed.value.parameters.copy()
-        if own:
-            self.packed = self.packed.replaced(type_of(self.packed.value), **own)
+            own = self.packed.value.parameters.copy()
+            self.packed = self.packed.replaced(type_of(self.packed.value), parameters=own)
         self.problem = self.packed.value
         self.advance = advance_of(isinstance(self.problem, PlanarProblem))
         self.workspace = self.prepared.workspace()

@@ -138,11 +138,15 @@ class Prepared(NamedTuple):
 
 
 def prepare_run(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
-    """The forcing without resonant tones and on one grid, and the tables."""
+    """The forcing without resonant tones and on one grid, and the tables with its sampled values."""
     taken = on_one_grid(without_resonance(system, forcing, duration, rtol), duration)
     prepared = prepare_system(system, taken)
+    kind = type_of(prepared.problem.value)
     if taken.table.shape[1] > 3:
-        load_parts(type_of(prepared.problem.value), KINKS)
+        load_parts(kind, KINKS)
+    if taken.table.size:
+        sampled = prepared.problem.replaced(kind, table=taken.table, table_start=taken.table_start)
+        prepared = prepared._replace(problem=sampled)
     return taken, prepared
 
 

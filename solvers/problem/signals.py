@@ -11,6 +11,9 @@ A signal is any callable t -> value that broadcasts. It becomes exactly one of
   What is shorter than duration/4096, such as a pulse, may hide between these and needs ``nodes``. Where the signal or
   its slope jumps, no spline agrees to a small tolerance, and the signal is refused.
 
+What is made of signals that are frozen dataclasses, their arrays read-only, is kept for other runs of the system; all
+other signals are asked anew by every run.
+
 A node table declares all that a signal does. Flight of `Exponential` crosses it cell by cell, its contact steps are
 compared with every node they pass, and `DormandPrince` keeps its steps to a few nodes or to where the signal is
 constant: so neither passes over a part of it, however short, even at rest. Methods of constant step know a signal only

@@ -90,9 +90,8 @@ def runs_of(case: str) -> list[Callable[[], Any]]:
         return [lambda start=start: run(start)[0] for start in of.starts[:4]]
     if case.endswith("s"):
         of, dt = problem(int(case[:-1])), DURATION / 100
-        return [
-            lambda z=z: solvers.integrate(of.system, *np.split(z, 2), DURATION, dt).q[-1, 0] for z in of.starts[:12]
-        ]
+        starts = [np.split(z, 2) for z in of.starts[:12]]
+        return [lambda start=start: solvers.integrate(of.system, *start, DURATION, dt).q[-1, 0] for start in starts]
     if case != "noise":
         of = problem(int(case))
         run = peers.exponential(of, {"rtol": 1e-8})
