@@ -346,7 +346,7 @@ def test_the_peak_of_friction_just_before_a_slip(method, k_t, v_t):
 
 @every_method
 def test_a_spring_drawn_beyond_the_limit_at_the_start_gives_no_peak(method):
-    """It slips at once: on the way out |F_t| is largest at the start, μN = 0.25 · 4e5 · 1e-4 = 10 N, not k_t s = 30 N."""
+    """It slips at once: |F_t| is largest at the start, μN = 0.25 · 4e5 · 1e-4 = 10 N, not k_t s = 30 N."""
     start = [1e-4, 0.0], [-0.8, 0.1]
     run = integrate(wall(Hertz(4e5, 1.0)), *start, 0.001, method=method, memory=[np.array([0.0, -1e-4])])
     assert run.transitions.event[0] == "slip"
