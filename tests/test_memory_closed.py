@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from contacts import BoucWen, Coulomb, Iwan, Jenkins, KelvinVoigt, WaltonBraun
+from contacts import BoucWen, Coulomb, Iwan, Jenkins, KelvinVoigt, PiecewiseLinear, WaltonBraun
 from fembeam import Harmonic
 from solvers import Contact, DormandPrince, Exponential, System, integrate
 
@@ -276,6 +276,17 @@ def test_a_yielding_stop_is_entered_at_once_by_a_start_on_its_surface(kind, meth
         assert run.contacts.speed_in[0] == pytest.approx(rate, abs=1e-14)
         deepest = rate * math.sqrt(2.0 / 400.0) if rate else 2.0 * force / 400.0
         assert run.contacts.peak_indentation[0] == pytest.approx(deepest, rel=1e3 * method.rtol)
+
+
+@pytest.mark.parametrize("method", [Exponential(1e-6), FINE, DormandPrince(1e-8)], ids=["1e-6", "1e-12", "dop853"])
+def test_a_slider_drawn_beyond_its_limit_slips_at_once_beside_a_stop_at_rest_on_a_knot(method):
+    """t = 0, where no step is possible: what it takes is its limit times its slip, and none of what it was drawn by."""
+    slider, row = element(Jenkins(1e4, 1.0), 1.0, 0.1), np.array([0.5, 0.5])
+    system = System.modal([90.0, 2000.0], 0.0, [slider, Contact(-row, PiecewiseLinear([400.0, 900.0], [1e-3]), 0.0)])
+    run = integrate(system, [0.01, -0.008], [0.0, 0.0], 0.01, method=method)
+    assert run.transitions.t[0] == 0.0
+    assert run.losses.slip[0] > 1e-3
+    assert run.losses.loss[0] == pytest.approx(run.losses.slip[0], rel=1e4 * method.rtol)
 
 
 @pytest.mark.parametrize("rate", [-0.5, 0.5])

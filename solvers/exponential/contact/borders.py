@@ -28,7 +28,7 @@ from solvers.compiled.kernels import (
     slider_of,
     surface_tolerance,
 )
-from solvers.compiled.parts import PASSED, part
+from solvers.compiled.parts import BEHIND, PASSED, part
 from solvers.compiled.renewals import count_event, margins, margins_before, margins_in, renew
 from solvers.compiled.sliding import DELTA, RATE
 from solvers.compiled.state import AT_ONCE, LAST_EVENT, PEAK_FORCE, T, rate_tolerance
@@ -360,8 +360,8 @@ def _may_dip(problem, state, scratch, s, landed, w, x):
 
 
 @merged
-def _estimate_rounding(problem, state, scratch, s, x, begin, end):
-    """Largest margins of an element and their rounding over a landing to x, where no step of its segment has told.
+def _estimate_rounding(problem, state, scratch, s, t, x, begin, end):
+    """Largest margins of an element and their rounding up to x at time t, where no step of its segment has told.
 
     N has the rounding of its peak, too: that it is zero may have been told by it in the segment before.
     """
@@ -376,7 +376,7 @@ def _estimate_rounding(problem, state, scratch, s, x, begin, end):
     for j in range(count):
         peak = 0.0
         if rubs(problem, s):
-            rounding = margin_rounding(problem, state, s, j, x[state.x.size], x)
+            rounding = margin_rounding(problem, state, s, j, t, x)
             if j == PRESSES or slider_of(problem, s)[CODE] == FREE:
                 peak = state.active[s, PEAK_FORCE]
         else:
@@ -384,6 +384,25 @@ def _estimate_rounding(problem, state, scratch, s, x, begin, end):
             rounding = abs(there[1] - there[0]) + abs(there[2] - there[0])
         scratch.largest[s, j] = max(abs(begin[j]), abs(end[j]))
         scratch.noise[s, j] = max(_ROUNDING * max(scratch.largest[s, j], peak), 2.0 * rounding)
+
+
+@part(BEHIND, types.UniTuple(types.int64, 2))
+def border_behind(problem, state, scratch):
+    """(element, border) of a margin that is negative as the run begins, by more than its rounding, or (-1, -1).
+
+    A spring may be drawn beyond its limit at the start. A step tells that, unless none is possible, as from a knot.
+    """
+    for s in range(problem.law.size):
+        margin, slips = scratch.margin_begin[s], rubs(problem, s) and slider_of(problem, s)[CODE] != STICK
+        if slips or _has_no_borders(problem, state, s):
+            continue
+        margins_of(problem, state, scratch, s, state.now[T], state.x, margin)
+        _estimate_rounding(problem, state, scratch, s, state.now[T], state.x, margin, margin)
+        for j in range(problem.border_count[s]):
+            if margin[j] < -scratch.noise[s, j]:
+                return s, j
+        _forget_rounding(problem, scratch, s)
+    return -1, -1
 
 
 @part(PASSED, types.UniTuple(types.int64, 2), types.int64, types.int64, VECTOR, VECTOR)
@@ -404,7 +423,7 @@ def passed(problem, state, scratch, element, border, w, x):
             margins_of(problem, state, scratch, s, w[size], w, begin)
             margins_of(problem, state, scratch, s, x[size], x, end)
             if scratch.noise[s, 0] == UNKNOWN:
-                _estimate_rounding(problem, state, scratch, s, x, begin, end)
+                _estimate_rounding(problem, state, scratch, s, x[size], x, begin, end)
         close = False
         for j in range(count):
             if s == element and j == border:

@@ -29,7 +29,7 @@ from solvers.compiled.kernels import (
     rubs,
     surface_tolerance,
 )
-from solvers.compiled.parts import ACCEPT, CONTACT, FIRST_END, PRESSED, part
+from solvers.compiled.parts import ACCEPT, BEHIND, CONTACT, FIRST_END, PRESSED, part
 from solvers.compiled.state import (
     CALLS,
     LAW_NOT_FINITE,
@@ -51,7 +51,7 @@ from solvers.compiled.state import (
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import guess_radial_forces
 from solvers.exponential.circles.friction import guess_rubbing_forces
-from solvers.exponential.contact.borders import UNRESOLVED
+from solvers.exponential.contact.borders import UNRESOLVED, border_behind
 from solvers.exponential.contact.collocation import end_state, solve_forces, step_error
 from solvers.exponential.contact.crossings import leaves_segment
 from solvers.exponential.contact.first_step import (
@@ -186,7 +186,9 @@ def _attempt(problem, tables, state, scratch, node_set, level):
         return np.inf, first, crossing
     end_state(problem, tables, state, scratch, node_set, level)
     if leaves_segment(problem, tables, state, scratch, node_set, level):
-        return 1.0 if shortest else np.inf, first, crossing
+        if shortest and state.now[T] == 0.0 and problem.parts[BEHIND]:
+            crossing, scratch.border[0] = border_behind(problem, state, scratch)
+        return (np.inf, 0.0, crossing) if crossing >= 0 else (1.0 if shortest else np.inf, first, crossing)
     if problem.parts[FIRST_END]:
         first, crossing = first_end(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0)
     if crossing == UNRESOLVED:
