@@ -184,6 +184,14 @@ def test_a_table_may_tell_both_sides_of_kinks_but_not_of_jumps():
         integrate(free(loads=[([1.0], Table(1.0, rows.reshape(3, 6)[:, :4]))]), [0.0], [0.0], 2.0)
 
 
+@pytest.mark.parametrize("dt", [0.01, 0.05])
+def test_stepping_through_a_coarse_table(dt):
+    """Steps that passed over nodes erred by 50 to 100 times the tolerance, and were told to be right."""
+    system = System.modal([10.0, 31.0], 0.01, [], [([1.0, 0.5], rough(dt, round(2.0 / dt) + 1, 1))])
+    exact, ours = (integrate(system, [0, 0], [0, 0], 2.0, method=m) for m in (Exponential(1e-12), DormandPrince(1e-8)))
+    assert np.abs(ours.q - exact.q).max() < 1e-8 * np.abs(exact.q).max()
+
+
 # --- nothing is passed over ---------------------------------------------------------------------------------------
 
 STOPS = {"polynomial": Polynomial([2e4, 0.0, 1e9]), "Kelvin-Voigt": KelvinVoigt(2e4, 5.0), "Hertz": Hertz(1e6)}

@@ -14,10 +14,10 @@ A signal is any callable t -> value that broadcasts. It becomes exactly one of
 What is made of signals that are frozen dataclasses, their arrays read-only, is kept for other runs of the system; all
 other signals are asked anew by every run.
 
-A node table declares all that a signal does. Flight of `Exponential` crosses it cell by cell, its contact steps are
-compared with every node they pass, and `DormandPrince` keeps its steps to a few nodes or to where the signal is
-constant: so neither passes over a part of it, however short, even at rest. Methods of constant step know a signal only
-where their steps evaluate it.
+A node table declares all that a signal does. Flight of `Exponential` crosses it cell by cell, and its contact steps are
+compared with every node they pass. A step of `DormandPrince` ends on the next node, passes some if they are close, or
+goes on to where the signal ceases to be constant. So neither passes over a part of it, however short, even at rest.
+Methods of constant step know a signal only where their steps evaluate it.
 """
 
 from __future__ import annotations

@@ -50,6 +50,7 @@ from solvers.stepping.located import NEAR_END, SWITCHED, accept, before_step, fi
 from solvers.stepping.shared import shared
 
 _LEAST_STEP = 1e-290  # s: at t = 0 any step changes the time
+_FEW_NODES = 2  # likewise, up to which none but the first is passed
 _MOST_NODES = 16  # of a signal on a step; a period of its fastest part has ten or more
 
 
@@ -110,7 +111,8 @@ def _first_event(problem, state, space, h, adaptive):
 def _longest_resolved(problem, t, longest):
     """The longest step up to ``longest`` that leaves out no part of a sampled signal.
 
-    It ends where a signal ceases to be constant or has a kink, or after a few of its nodes.
+    It ends where a signal ceases to be constant or has a kink, or after some of its nodes; at the next one if it would
+    pass few: there s''' jumps, which in a coarse table the embedded difference does not tell.
     """
     for j in range(problem.table_dt.size):
         dt, start, last = problem.table_dt[j], problem.table_start[j], problem.table_start[j + 1] - 1
@@ -121,7 +123,7 @@ def _longest_resolved(problem, t, longest):
         if node > first:
             longest = min(longest, (node - start) * dt - t)
             continue
-        longest = min(longest, _MOST_NODES * dt)
+        longest = min(longest, _MOST_NODES * dt if longest > _FEW_NODES * dt else (first + 1 - start) * dt - t)
         for kink in range(first + 1, min(first + _MOST_NODES, last)):
             if bends_at(problem, kink):
                 longest = min(longest, (kink - start) * dt - t)
