@@ -46,7 +46,7 @@ from solvers.problem.whole_runs import must_be_whole, whole_runs
 
 _SAMPLES = 64  # of a run that is made again for its balance
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
-_MOST_KEPT = 1 << 26  # bytes of sampled signals that are kept for other runs
+_MOST_KEPT = 1 << 22  # bytes of sampled signals that are kept for other runs: of longer ones the run takes the time
 _NOTHING = np.empty(0)  # latched by a law without memory
 
 
