@@ -1,5 +1,6 @@
 """Beams from mesh files and back; what a file may not hold."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -259,3 +260,68 @@ $Elements
 3 33 7
 $EndElements
 """
+
+
+BARS = """BEGIN BULK
+{first}
+GRID,10,,0.,0.,0.
+GRID,7,{system},0.,0.,1.
+CBAR,1,1,10,7,0.,1.,0.{more}
+ENDDATA
+"""
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ({"system": 5}, "GRID 7 must be in the basic system, got 'system 5'"),
+        ({"first": "GRDSET,,5"}, "GRID 10 must be in the basic system"),
+        ({"first": "INCLUDE 'bar.bdf'"}, "all cards must stand in one file"),
+        ({"more": ",GGG,+B\n+B,56"}, "CBAR 1 must have no pin flags and no offsets, got ['56']"),
+        ({"more": ",GGG,+B\n+B,,,0.,0.,.1"}, "CBAR 1 must have no pin flags and no offsets, got ['.1']"),
+    ],
+)
+def test_what_is_passed_over_in_nastran_files(tmp_path, parts, said):
+    """Systems, pins, offsets and included files would be lost without a word; without them the bar is read."""
+    path, nothing = tmp_path / "bar.bdf", {"first": "$", "system": "", "more": ""}
+    path.write_text(BARS.format(**nothing | parts))
+    with pytest.raises(ValueError, match=re.escape(said)):
+        fb.Frame.from_mesh(path, {1: THICK})
+    for rest in (nothing, nothing | {"system": 0}, nothing | {"more": ",GGG,+B\n+B,,,0.,0.,0.0E+00"}):
+        path.write_text(BARS.format(**rest))
+        assert fb.Frame.from_mesh(path, {1: THICK}, plane=False).nodes["n1"] == (0.0, 0.0, 1.0)
+
+
+PART = """*Part, name=post
+*Node
+1,0,0,0
+2,0,0,1
+*Element, type={kind}, elset=steel
+1,1,{nodes}
+*End Part
+*Assembly, name=rig
+*Instance, name=one, part=post
+{moved}*End Instance
+{second}*End Assembly
+"""
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ({"moved": "0.,0.,2.\n"}, "an instance must not be moved, got '0.,0.,2.'"),
+        ({"second": "*Instance, name=two, part=post\n0.,0.,1.\n*End Instance\n"}, "one instance of a part"),
+        ({"second": "*NGEN\n1,2,1\n"}, "nodes and elements must stand there as they are, got '*NGEN'"),
+        ({"nodes": "9"}, "it names 9, which is not defined above that"),
+        ({"nodes": "2,100"}, "cannot be read as a mesh: Expected number of data items does not match element type"),
+        ({"kind": "MASS"}, "cannot be read as a mesh: Element type not available: MASS"),
+    ],
+)
+def test_what_is_passed_over_in_abaqus_files(tmp_path, parts, said):
+    """Instances that are moved would stay where their parts are; what cannot be read is said."""
+    path, plain = tmp_path / "post.inp", {"kind": "B31", "nodes": "2", "moved": "", "second": ""}
+    path.write_text(PART.format(**plain | parts))
+    with pytest.raises(ValueError, match=re.escape(said)):
+        fb.Frame.from_mesh(path, {"steel": THICK})
+    path.write_text(PART.format(**plain))
+    assert fb.Frame.from_mesh(path, {"steel": THICK}).nodes["n1"] == (0.0, 0.0, 1.0)

@@ -62,6 +62,32 @@ def test_equal_sampled_motions_are_a_base_motion(signal, tmp_path):
         assert equal(force[first:], run.reactions()[0].force[found], 2e-5)
 
 
+def rotor(spin=180.0, motion=None, **options):
+    """A shaft on pins with a disk on one of them, out of balance; the pins at rest or in one motion."""
+    shaft = fb.Frame.straight(0.8, fb.Section.circle(2.1e11, 7850.0, 0.03), spin=spin, bending_only=True)
+    supports = [fb.Pinned(end, motion=motion) for end in "AB"]
+    disks = [fb.Disk("A", 2.0, 0.02, 0.035), fb.Disk(0.3, 6.0, 0.03, 0.055)]
+    return fb.Scene(shaft, supports, masses=disks, forces=[fb.Unbalance(0.3, 3e-4)], **DAMPED, **options)
+
+
+def test_equal_motions_of_the_bearings_of_a_rotor_are_a_base_motion():
+    """Gyroscopic moments between moving bearings and what is beside them count: motion and reactions, to rounding."""
+    scenes = rotor(base={"x": WAVE}), rotor(motion={"x": WAVE})
+    one, two = (scene.reduce("all", elements=6).simulate(0.1, 5e-3) for scene in scenes)
+    for way in "xy":
+        assert equal(*(run.displacement(0.5, way, absolute=True) for run in (one, two)), 1e-9), way
+        for mine, other in zip(one.reactions(), two.reactions(), strict=True):
+            assert equal(mine[way], other[way], 1e-9), way
+
+
+def test_models_of_another_spin_on_moving_bearings():
+    """A model made again for another spin is that of the rotor with this spin."""
+    motion = {"x": WAVE}
+    made = rotor(120.0, motion).reduce(4).again(rotor(240.0, motion))
+    runs = [model.simulate(0.1, 1e-3).displacement(0.5, "y") for model in (rotor(240.0, motion).reduce(4), made)]
+    assert np.array_equal(*runs)
+
+
 def test_kept_by_a_file(tmp_path):
     """Places on and beside moving supports, from the file alone."""
     run = feet(WAVE, fb.Harmonic(2e-3, 30.0)).reduce(2).simulate(0.1, 5e-3)

@@ -192,6 +192,23 @@ def test_stepping_through_a_coarse_table(dt):
     assert np.abs(ours.q - exact.q).max() < 1e-8 * np.abs(exact.q).max()
 
 
+def test_tables_are_of_real_numbers_in_whatever_form():
+    """Whole numbers and lists are tables, alone and beside others; others are refused with what they are."""
+    rows = np.array([[1.0, -1.0, 0.0, 1.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0, -1.0, 0.0], [1.0, 1.0, 0.0, 1.0, 1.0, 0.0]])
+    steady = Table(1.0, np.outer([1, 1, 1], [1, 0, 0]))
+
+    def end(*tables):
+        system = System(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), loads=[([1.0], one) for one in tables])
+        return integrate(system, [0.0], [0.0], 2.0).q[-1]
+
+    for form in (rows.astype(int), rows.tolist(), [tuple(row) for row in rows]):
+        assert end(Table(1, form)) == pytest.approx(5.0 / 6.0 + 1.0 / 6.0, abs=1e-9)
+        assert end(Table(1, form), steady) == pytest.approx(3.0, abs=1e-9)
+    for wrong in (rows + 0.5j, None, [["a", "b", "c"]], rows[0, 0]):
+        with pytest.raises(ValueError, match=r"load 0 must give (dt and rows of real numbers, got|rows)"):
+            end(Table(1.0, wrong))
+
+
 # --- nothing is passed over ---------------------------------------------------------------------------------------
 
 STOPS = {"polynomial": Polynomial([2e4, 0.0, 1e9]), "Kelvin-Voigt": KelvinVoigt(2e4, 5.0), "Hertz": Hertz(1e6)}

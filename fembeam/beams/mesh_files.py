@@ -11,7 +11,8 @@ import re
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
 from itertools import combinations, groupby, pairwise
 from pathlib import Path
 from typing import Any
@@ -21,8 +22,9 @@ from numpy.typing import NDArray
 
 from fembeam.beams.beam import Beam
 from fembeam.beams.mesh import SHORTEST, divided
+from fembeam.beams.mesh_unread import check_read
 from fembeam.beams.section import Section, Taper
-from fembeam.support import require, written_beside
+from fembeam.support import is_whole, require, written_beside
 
 Vector = NDArray[np.float64]
 Names = list[set[str]]
@@ -71,14 +73,25 @@ def read_mesh(path: str | os.PathLike[str]) -> Any:
 
     if not Path(path).is_file():
         raise FileNotFoundError(f"{path} does not exist")
+    check_read(Path(path))
+    said = StringIO()
     try:
-        with _mended_readers():
+        with _mended_readers(), redirect_stdout(said):
             mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio raises many kinds, and exits for unknown suffixes
-        raise ValueError(f"{path} cannot be read as a mesh: {error or 'unknown format'}") from error
+        raise ValueError(f"{path} cannot be read as a mesh: {_reason(error, said.getvalue())}") from error
     if Path(path).suffix == ".inp":
         _mend_sets(mesh, Path(path))
     return mesh
+
+
+def _reason(error: BaseException, said: str) -> str:
+    """Why meshio does not read a file: what it raised, or printed before it exits with a number."""
+    if isinstance(error, KeyError):
+        return f"it names {error.args[0]}, which is not defined above that"
+    if isinstance(error, SystemExit) and is_whole(error.code):
+        return said.strip() or "unknown format"
+    return f"{error}" or "unknown format"
 
 
 @contextmanager

@@ -134,7 +134,8 @@ class Matrices:
         found = self._on_all(scene)
         if self.carried is None:
             return found
-        return replace(found, **moving(found.M, found.K, found.dashpots, found.spread, self.carried))
+        each = found.M, found.K, found.dashpots, found.spread, self.carried, found.gyroscopic
+        return replace(found, **moving(*each))
 
     def _on_all(self, scene: Scene) -> Matrices:
         """Matrices of a scene without supports, on the same mesh."""
@@ -407,9 +408,13 @@ def _carried(scene: Scene, nodes: Vector) -> sparse.csr_matrix | None:
     return sparse.csr_matrix((signs, (rows, range(len(moved)))), shape=shape) if moved else None
 
 
-def moving(M: Any, K: Any, C: Any, spread: Any, carried: Any) -> dict[str, Any]:
-    """What dofs of supports that move carry, and their loads -K e, -C e, -M e of displacement, speed, acceleration."""
-    each = [-(carried.T @ A @ spread).tocsr() for A in (K, C, M)]
+def moving(M: Any, K: Any, C: Any, spread: Any, carried: Any, gyroscopic: Any = None) -> dict[str, Any]:
+    """What dofs of supports that move carry, and their loads -K e, -(C + G) e, -M e of e, ė and ë.
+
+    M, K, C are symmetric, G is skew: of its rows the sign turns round.
+    """
+    rates = C if gyroscopic is None else C - gyroscopic
+    each = [-(carried.T @ A @ spread).tocsr() for A in (K, rates, M)]
     order = np.arange(3 * carried.shape[1]).reshape(3, -1).T.ravel()
     return {"carried": carried, "coupling": sparse.vstack(each, format="csr")[order]}
 

@@ -96,7 +96,7 @@ class BodyMatrices(Matrices):
 def respun(matrices: Matrices, before: Scene, after: Scene) -> BodyMatrices | None:
     """The matrices of a scene that differs in the spin of its shaft alone, where only G does; None of any other."""
     spins = [getattr(scene.beam, "spin", 0.0) for scene in (before, after)]
-    if not isinstance(matrices, BodyMatrices) or matrices.bodies or 0.0 in spins:
+    if not isinstance(matrices, BodyMatrices) or matrices.bodies or matrices.carried is not None or 0.0 in spins:
         return None
     if replace(after, beam=replace(after.beam, spin=spins[0])) != before:
         return None
@@ -126,7 +126,7 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
                 "condense the structure first")  # fmt: skip
         M, K, C, _ = _with_parts(scene, assembled)
         carried = sparse.eye(M.shape[0], format="csr")[:, moved]
-        found = replace(found, **moving(M, K, C, found.spread, carried))
+        found = replace(found, **moving(M, K, C, found.spread, carried, gyroscopic(scene, assembled)))
     _warn_of_massless(scene, found)
     _check_moving(scene, found)
     return found

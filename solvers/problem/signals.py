@@ -65,7 +65,8 @@ def forcing_of(signals: list[Signal], duration: float, rtol: float) -> Forcing:
             ]
         else:
             provider = getattr(signal, "nodes", None)
-            dt, rows = provider(duration, rtol) if provider else _sample(signal, duration, rtol, load)
+            told = provider(duration, rtol) if provider else _sample(signal, duration, rtol, load)
+            dt, rows = _numbers(told, load)
             _check_nodes(rows, dt, duration, load)
             tables.append((dt, rows, load))
     starts = np.cumsum([0] + [len(rows) for _, rows, _ in tables])
@@ -133,6 +134,18 @@ def tones_as_nodes(forcing: Forcing, chosen: list[int], duration: float, rtol: f
         np.concatenate((forcing.table_start, forcing.table_start[-1] + np.cumsum(sizes, dtype=np.int64))),
         np.concatenate((forcing.table_load, np.array(loads, dtype=np.int64))),
     )
+
+
+def _numbers(told: Any, load: int) -> tuple[float, Array]:
+    """Step and rows of a node table as real numbers, or a ValueError that says what was given."""
+    try:
+        dt, rows = told
+        if np.iscomplexobj(rows):
+            raise TypeError
+        return float(dt), np.asarray(rows, dtype=float)
+    except (TypeError, ValueError):
+        need = f"nodes() of the signal of load {load} must give dt and rows of real numbers"
+        raise ValueError(f"{need}, got {repr(told)[:60]}") from None
 
 
 def _check_nodes(rows: Array, dt: float, duration: float, load: int) -> None:
