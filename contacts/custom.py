@@ -47,9 +47,9 @@ class CustomLaw(Law):
 
     @property
     def gradient(self) -> Any:
-        """Its derivatives as given, else central differences, compiled."""
+        """Its derivatives as given, else differences, compiled."""
         if self.derivative is None:
-            return difference_kernel(self.function, len(self.values))
+            return difference_kernel(self.function, len(self.values), self.knots)
         return derivative_kernel(self.derivative, len(self.values))
 
     @property
@@ -97,12 +97,12 @@ def law(
     ----------
     function : ``f(delta, delta_dot, entry_rate, parameter, ...) -> force``; further arguments are the law's
         parameters, bound by keyword; defaults are kept.
-    knots : indentations (m) where the force has a kink; integrators locate them.
+    knots : indentations (m) where the force has a kink or jumps; integrators locate them.
     jump : say True when the force is not zero at the instant of entry.
     exponent : leading exponent of the force at first touch; None finds it when parameters are bound.
     entry_rate_floor : smallest entry rate handed to the function, m/s.
     derivative : function of the same arguments that returns (∂F/∂delta, ∂F/∂delta_dot, ∂F/∂entry_rate); None takes
-        central differences.
+        differences, which end at knots.
 
     Returns
     -------
@@ -242,7 +242,7 @@ def _check_derivative(made: CustomLaw) -> None:
 
     pointer = ctypes.POINTER(ctypes.c_double)
     delta, delta_dot = np.array([_off_knots(made, place) for place in (1e-4, 3e-4)]), np.array([0.3, -0.2])
-    kernels = (made.gradient, difference_kernel(made.function, len(made.values)))
+    kernels = (made.gradient, difference_kernel(made.function, len(made.values), made.knots))
     found = np.empty((2, 3, 2))
     for kernel, out in zip(kernels, found, strict=True):
         arrays = [x.ctypes.data_as(pointer) for x in (delta, delta_dot, made.parameters)]
