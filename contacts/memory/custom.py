@@ -6,14 +6,14 @@ import inspect
 import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.custom import bound_values
+from contacts.custom import bound_values, changed_values
 from contacts.law import Law
 from contacts.memory.custom_kernels import LEAST, RELATIVE, Function, Pieces, compiled
 from contacts.numbers import LARGEST_PARAMETER, check_number
@@ -89,6 +89,14 @@ class CustomMemoryLaw(Law):
     reach: float = 1e-3
     jumps: bool = False
     opens: bool = False
+
+    varied: ClassVar[tuple[str, ...]] = ()  # beside its parameters
+
+    def rebound(self, **values: float) -> CustomMemoryLaw:
+        """The same law with other values of some parameters, checked as when it was bound."""
+        made = replace(self, values=changed_values(self, values))
+        _check_cycles(made)
+        return made
 
     @property
     def pieces(self) -> Pieces:
