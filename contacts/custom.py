@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from importlib import import_module
 from typing import Any, ClassVar
 
@@ -34,6 +34,12 @@ class CustomLaw(Law):
     derivative: Function | None = field(default=None, repr=False)
 
     one_sided: ClassVar[bool] = False  # type: ignore[misc]
+    varied: ClassVar[tuple[str, ...]] = ("entry_rate_floor",)  # beside its parameters
+
+    def rebound(self, **values: float) -> CustomLaw:
+        """The same law with other values of some parameters, checked as when it was bound."""
+        found = self.exponent == _leading_exponent(self)
+        return _checked(replace(self, values=changed_values(self, values)), found)
 
     @property
     def parameters(self) -> NDArray[np.float64]:
@@ -47,9 +53,9 @@ class CustomLaw(Law):
 
     @property
     def gradient(self) -> Any:
-        """Its derivatives as given, else central differences, compiled."""
+        """Its derivatives as given, else differences, compiled."""
         if self.derivative is None:
-            return difference_kernel(self.function, len(self.values))
+            return difference_kernel(self.function, len(self.values), self.knots)
         return derivative_kernel(self.derivative, len(self.values))
 
     @property
@@ -97,12 +103,12 @@ def law(
     ----------
     function : ``f(delta, delta_dot, entry_rate, parameter, ...) -> force``; further arguments are the law's
         parameters, bound by keyword; defaults are kept.
-    knots : indentations (m) where the force has a kink; integrators locate them.
+    knots : indentations (m) where the force has a kink or jumps; integrators locate them.
     jump : say True when the force is not zero at the instant of entry.
     exponent : leading exponent of the force at first touch; None finds it when parameters are bound.
     entry_rate_floor : smallest entry rate handed to the function, m/s.
     derivative : function of the same arguments that returns (∂F/∂delta, ∂F/∂delta_dot, ∂F/∂entry_rate); None takes
-        central differences.
+        differences, which end at knots.
 
     Returns
     -------
@@ -145,14 +151,7 @@ def law(
 
     def bind(**values: float) -> CustomLaw:
         pairs = bound_values(who, probe, values)
-        made = CustomLaw(who, function, pairs, *options, power, floor, derivative)
-        _check_force(made)
-        _check_jump(made)
-        if derivative is not None:
-            _check_derivative(made)
-        if exponent is None and not jump:
-            made = CustomLaw(who, function, pairs, *options, _leading_exponent(made), floor, derivative)
-        return made
+        return _checked(CustomLaw(who, function, pairs, *options, power, floor, derivative), exponent is None)
 
     bind.__name__, bind.__qualname__ = function.__name__, function.__qualname__
     bind.__doc__, bind.__module__ = function.__doc__, function.__module__
@@ -189,6 +188,23 @@ def bound_values(who: str, probe: inspect.Signature, values: dict[str, Any]) -> 
     bound.apply_defaults()
     checked = {key: check_number(x, f"parameter {key} of law {who!r}", -math.inf) for key, x in bound.arguments.items()}
     return tuple(checked.items())
+
+
+def changed_values(law: Any, values: dict[str, float]) -> tuple[tuple[str, float], ...]:
+    """The bound values of a law, some of them changed, as finite numbers."""
+    return tuple(
+        (key, check_number(values.get(key, one), f"parameter {key} of law {law.name!r}", -math.inf))
+        for key, one in law.values
+    )
+
+
+def _checked(made: CustomLaw, finds_exponent: bool) -> CustomLaw:
+    """A law that was tried out, with the exponent that it has if none was given."""
+    _check_force(made)
+    _check_jump(made)
+    if made.derivative is not None:
+        _check_derivative(made)
+    return replace(made, exponent=_leading_exponent(made)) if finds_exponent and not made.jump else made
 
 
 def _checked_knots(name: str, knots: Any) -> tuple[float, ...]:
@@ -242,7 +258,7 @@ def _check_derivative(made: CustomLaw) -> None:
 
     pointer = ctypes.POINTER(ctypes.c_double)
     delta, delta_dot = np.array([_off_knots(made, place) for place in (1e-4, 3e-4)]), np.array([0.3, -0.2])
-    kernels = (made.gradient, difference_kernel(made.function, len(made.values)))
+    kernels = (made.gradient, difference_kernel(made.function, len(made.values), made.knots))
     found = np.empty((2, 3, 2))
     for kernel, out in zip(kernels, found, strict=True):
         arrays = [x.ctypes.data_as(pointer) for x in (delta, delta_dot, made.parameters)]

@@ -22,6 +22,7 @@ import numpy as np
 
 Function = Callable[..., Any]
 KEPT = 300  # kernels of users' laws that stay in a folder, the last used; a law has two, one with memory six
+OFF_KNOTS = 1e-12  # relative distance from a knot at which a law is on one side of it
 LARGEST = 10**6  # bytes of an array that becomes a part of machine code
 KNOWN = {"builtins", "cmath", "math", "numba", "numpy"}  # told by their names and versions
 
@@ -41,16 +42,21 @@ def force_kernel(function: Function, count: int) -> Any:
 
 
 @lru_cache(maxsize=256)
-def difference_kernel(function: Function, count: int) -> Any:
-    """Compile central differences of a scalar force, likewise."""
-    scalar = inner(function)
+def difference_kernel(function: Function, count: int, knots: tuple[float, ...] = ()) -> Any:
+    """Compile differences of a scalar force, likewise: central ones, in δ between the knots on either side."""
+    scalar, ends = inner(function), (*knots, math.inf)
 
     def slopes(n, delta, delta_dot, entry_rate, values, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
         for i in range(n):
             d, v, r = delta[i], delta_dot[i], entry_rate
             h = 1e-5 * abs(d) + 1e-14  # relative to the cube root of rounding; a stop is not asked below its surface
-            low = d - h if d < 0.0 else max(d - h, 0.0)
-            by_delta[i] = (scalar(d + h, v, r, *values) - scalar(low, v, r, *values)) / (d + h - low)
+            low, high = d - h if d < 0.0 else max(d - h, 0.0), d + h
+            for knot in ends:
+                if knot < d:
+                    low = max(low, knot * (1.0 + OFF_KNOTS))
+                elif knot < high:
+                    high = knot * (1.0 - OFF_KNOTS)
+            by_delta[i] = (scalar(high, v, r, *values) - scalar(low, v, r, *values)) / (high - low)
             h = 1e-5 * max(abs(v), r)
             by_rate[i] = (scalar(d, v + h, r, *values) - scalar(d, v - h, r, *values)) / (2.0 * h)
             h = 1e-5 * r
@@ -252,11 +258,11 @@ def _is_known(value: Any) -> bool:
 
 def or_say_where(compile_it: Callable[[], Any], function: Function, kind: str) -> Any:
     """Compile, or say which line of the user's function cannot be."""
-    from numba.core.errors import NumbaError
+    from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
     try:
         return compile_it()
-    except NumbaError as error:
+    except (NumbaError, UnsupportedBytecodeError) as error:
         file = inspect.getsourcefile(function)
         line = _line_of(error, function)
         raise TypeError(
@@ -274,7 +280,7 @@ def _line_of(error: Exception, function: Function) -> str:
         source = inspect.getsource(function).splitlines()
     except OSError:
         return str(first)
-    named = [int(n) for n in re.findall(r"line (\d+)", str(error))]
+    named = [int(n) for n in re.findall(r"(?:line |\.py \()(\d+)", str(error))]
     inside = [n for n in named if first < n < first + len(source)]
     unknown = re.search(r"name '(\w+)' is not defined", str(error))
     if unknown and not inside:  # the compiler names the word, not the line

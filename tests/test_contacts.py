@@ -395,6 +395,17 @@ def test_law_that_cannot_be_compiled_names_itself():
         talks()
 
 
+def test_law_that_imports_names_the_line():
+    @law
+    def imports(delta, delta_dot, entry_rate):
+        import scipy.special
+
+        return scipy.special.erf(delta)
+
+    with pytest.raises(TypeError, match=r"law 'imports' \(.*, line \d+: 'import scipy.special'\) cannot be compiled"):
+        imports()
+
+
 @pytest.mark.parametrize("knots", [(0.0,), (2e-3, 1e-3), (1e-3, 1e-3), (math.nan,), (-1e-3,), (math.inf,)])
 def test_knots_must_ascend(knots):
     with pytest.raises(ValueError, match=r"knots of law 'bent' must be positive, finite and ascending"):

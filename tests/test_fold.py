@@ -10,6 +10,7 @@ from refusals import refused_by
 
 import fembeam as fb
 from contacts import KelvinVoigt, Polynomial
+from fembeam.scene_file import SceneFileError
 
 TIP = 0.5
 CUBIC, ZETA, FORCE = 2e7, 0.01, "forces[0].signal.amplitude"
@@ -94,8 +95,7 @@ def test_it_prints_and_is_drawn(tmp_path):
     fb.plot.fold_curve(found, figure.axes)
 
 
-def test_the_table_of_a_scene_file(tmp_path, file_of):
-    file = file_of(f"""{ROD_FILE}
+FILE = f"""{ROD_FILE}
 [[elements]]
 z = 0.5
 law = {{ kind = "polynomial", coefficients = [0.0, 0.0, {CUBIC}] }}
@@ -110,9 +110,19 @@ modes = 1
 over = "forces[0].signal.amplitude"
 values = [0.298, 0.3]
 span = [175.0, 210.0]
-""")
+"""
+
+
+def test_the_table_of_a_scene_file(tmp_path, file_of):
+    file = file_of(FILE)
     found = file.studies["fold"].run(file, tmp_path)
     assert np.abs(np.array(places(known())) - found.at[found.values == 0.3]).min() < 1e-7
+
+
+def test_values_without_the_present_one_are_refused_when_read(file_of):
+    """Before the branch is computed, by the name of the key."""
+    with pytest.raises(SceneFileError, match=r"\[fold\]: values must hold the present value 0.3 of forces"):
+        file_of(FILE.replace("[0.298, 0.3]", "[0.1, 0.2]"))
 
 
 test_bad_input = refused_by(

@@ -266,6 +266,8 @@ test_refused = refused(
     (lambda: scene_of([AT_B], fb.Scene(fb.Beam(1.0, FLAT))), "must be of frames and structures"),
     (lambda: scene_of([AT_B], fb.Scene(leg("BC"), damping=fb.ModalDamping(0.1))), "damping of a joined"),
     (lambda: scene_of([AT_B], stops=[fb.Stop("E", LAW, direction="x")]), "is the nearest"),
+    (lambda: scene_of([AT_B], stops=[fb.Stop(("A-B", 60.0), LAW, direction="x")]),
+     "the distance along member 'A-B' must lie within 0 to .* m, got 60.0 in stops"),
     (lambda: fb.Scene(leg("AB"), bodies=[fb.Scene(leg("AB")), fb.Scene(leg("BC"))], joints=[fb.Joint("B", (2, "B"))]),
      "come before the others"),
     (lambda: fb.Scene(leg("AB"), bodies=LEGS, joints=[fb.Joint("B", (2, "B"), body=1)]), "come before the others"),

@@ -230,6 +230,18 @@ def no_number(delta, delta_dot, way, slider, stiffness, limit):
     return "strong"
 
 
+def wrong_slopes(delta, delta_dot, way, slider, stiffness, limit):
+    return stiffness, 0, 0.0, -1.01 * stiffness
+
+
+def few_slopes(delta, delta_dot, way, slider, stiffness, limit):
+    return stiffness, 0.0
+
+
+def let_go_alone(delta, delta_dot, way, slider, stiffness, limit):
+    return way
+
+
 def made(stick=STICK, slip=SLIP, **options):
     return lambda: memory_law("mine", {"stick": stick, "slip": slip}, LATCHED, **options)(stiffness=2e4, limit=10.0)
 
@@ -247,6 +259,10 @@ MISTAKES = [
     (mistaken(sense=0.0, never=1.0), TURNS.format("0.0005 m, δ̇ > 0")),
     (mistaken(real=-1.0), "force of mine is nan N at δ = "),
     (made(slip=Segment(drag, Border(onwards, "stuck", hold))), "law 'mine': 'slip' ends in 'stuck'; its segments are"),
+    (
+        made(stick=Segment(pull, Border(left, "slip", let_go), wrong_slopes)),
+        "slope of segment 'stick' of law 'mine' by slider is -20200 at δ = .* but differences of the force give -20000",
+    ),
     (made(reach=0.0), "reach of law 'mine' must be finite and > 0, got 0.0"),
     (lambda: memory_law("mine", {}), "segments of law 'mine' must be contacts.Segment by name, at least one"),
     (
@@ -268,6 +284,14 @@ test_functions_that_do_not_fit = refused(
     (
         made(stick=Segment(no_number, Border(left, "slip", let_go))),
         "law with memory 'no_number' .* cannot be compiled",
+    ),
+    (
+        made(stick=Segment(pull, Border(left, "slip", let_go), few_slopes)),
+        "slopes of segment 'stick' of law 'mine' must return 4 numbers, got 2",
+    ),
+    (
+        made(stick=Segment(pull, Border(left, "slip", let_go_alone))),
+        "renew 'let_go_alone' of law 'mine' must return as many numbers as are latched, 2, got 1",
     ),
     (lambda: friction(stiffness=1.0), "law 'friction': missing a required argument: 'limit'"),
     (lambda: friction(stiffness=1.0, limit=1.0, mass=2.0), "law 'friction': unexpected 'mass'"),

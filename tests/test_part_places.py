@@ -159,6 +159,8 @@ def test_scene_files(file_of):
     (lambda: beam(masses=[], stops=[fb.Stop("valve", LAW)]), "z must be a number on a Beam, which has no names"),
     (lambda: beam(masses=[]).reduce(1).simulate(0.01, 1e-3).displacement("tip"),
      "places of a beam must be numbers, for no part has a name, got 'tip' in Run; give m, or name the part there"),
+    (lambda: beam(masses=[]).at([0.1, "tip"], "places"),
+     "places of a beam must be numbers, for no part has a name, got 'tip' in places"),
     (lambda: beam().reduce(1).simulate(0.01, 1e-3).moment("vlave"),
      "'valve' is the nearest there is, got 'vlave' in Run"),
     (lambda: beam().reduce(1).frequency_response([1.0], "vlave"), "input must be a place z in m, or one of base"),

@@ -241,6 +241,7 @@ def test_solvers_by_name(file_of):
             r"\[reduce\]: modes must be a whole number or a list of whole numbers or 'all', got true",
         ),
         ("modes = 2", "mode = 2", r"\[reduce\]: unknown key 'mode'; did you mean 'modes'"),
+        ("modes = 2", "modes = 2\ngravity = 9.81", r"unknown key 'gravity'; gravity stands above all tables \(valid"),
         ("modes = 2", "modes = -1", r"\[reduce\]: modes must be a count above 0 or a list"),
         ("modes = 2", "modes = 'most'", r"\[reduce\]: modes must be"),
         ("modes = 2", "modes = 2\nelements = 0", r"\[reduce\]: elements must be a whole number above 0"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fembeam as fb
-from contacts import BoucWen, Coulomb, KelvinVoigt, PiecewiseLinear, Polynomial
+from contacts import BoucWen, Coulomb, KelvinVoigt, PiecewiseLinear, Polynomial, Segment, law, memory_law
 from fembeam.scene import value_of, with_value
 from solvers import Exponential
 
@@ -72,6 +72,49 @@ def test_numbers_of_smooth_hysteresis(name):
     found = simulated(scene).sensitivity(path).displacement(0.25)
     by_differences = differences(scene, path, 1e-4 * value_of(scene, path), lambda run: run.displacement(0.25))
     np.testing.assert_allclose(found, by_differences, rtol=0.0, atol=5e-7 * np.abs(by_differences).max())
+
+
+@law(knots=[1e-4])
+def two_slopes(delta, delta_dot, entry_rate, soft=1e4, hard=3e4):
+    return soft * delta + (hard - soft) * max(delta - 1e-4, 0.0)
+
+
+def power(delta, delta_dot, entry_rate, stiffness, exponent):
+    return stiffness * delta**exponent
+
+
+def spring(delta, delta_dot, stiffness):
+    return stiffness * delta
+
+
+def test_parameters_of_own_laws():
+    """They have the names of the function's arguments, also of laws with memory and in sums."""
+    known = rig(PiecewiseLinear([1e4, 3e4], knots=[1e-4]))
+    scene = rig(two_slopes())
+    for own, same in (("soft", "slopes[0]"), ("hard", "slopes[1]")):
+        assert value_of(scene, f"stops[0].law.{own}") == value_of(known, f"stops[0].law.{same}")
+        found, right = (
+            simulated(one).sensitivity(f"stops[0].law.{name}").displacement(0.25)
+            for one, name in ((scene, own), (known, same))
+        )
+        np.testing.assert_allclose(found, right, rtol=0.0, atol=1e-7 * np.abs(right).max())
+    line = memory_law("line", {"always": Segment(spring)})(stiffness=1e3)
+    both = rig(two_slopes() + KelvinVoigt(1e3, 1.0), line)
+    for path in ("stops[0].law.parts[0].hard", "elements[0].law.stiffness"):
+        assert value_of(with_value(both, path, 2e3), path) == 2e3
+    with pytest.raises(ValueError, match=r"no such parameter; the scene has .*law\.hard.* did you mean .*law\.hard"):
+        value_of(scene, "stops[0].law.hrd")
+    with pytest.raises(ValueError, match="must not pull at rest"):
+        with_value(scene, "stops[0].law.soft", -1e4)
+
+
+def test_the_exponent_of_an_own_law_follows_its_parameters():
+    """Unless it was given; it is no number of the scene, nor are knots."""
+    found, given = law(power)(stiffness=1e7, exponent=1.5), law(power, exponent=2.0)(stiffness=1e7, exponent=1.5)
+    assert [with_value(rig(one), "exponent", 1.25).stops[0].law.exponent for one in (found, given)] == [1.25, 2.0]
+    for path in ("stops[0].law.exponent", "stops[0].law.knots[0]"):
+        with pytest.raises(ValueError, match="no such parameter"):
+            value_of(rig(two_slopes()), path)
 
 
 def test_a_knot_that_is_hardly_passed():

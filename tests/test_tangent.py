@@ -90,6 +90,24 @@ def test_preload_end_in_contact_and_user_law():
         differenced(beam(2, cubic(stiffness=3e5), gap=-2e-5), *start(2), duration)
 
 
+@pytest.mark.parametrize(("knots", "hard", "damped"), [([2e-5], 2e6, 250.0), ([2e-5, 2.0001e-5], 4e5, 0.0)])
+def test_user_law_with_knots(knots, hard, damped):
+    """Slopes are those of one side of a knot, where slope and force jump."""
+
+    @law(knots=knots, jump=True)
+    def two_slopes(delta, delta_dot, entry_rate, soft=1e5, hard=1.0, damped=0.0):
+        if delta <= 2e-5:
+            return soft * delta + 30.0 * delta_dot
+        return soft * 2e-5 + hard * (delta - 2e-5) + (30.0 + damped) * delta_dot
+
+    used = two_slopes(hard=hard, damped=damped)
+    found = differenced(beam(2, used), *start(2, seed=3), 0.06)
+    assert found.contacts.peak_indentation.max() > 2.1e-5
+    known = PiecewiseLinear([1e5, hard], [2e-5], damping=[30.0, 30.0 + damped])
+    expected = integrate(beam(2, known), *start(2, seed=3), 0.06, method=Exponential(1e-11), tangent=True).tangent
+    assert_allclose(found.tangent, expected, rtol=0, atol=1e-7 * np.abs(expected).max())
+
+
 def test_the_end_within_every_kind_of_contact_step():
     system, (q, q_dot) = beam(2), start(2)
     log = integrate(system, q, q_dot, 0.05).contacts

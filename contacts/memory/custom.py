@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.custom import bound_values
+from contacts.custom import bound_values, changed_values
 from contacts.law import Law
-from contacts.memory.custom_kernels import Function, Pieces, compiled
+from contacts.memory.custom_kernels import LEAST, RELATIVE, Function, Pieces, compiled
 from contacts.numbers import LARGEST_PARAMETER, check_number
-from contacts.path import walk
+from contacts.path import Piece, walk
 
 PROBES = 0.01, 0.1, 1.0  # parts of its reach at which a law is led through a cycle when its parameters are bound
 JUMP = 1e-6  # of the largest force on the way: what may change at a border by rounding
+RATE = 0.1  # m/s, at which given slopes are compared with differences
 
 
 @dataclass(frozen=True)
@@ -86,6 +89,14 @@ class CustomMemoryLaw(Law):
     reach: float = 1e-3
     jumps: bool = False
     opens: bool = False
+
+    varied: ClassVar[tuple[str, ...]] = ()  # beside its parameters
+
+    def rebound(self, **values: float) -> CustomMemoryLaw:
+        """The same law with other values of some parameters, checked as when it was bound."""
+        made = replace(self, values=changed_values(self, values))
+        _check_cycles(made)
+        return made
 
     @property
     def pieces(self) -> Pieces:
@@ -187,7 +198,7 @@ def memory_law(
     ------
     TypeError for functions with other arguments or that cannot be compiled; ValueError for segments that are not there.
     On binding: ValueError for borders that fall to zero again and again at one place, a force that is not finite, or
-    one that jumps at a border without ``jumps=True``.
+    one that jumps at a border without ``jumps=True``, and slopes that are not those of the force.
 
     Examples
     --------
@@ -214,7 +225,11 @@ def memory_law(
     def bind(**values: float) -> CustomMemoryLaw:
         pairs = bound_values(name, probe, values)
         made = CustomMemoryLaw(name, tuple(segments.items()), tuple(starts.items()), pairs, size, jumps, opens)
-        _check_cycles(made)
+        try:
+            _check_cycles(made)
+        except TypeError:  # of the compiler, which names no function
+            _check_renewals(made)
+            raise
         return made
 
     return bind
@@ -261,12 +276,28 @@ def _functions(one: Segment) -> list[Function]:
     return [function for function in found if function is not None]
 
 
+def _check_renewals(law: CustomMemoryLaw) -> None:
+    """Raise TypeError for a renewal that returns more or fewer numbers than are latched."""
+    numbers = [value for _, value in (*law.latched, *law.values)]
+    for renew in (end.renew for _, one in law.segments for end in one.ends if end.renew is not None):
+        with suppress(ArithmeticError, ValueError):
+            count = np.size(renew(law.reach, RATE, *numbers))
+            if count != len(law.latched):
+                raise TypeError(
+                    f"renew {renew.__name__!r} of law {law.name!r} must return as many numbers as are latched, "
+                    f"{len(law.latched)}, got {count}"
+                )
+
+
 def _check_cycles(law: CustomMemoryLaw) -> None:
     """Lead a law through slow cycles; the walk itself refuses borders that fall again and again and forces of nan."""
     for X in (part * law.reach for part in PROBES):
         path = X * np.array([0.0, 1.0, -1.0, 1.0, 0.3, 0.8, 0.0])
         largest = np.abs(law.along(path)).max()
-        for before, after in pairwise(walk(law, path)):
+        pieces = list(walk(law, path))
+        for one in pieces:
+            _check_slopes(law, one)
+        for before, after in pairwise(pieces):
             left, right = (law.batch(1.0, one.parameters) for one in (before, after))
             at, rate = np.array([after.start]), np.array([after.rate])
             jump = float((right(at, rate) - left(at, rate))[0])
@@ -276,3 +307,43 @@ def _check_cycles(law: CustomMemoryLaw) -> None:
                     f"force of law {law.name!r} jumps by {jump:.6g} N from {names[0]!r} to {names[1]!r} at δ = "
                     f"{after.start:.6g} m; if it is to, declare it with jumps=True, else correct what is latched there"
                 )
+
+
+def _check_slopes(law: CustomMemoryLaw, piece: Piece) -> None:
+    """Compare the given slopes of a segment with differences of its force, within a piece of a path."""
+    name, segment = law.segments[int(piece.parameters[0])]
+    if segment.slopes is None or piece.start == piece.end:
+        return
+    count, row = len(law.latched), piece.parameters
+    x = np.array([0.5 * (piece.start + piece.end), math.copysign(RATE, piece.rate), *row[1 : 1 + count]])
+    given = np.array(segment.slopes(*x.tolist(), *row[1 + count :].tolist()), dtype=float)
+    if given.shape != x.shape:
+        raise TypeError(
+            f"slopes of segment {name!r} of law {law.name!r} must return {x.size} numbers, got {given.size}"
+        )
+    expected, rounding = _differences(law, row, x)
+    for what, one, right, least in zip(
+        ("delta", "delta_dot", *(key for key, _ in law.latched)), given, expected, rounding, strict=True
+    ):
+        if not abs(one - right) <= 1e-3 * abs(right) + least:
+            raise ValueError(
+                f"slope of segment {name!r} of law {law.name!r} by {what} is {one:g} at δ = {x[0]:.6g} m, δ̇ = {x[1]:g} "
+                f"m/s, but differences of the force give {right:g}"
+            )
+
+
+def _differences(law: CustomMemoryLaw, row: NDArray[np.float64], x: NDArray[np.float64]) -> tuple[Any, Any]:
+    """Slopes of the force by δ, its rate and latched numbers, and what of them may be rounding."""
+    found, rounding = np.empty(x.size), np.empty(x.size)
+    for i, value in enumerate(x):
+        h = RELATIVE * abs(value) + LEAST[min(i, 2)] * law.reach
+        ends = [_force_at(law, row, x + side * h * (np.arange(x.size) == i)) for side in (-1.0, 1.0)]
+        found[i], rounding[i] = (ends[1] - ends[0]) / (2.0 * h), 1e-12 * max(map(abs, ends)) / h
+    return found, rounding
+
+
+def _force_at(law: CustomMemoryLaw, row: NDArray[np.float64], x: NDArray[np.float64]) -> float:
+    """The force at δ, its rate and latched numbers."""
+    changed = row.copy()
+    changed[1 : x.size - 1] = x[2:]
+    return float(law.batch(1.0, changed)(x[:1], x[1:2])[0])

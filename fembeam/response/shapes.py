@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.beams import hermite_rows
-from fembeam.scene import at_parts
+from fembeam.scene import at_parts, require_number
 from fembeam.support import numbers, require
 
 Vector = NDArray[np.float64]
@@ -56,9 +56,7 @@ class Shapes:
 
     def place(self, z: Any) -> Any:
         """The same place, or places, with z for names of parts."""
-        known = bool(self.parts) or not isinstance(z, str)
-        require(known, "places of a beam must be numbers, for no part has a name", z, "Run",
-                "give m, or name the part there")  # fmt: skip
+        require_number(z, self.parts, "Run")
         return at_parts(z, self.parts)
 
     def rows_with_supports(self, z: ArrayLike, derivative: int = 0) -> Vector:

@@ -27,7 +27,7 @@ from fembeam.scene.impactor import Impactor
 from fembeam.scene.local_coordinate import LocalCoordinate, unit_of
 from fembeam.scene.parameters import called, changes_structure, numbered, path_of, replaced, value_of, with_value
 from fembeam.scene.part import ScenePart
-from fembeam.scene.part_places import at_parts
+from fembeam.scene.part_places import at_parts, require_number
 from fembeam.scene.parts import (
     Clamped,
     Dashpot,

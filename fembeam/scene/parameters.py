@@ -67,7 +67,12 @@ def _numbers(path: str, item: Any) -> dict[str, float]:
     for part in fields(item):
         if part.init and part.repr and (varied is None or part.name in varied):
             found.update(_numbers(f"{path}.{part.name}", getattr(item, part.name)))
-    return found
+    return found | {f"{path}.{name}": value for name, value in _bound(item).items()}
+
+
+def _bound(item: Any) -> dict[str, float]:
+    """Parameters of a law of the user's own, by the names that its function gives them."""
+    return dict(item.values) if hasattr(item, "rebound") else {}
 
 
 def path_of(scene: Scene, name: str) -> str:
@@ -142,6 +147,8 @@ def _replaced(item: Any, path: list[str], value: float) -> Any:
         return {key: _replaced(part, path, value) for key, part in item.items()}
     if isinstance(item, dict):
         return {**item, path[0]: _replaced(item[path[0]], path[1:], value)}
+    if path[0] in _bound(item):
+        return item.rebound(**{path[0]: value})
     changed = _replaced(getattr(item, path[0]), path[1:], value)
     if path[0] != "base":
         return replace(item, **{path[0]: changed})

@@ -85,6 +85,13 @@ def at_parts(at: Any, parts: Mapping[str, Any], names: Collection[Any] = (), whe
     return at
 
 
+def require_number(at: Any, parts: Mapping[str, Any], where: str) -> None:
+    """Raise ValueError for the name of a place on a beam none of whose parts has a name."""
+    known = bool(parts) or not isinstance(at, str)
+    require(known, "places of a beam must be numbers, for no part has a name", at, where,
+            "give m, or name the part there")  # fmt: skip
+
+
 def placed_parts(scene: Scene, names: Sequence[str]) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """Each list of parts of a scene, with places for the names of parts."""
     each = [(_parts_of(one, names), one.beam) for one in (scene, *scene.bodies)]

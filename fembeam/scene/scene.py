@@ -20,7 +20,7 @@ from fembeam.scene.element import Element
 from fembeam.scene.impactor import Impactor
 from fembeam.scene.joined_scene import merged
 from fembeam.scene.local_coordinate import LocalCoordinate
-from fembeam.scene.part_places import at_parts, names_of, part_places, placed_parts
+from fembeam.scene.part_places import at_parts, names_of, part_places, placed_parts, require_number
 from fembeam.scene.parts import (
     Dashpot,
     LumpedMass,
@@ -328,6 +328,8 @@ class Scene:
 
     def at(self, places: Any, where: str = "Scene") -> Any:
         """Places of the scene's own body, with or without directions, with places for names of parts."""
+        for place in [] if self.named else places if isinstance(places, list) else [places]:
+            require_number(place, self.part_places, where)
         return at_parts(places, self.part_places, names_of(self.beam), where)
 
     @property

@@ -23,7 +23,7 @@ from fembeam.beams import on_beam
 from fembeam.model import Branch, Orbit
 from fembeam.model.run_csv import SECTIONS, Output
 from fembeam.response import checked_damping, checked_oscillators
-from fembeam.scene import Place, components_at, is_directed, path_of, told
+from fembeam.scene import Place, components_at, is_directed, path_of, told, value_of
 from fembeam.scene_file.keys import Constructors, parameters
 from fembeam.structures import direction_of, require_components
 from fembeam.study import (
@@ -624,7 +624,10 @@ class FoldTable:
 
     def check(self, scene: Scene) -> None:
         """Raise ValueError for numbers that the scene does not have, or values that do not ascend."""
-        check_peak(scene, self.parameter, self.over, self.values, self.span, "[fold]")
+        low, high = check_peak(scene, self.parameter, self.over, self.values, self.span, "[fold]")
+        present = value_of(scene, path_of(scene, self.over))
+        require(bool(low <= present <= high), f"values must hold the present value {present:.6g} of {self.over}",
+                self.values, "[fold]", "give [lowest, highest]")  # fmt: skip
         _check_place(scene, self.z)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Fold:
@@ -748,7 +751,12 @@ def _drawn(path: str, table: Mapping[str, Any]) -> Any:
     known = isinstance(kind, stats.rv_continuous)
     require(known, f"the kind of {path} must be a distribution of scipy.stats", table.get("kind"), "[vary]",
             'e.g. { kind = "norm", loc = 1e-3, scale = 1e-5 }')  # fmt: skip
-    return kind(**{key: value for key, value in table.items() if key != "kind"})
+    given = {key: value for key, value in table.items() if key != "kind"}
+    needed = kind.shapes.split(", ") if kind.shapes else []
+    right = {*needed} <= {*given} <= {*needed, "loc", "scale"}
+    require(right, f"numbers of {table['kind']} must be {', '.join([*needed, 'loc', 'scale'])}", list(given),
+            f"{path} of [vary]", "as scipy.stats calls them; loc is 0 and scale 1 if left out")  # fmt: skip
+    return kind(**given)
 
 
 def _plan_of(table: VaryTable | MinimiseTable) -> dict[str, Any]:

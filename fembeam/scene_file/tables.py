@@ -271,7 +271,8 @@ class TableReader:
         """Every key is a valid one, else "unknown key 'mas'; did you mean 'mass'?"."""
         for key in table:
             if key not in valid:
-                self.fail(where, f"unknown {what} {key!r}{nearest(key, valid)} (valid: {listed(valid)})")
+                above = "; gravity stands above all tables" if key == "gravity" else ""
+                self.fail(where, f"unknown {what} {key!r}{nearest(key, valid)}{above} (valid: {listed(valid)})")
 
     def need(self, table: Table, keys: Sequence[str], where: str, told: str = "") -> None:
         """Every key stands in the table."""

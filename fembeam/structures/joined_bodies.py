@@ -21,7 +21,7 @@ from fembeam.structures.frame import Frame
 from fembeam.structures.frame_forces import FrameForces
 from fembeam.structures.frame_mesh import FrameMatrices, spaced
 from fembeam.structures.joints import Joint, joined_fields, joining, shared_dofs, translations_of
-from fembeam.support import is_numbered, require
+from fembeam.support import is_numbered, is_pair, require
 
 Vector = NDArray[np.float64]
 APART = 1e-6  # of the size of the bodies: two places that a joint makes one
@@ -359,6 +359,11 @@ class JoinedForces:
         return self.each[number], own
 
 
+def _members(body: Any) -> list[str]:
+    """Names of the members of a frame; none of a structure."""
+    return [one.name for one in getattr(body, "members", ())]
+
+
 def located_among(bodies: Mapping[int, Any], place: Any, where: str) -> tuple[int, Any]:
     """Number of the body that a place is on, and the place there: (number, place), or a place of the first that has it.
 
@@ -374,6 +379,9 @@ def located_among(bodies: Mapping[int, Any], place: Any, where: str) -> tuple[in
         return number, own
     having = [number for number, body in bodies.items() if has_place(body, place)]
     if not having:
+        of_member = [body for body in bodies.values() if is_pair(place) and place[0] in _members(body)]
+        for body in of_member:  # its distance is wrong
+            body.check_place(place, where)
         known = list(dict.fromkeys(name for body in bodies.values() for name in body.places()))
         require(False, f"a place must be one of the joined bodies; {nearest(place, known)}", place, where,
                 "use that, or (number of the body, place)")  # fmt: skip

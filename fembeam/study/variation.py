@@ -253,6 +253,8 @@ def points_of(
     for name, one in zip(names, given, strict=True):
         require(_is_distribution(one), f"{name} must be a distribution as others are", one, WHERE,
                 "e.g. scipy.stats.norm(1e-3, 1e-5)")  # fmt: skip
+        require(bool(np.isfinite(one.ppf(0.5))), f"the distribution of {name} must have a median", one.ppf(0.5), WHERE,
+                "its scale must be above 0, its shape within what scipy.stats allows")  # fmt: skip
     share = _shares(samples, seed, len(names))
     points = np.stack([np.asarray(one.ppf(share[:, i]), dtype=float) for i, one in enumerate(given)], axis=-1)
     require(bool(np.isfinite(points).all()), "samples must be finite", points[~np.isfinite(points)][:1], WHERE,
