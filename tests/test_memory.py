@@ -171,6 +171,16 @@ def test_a_slider_at_its_limit_that_still_moves_back_slips_once(method):
         assert abs(run.q[-1, 0] - 5.0 - (1e-4 - 5.0) * np.cos(t) + back * np.sin(t)) < 1e-14 + 1e-3 * back**2
 
 
+@pytest.mark.parametrize("method", [Exponential(1e-6), Exponential(1e-10), DormandPrince(1e-10)], ids=str)
+def test_a_slider_at_its_limit_that_still_moves_on_slips_shortly(method):
+    """Against F = 1 N and a spring the mass comes to rest after v/(1 + q), long before the first node of a step."""
+    system = System([[1.0]], [[0.0]], [[1.0]], [element(Jenkins(1e4, 1.0), -1.0)])
+    for on in 10.0 ** np.arange(-8.0, -3.0):
+        run = integrate(system, [1e-4], [on], 0.02, method=method)
+        assert run.transitions.event[:2].tolist() == ["slip", "stick"]
+        assert run.transitions.t[:2] == pytest.approx([0.0, on / 1.0001], rel=1e-5)
+
+
 @pytest.mark.parametrize("rtol", [1e-4, 1e-5, 1e-6, 1e-7, 1e-8])
 def test_a_landing_off_by_rounding_is_not_passed_again(rtol):
     """A slow mass held by large forces turns every half period: their rounding once made three reversals of one."""

@@ -53,6 +53,7 @@ _ROUNDING = 1e-11  # rounding of a margin, in the same units
 _TOGETHER = 1e-9  # margin, relative to its value at the start, at which a border counts as reached along with another
 _MISSED = 1e-5  # the most, in units of its largest, by which a margin may be negative after a landing on its border
 _SHORTLY = 1e-3  # part of a step or landing over which a margin is extrapolated by the rates at its end
+_JUST_AFTER = 1e-6  # part of the time to the first node from which on a fall at the start of a run is looked for
 _FIRST_SHARE, _SHORTER, _MOST_SHARES = 0.1, 1e-2, 6  # shares of the time to the first node: first, ratio, number
 _UNDECIDED = 2  # events at one instant, after the first, from which on a stick is believed until a step denies it
 _LONGER = 8.0  # factor of the time of extrapolation until it is clear whether a margin rises
@@ -142,13 +143,13 @@ def _extrapolated(problem, state, scratch, s, j, time):
 
 
 @inlined
-def _rises_at_start(problem, tables, state, scratch, s, j, time):
-    """Whether a margin rises at the start of the step, by central differences over longer and longer times."""
+def _rise_at_start(problem, tables, state, scratch, s, j, time):
+    """Rise of a margin at the start of the step, by central differences over longer and longer times; or its noise."""
     noise, rise = scratch.noise[s, j], 0.0
     while abs(rise) <= noise and time < tables.contact_step[0]:
         rise = _extrapolated(problem, state, scratch, s, j, time) - _extrapolated(problem, state, scratch, s, j, -time)
         time *= _LONGER
-    return rise > 0.0
+    return rise
 
 
 @inlined
@@ -165,9 +166,20 @@ def _falls_at_once(problem, tables, state, scratch, s, j, time):
         if value > noise:
             return False
         if value >= -noise:
-            return not _rises_at_start(problem, tables, state, scratch, s, j, time)
+            return _rise_at_start(problem, tables, state, scratch, s, j, time) <= 0.0
         share *= _SHORTER
     return True
+
+
+@inlined
+def _falls_as_run_begins(problem, tables, state, scratch, s, j, start, time):
+    """Whether a margin that is zero as the run begins falls: before ``time``, the first node, it may be back.
+
+    A slider that begins at its limit may slip on for a short time, and stick.
+    """
+    if state.now[T] > 0.0 or state.count[AT_ONCE] > 0 or abs(start) > scratch.noise[s, j]:
+        return False
+    return _rise_at_start(problem, tables, state, scratch, s, j, _JUST_AFTER * time) < -scratch.noise[s, j]
 
 
 @inlined
@@ -238,6 +250,8 @@ def _crossing_time(problem, tables, state, scratch, s, j, node_set, h):
     if before < -tolerance and not overshot:
         return 0.0
     begins_on = before <= tolerance
+    if _falls_as_run_begins(problem, tables, state, scratch, s, j, before, h * tables.times[node_set, 0]):
+        return 0.0
     for i in range(S + 1):
         value = scratch.margin[S * j + i] if i < S else scratch.ends[ENDS * j + 1]
         after = h * tables.times[node_set, i] if i < S else h
