@@ -50,8 +50,8 @@ from solvers.stepping.located import NEAR_END, SWITCHED, accept, before_step, fi
 from solvers.stepping.shared import shared
 
 _LEAST_STEP = 1e-290  # s: at t = 0 any step changes the time
-_FEW_NODES = 2  # likewise, up to which none but the first is passed
 _MOST_NODES = 16  # of a signal on a step; a period of its fastest part has ten or more
+_FEW_NODES = 2  # so many, or fewer: a step that would pass these ends on the next one
 
 
 class Space(NamedTuple):
