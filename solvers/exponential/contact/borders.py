@@ -30,12 +30,22 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.parts import BEHIND, PASSED, part
 from solvers.compiled.renewals import count_event, margins, margins_before, margins_in, renew
+from solvers.compiled.simd import load8, splat8, sum8
 from solvers.compiled.sliding import DELTA, RATE
 from solvers.compiled.state import AT_ONCE, LAST_EVENT, PEAK_FORCE, T, rate_tolerance
 from solvers.exponential.contact.crossings import extremum
 from solvers.exponential.contact.first_step import UNKNOWN
-from solvers.exponential.contact.node_response import DELTAS, KNOWN, RATES, START, motion_of, rate_ripple_of, ripple_of
-from solvers.exponential.contact.nodes import LOCAL, S, lagrange
+from solvers.exponential.contact.node_response import (
+    DELTAS,
+    KNOWN,
+    RATES,
+    SLOPE,
+    START,
+    motion_of,
+    rate_ripple_of,
+    ripple_of,
+)
+from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import maximum_and_place, motion_around
 from solvers.exponential.contact.slider_margins import (
     ENDS,
@@ -58,6 +68,8 @@ _FIRST_SHARE, _SHORTER, _MOST_SHARES = 0.1, 1e-2, 6  # shares of the time to the
 _UNDECIDED = 2  # events at one instant, after the first, from which on a stick is believed until a step denies it
 _LONGER = 8.0  # factor of the time of extrapolation until it is clear whether a margin rises
 _ROOT_FOUND = 1e-6  # value of the polynomial, in units of the largest margin, that ends the search for its root
+_SLOPE_STEP = 1e-5  # relative step in σ for the slope of this polynomial at its root
+_OFF_NODES = 1e-200  # keeps σ off a node where this polynomial is evaluated
 _MOST_ILLINOIS = 6  # iterations for a root of the polynomial through the nodes
 _REST = 1e-14  # rate, in units of the reference speed, below which a rate at rest is rounding
 _INTERPOLATED = 4.0  # rounding of a margin at points around a node, in units of that at the nodes
@@ -196,29 +208,35 @@ def _before_first_node(problem, state, scratch, s, j, start, time, h):
     return _SHORTLY * time * start / fall if fall > _SHORTLY * start else np.inf
 
 
-@inlined
+@inner
 def _polynomial(tables, scratch, s, j, node_set, sigma):
-    """Value at σ of the polynomial through margin j at the nodes."""
-    value = 0.0
-    lagrange(tables.nodes[node_set], tables.lagrange[node_set, 0], sigma, scratch.trial)
+    """Value at σ of the polynomial through margin j at the nodes: Π (σ - σ_i) Σ w_i margin_i/(σ - σ_i)."""
+    nodes, product = tables.nodes[node_set], 1.0
     for i in range(S):
-        value += scratch.trial[i] * scratch.margin[S * j + i]
-    return value
+        product *= sigma - nodes[i] + _OFF_NODES
+    apart = splat8(sigma) - load8(nodes, 0) + splat8(_OFF_NODES)
+    return product * sum8(load8(tables.lagrange[node_set, 0], 0) * load8(scratch.margin, S * j) / apart)
 
 
 @inlined
 def _root_before_node(tables, scratch, s, j, node_set, h, i, linear):
-    """Time at which this polynomial falls to zero between node i - 1 and node i, or the end, by the Illinois rule.
+    """(time, slope) where this polynomial falls to zero between node i - 1 and node i, or the end.
 
-    Without a change of sign it is ``linear``. Landings of friction that begin with this time take a fifth fewer trials.
+    Without a change of sign they are ``linear`` and 0. A landing that begins with both takes half as many trials.
     """
     left = tables.nodes[node_set, i - 1] if i > 0 else 0.0
     right = tables.nodes[node_set, i] if i < S else 1.0
     above = scratch.margin[S * j + i - 1] if i > 0 else _polynomial(tables, scratch, s, j, node_set, left)
     below = scratch.margin[S * j + i] if i < S else _polynomial(tables, scratch, s, j, node_set, right)
     if not below < 0.0 < above:
-        return linear
-    middle, last = right, 0.0
+        return linear, 0.0
+    return _root_of_polynomial(tables, scratch, s, j, node_set, h, left, right, above, below)
+
+
+@inner
+def _root_of_polynomial(tables, scratch, s, j, node_set, h, left, right, above, below):
+    """(time, slope) of this polynomial's root between two places σ with the values given, by the Illinois rule."""
+    middle, last, value = right, 0.0, below
     for _ in range(_MOST_ILLINOIS):
         middle = right - (right - left) * below / (below - above)
         value = _polynomial(tables, scratch, s, j, node_set, middle)
@@ -229,29 +247,54 @@ def _root_before_node(tables, scratch, s, j, node_set, h, i, linear):
         else:
             right, below, above = middle, value, above * (0.5 if last < 0.0 else 1.0)
         last = value
-    return h * middle ** tables.time_exponent[node_set]
+    step, kappa = _SLOPE_STEP * middle, tables.time_exponent[node_set]
+    slope = (_polynomial(tables, scratch, s, j, node_set, middle + step) - value) / step
+    return h * middle**kappa, slope / (h * kappa * middle ** (kappa - 1.0))
+
+
+@inlined
+def _expect(tables, scratch, s, j, node_set, h):
+    """Note when a margin will be zero within as long a step again, by its polynomial, if no other one is earlier.
+
+    The parabola through the last two nodes and the end tells whether that is worth a closer look.
+    """
+    nodes, margin, end = tables.nodes[node_set], scratch.margin[S * j : S * j + S], scratch.ends[ENDS * j + 1]
+    fall = (margin[S - 1] - end) / (1.0 - nodes[S - 1])
+    before = (margin[S - 2] - margin[S - 1]) / (nodes[S - 1] - nodes[S - 2])
+    last = 2.0 ** (1.0 / tables.time_exponent[node_set])
+    bent = (fall - before) / (1.0 - nodes[S - 2]) * (last - nodes[S - 1])
+    if end <= 0.0 or fall <= 0.0 or end > (fall + bent) * (last - 1.0):
+        return
+    below, above = _polynomial(tables, scratch, s, j, node_set, last), _polynomial(tables, scratch, s, j, node_set, 1.0)
+    if not below < 0.0 < above:
+        return
+    time, slope = _root_of_polynomial(tables, scratch, s, j, node_set, h, 1.0, last, above, below)
+    if time < scratch.expected[0]:
+        scratch.expected[0], scratch.expected[SLOPE] = time, slope
+        scratch.expected_of[0], scratch.expected_of[1] = s, j
 
 
 @inlined
 def _crossing_time(problem, tables, state, scratch, s, j, node_set, h):
-    """Time after the start of the step at which a margin falls below zero, by its values at the nodes and ends, or inf.
+    """(time after the start of the step, slope) where a margin falls below zero, by its values at the nodes and ends.
 
-    It is 0 if the margin is negative from the start on. A margin that begins at zero may have risen before the first
-    node: then half the time to that node is returned, for a shorter step to decide. A landing may have missed its
-    border by more than the rounding of this step: then the margin begins slightly below zero and rises, and only a
-    later fall counts. Slip that begins against its own force, as dashpots can make it, has a strongly negative margin
-    and ends at once. Where N falls to zero just after stick has begun, it rises by less than its noise: told to
-    fall at once, the slider would stick and slip at one instant for ever.
+    The time is inf if it does not, the slope 0 if it is not known. The time is 0 if the margin is negative from the
+    start on. A margin that begins at zero may have risen before the first node: then half the time to that node is
+    returned, for a shorter step to decide. A landing may have missed its border by more than the rounding of this step:
+    then the margin begins slightly below zero and rises, and only a later fall counts. Slip that begins against its own
+    force, as dashpots can make it, has a strongly negative margin and ends at once. Where N falls to zero just after
+    stick has begun, it rises by less than its noise: told to fall at once, the slider would stick and slip at one
+    instant for ever.
     """
     noise, before, t = scratch.noise[s, j], scratch.ends[ENDS * j], 0.0
     tolerance = max(_ON_BORDER * scratch.largest[s, j], noise)
     overshot = state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0 and scratch.margin[S * j] > before
     overshot &= before > -_MISSED * scratch.largest[s, j]
     if before < -tolerance and not overshot:
-        return 0.0
+        return 0.0, 0.0
     begins_on = before <= tolerance
     if _falls_as_run_begins(problem, tables, state, scratch, s, j, before, h * tables.times[node_set, 0]):
-        return 0.0
+        return 0.0, 0.0
     for i in range(S + 1):
         value = scratch.margin[S * j + i] if i < S else scratch.ends[ENDS * j + 1]
         after = h * tables.times[node_set, i] if i < S else h
@@ -259,14 +302,14 @@ def _crossing_time(problem, tables, state, scratch, s, j, node_set, h):
             believed = state.count[AT_ONCE] >= _UNDECIDED and rubs(problem, s) and slider_of(problem, s)[CODE] == STICK
             at_once = i == 0 and before <= noise and not believed
             if at_once and _falls_at_once(problem, tables, state, scratch, s, j, after):
-                return 0.0
+                return 0.0, 0.0
             if begins_on and i == 0:
-                return 0.5 * after
+                return 0.5 * after, 0.0
             share = max(before, 0.0) / (max(before, 0.0) - value)
             return _root_before_node(tables, scratch, s, j, node_set, h, i, t + (after - t) * share)
         before, t = value, after
     first = h * tables.times[node_set, 0]
-    return _before_first_node(problem, state, scratch, s, j, scratch.ends[ENDS * j], first, h)
+    return _before_first_node(problem, state, scratch, s, j, scratch.ends[ENDS * j], first, h), 0.0
 
 
 @inlined
@@ -333,8 +376,11 @@ def _may_be_hidden(scratch, s, j):
 def border_ahead(problem, tables, state, scratch, node_set, level):
     """(time after the start of the step, element, border) of the first border that the step just tried crosses.
 
-    (inf, -1, -1) if there is none, (inf, `UNRESOLVED`, -1) if the step is too long to tell.
+    (inf, -1, -1) if there is none, (inf, `UNRESOLVED`, -1) if the step is too long to tell. Of one that is crossed
+    ``scratch.ahead`` gets the slope of its margin there, or 0. ``scratch.expected`` gets the one that the step after
+    this one may cross.
     """
+    scratch.expected[0] = np.inf
     first, element, border, h = np.inf, -1, -1, tables.contact_step[level]
     for s in range(problem.law.size):
         count = problem.border_count[s]
@@ -344,13 +390,15 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
         for j in range(count):
             if scratch.largest[s, j] <= scratch.noise[s, j]:
                 continue
-            time = _crossing_time(problem, tables, state, scratch, s, j, node_set, h)
+            time, slope = _crossing_time(problem, tables, state, scratch, s, j, node_set, h)
             if time == np.inf:
                 time = _crossing_between_nodes(problem, tables, state, scratch, s, j, node_set, h)
             if time == np.inf and _may_be_hidden(scratch, s, j):
                 return np.inf, UNRESOLVED, -1
             if time < first:
-                first, element, border = time, s, j
+                first, element, border, scratch.ahead[SLOPE] = time, s, j, slope
+            elif time == np.inf and not (rubs(problem, s) and j == PRESSES):  # at an opening N falls to zero anyway
+                _expect(tables, scratch, s, j, node_set, h)
     return first, element, border
 
 

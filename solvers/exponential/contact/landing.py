@@ -74,6 +74,7 @@ from solvers.exponential.contact.node_response import (
     LANDED,
     REACH,
     RTOL,
+    SLOPE,
     START,
     STRAIGHT,
     WITHIN,
@@ -93,6 +94,7 @@ _ON_BORDER = 1e-6  # margin, in units of its largest, below which a landing begi
 _STAGNATION = 1e-10  # margin, in units of its largest, below which trials that do not halve it show its rounding
 _FOUND = 1e-6  # the same, up to which a landing has found its border
 _MOST_ROUNDING = 0.01  # the same, up to which rounding of δ may hide a margin's zero
+_PROMISED = 0.01  # the same after a first trial whose slope is known, up to which the landing goes on
 _HALVINGS, _LEAST_SHARE = 30, 1e-3  # of an interval that contains a root; least share of the way to it
 _MOST_VERTICES = 6  # parabolas to the maximum of |F_t| inside a landing
 _MOST_BORDER_TRIALS = 40  # the same on a bend or border: it may change only near the start, which bisection must find
@@ -646,8 +648,8 @@ def _rounded(problem, tables, scratch, stop, size):
 def _locate(problem, tables, state, scratch, stop, border, search):
     """Locate a zero of the event function by the secant rule, safeguarded by a bracket.
 
-    Returns (length, remaining value, its rounding, by that of δ too). The value is NaN if there is no zero up to
-    ``longest``. Trials that differ little are short steps from the last one.
+    Returns (length, remaining value, its rounding, by that of δ too, slope there or 0 if it is not known). The value is
+    NaN if there is no zero up to ``longest``. Trials that differ little are short steps from the last one.
     ``search`` is (variable, sign of its direction, first trial, longest, scale of the event function, tolerance,
     sign of `_event_function`, slope at the first trial or 0).
     """
@@ -661,7 +663,7 @@ def _locate(problem, tables, state, scratch, stop, border, search):
         span_before = 0.9 * span
         take_step(problem, tables, state, scratch, variable, stop, forward * span_before)
         value_before, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
-    low, high, rounding = span_before if value_before > 0.0 else 0.0, longest, 0.0
+    low, high, rounding, near = span_before if value_before > 0.0 else 0.0, longest, 0.0, slope
     for _ in range(_MOST_BORDER_TRIALS):
         change = span - span_before
         if abs(change) <= _CLASSICAL_UP_TO * span:
@@ -670,8 +672,11 @@ def _locate(problem, tables, state, scratch, stop, border, search):
         else:
             take_step(problem, tables, state, scratch, variable, stop, forward * span)
         value, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
+        if slope != 0.0 and forward > 0.0 and abs(value) > _PROMISED * largest:
+            return span, np.nan, rounding, 0.0  # what the polynomial of a step promised is not there
         if slope == 0.0:
             slope = (value - value_before) / (span - span_before)
+            near = slope if abs(change) <= _CLASSICAL_UP_TO * span else 0.0
         rounding = _STAGNATION * largest
         if rubs(problem, stop) and variable != TIME:
             of_delta = slope * _rounded(problem, tables, scratch, stop, state.x.size)
@@ -686,9 +691,9 @@ def _locate(problem, tables, state, scratch, stop, border, search):
             if rubs(problem, stop):  # the landing may begin on the same border
                 next_span = max(next_span, 2.0 * shortest)
         if not shortest < next_span <= longest or next_span == span:
-            return span, np.nan, rounding
+            return span, np.nan, rounding, 0.0
         span_before, value_before, span = span, value, next_span
-    return span, value, rounding
+    return span, value, rounding, near
 
 
 @merged
@@ -699,8 +704,8 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
     is none, `UNRESOLVED` if a shorter step must tell.
     """
     limit, largest = longest_time(problem, tables, state, scratch), scratch.bend_values[scratch.bend_values.size - 1]
-    tolerance, sign, slope = 1e-10 * largest, 0.0, 0.0
-    opened = scratch.landed[OPENED] == stop + 1
+    tolerance, sign = 1e-10 * largest, 0.0
+    opened, slope_in_time = scratch.landed[OPENED] == stop + 1, scratch.ahead[SLOPE] if border >= 0 else 0.0
     if border >= 0:  # if it were missed by more, the next step might cross it in the wrong direction
         largest, tolerance = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
     scratch.landed[0], scratch.landed[OPENED] = -1, 0
@@ -712,17 +717,20 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
     start_landing(problem, tables, state, scratch, stop, variable)
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
     limit, span = limit**exponent, guess**exponent
+    slope = slope_in_time * guess / (exponent * span)
     if border >= 0 and variable == TIME and _may_end_at_opening(problem, tables, state, scratch, stop):
         variable, forward, limit = np.int64(ROOT), -1.0, w[size + 1]
         span, sign, slope = _guess_before_opening(problem, tables, state, scratch, stop, border, guess, opened)
         largest, tolerance = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
     search = variable, forward, span, limit, largest, tolerance, sign, slope
-    span, value, rounding = _locate(problem, tables, state, scratch, stop, border, search)
+    span, value, rounding, slope = _locate(problem, tables, state, scratch, stop, border, search)
     time = span if variable == TIME else x[size] - w[size]
     found = abs(value) <= max(_FOUND * largest, rounding)
     if not (found and _within_tolerance(problem, tables, state, scratch, variable, stop, time)):
         return False
-    crossed_upward = border >= 0 and _was_below(problem, state, scratch, stop, border, value, 1e-3 * time)
+    crossed_upward = slope > 0.0
+    if slope == 0.0:
+        crossed_upward = border >= 0 and _was_below(problem, state, scratch, stop, border, value, 1e-3 * time)
     if crossed_upward or before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
         return False  # the margin was below zero before, or another surface or bend is crossed first
     scratch.landed[0], scratch.landed[1] = passed(problem, state, scratch, stop, border, w, x)

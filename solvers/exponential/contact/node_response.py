@@ -47,6 +47,7 @@ step, for the energy balance; the state at the start of a landing, or at the end
 DELTAS, RATES, FORCES, KNOWN = range(4)
 """Rows of `Scratch.local_motion`: m, m/s, N at points around a node, and the values they are interpolated from."""
 RTOL, REACH = range(2)  # places in Scratch.accuracy
+SLOPE = 1  # place in Scratch.ahead: slope, by time, of the margin of the border crossed, where it is zero; 0 if unknown
 _KINK_JUMP = 1e-2  # jump of a third derivative, over signal/dt³, that is a kink; smooth signals have a tenth
 STRAIGHT = 1e-9  # change of a law's slope on a step, in units of the slope, that is rounding
 _WORK_TOLERANCE = 10.0  # part of a force, in units of rtol × the largest force, that a step may leave out for its work
@@ -111,8 +112,10 @@ class Scratch(NamedTuple):
     margin: Annotated[Any, "B*S"]  # margins of an element's borders at points, row by row; see `borders`
     ends: Annotated[Any, "6*B"]  # margins of an element's borders at the ends of a step or landing; see `borders`
     fired: Annotated[Any, "B"]  # margins of an element's borders in one state
-    ahead: Annotated[Any, "1"]  # s: when a border is reached that a step has crossed and not landed on, else 0
-    ahead_of: Annotated[Any, "int 2"]  # its element and number
+    ahead: Annotated[Any, "2"]  # s: when a border is reached, known before a step, else 0; then `SLOPE`
+    ahead_of: Annotated[Any, "int 3"]  # its element and number; 1 if it is only expected
+    expected: Annotated[Any, "2"]  # the same after the start of the step tried of one expected beyond its end, else inf
+    expected_of: Annotated[Any, "int 2"]
     margin_begin: Annotated[Any, "E, B"]  # margins at the start of a landing, then at its end and shortly before it
     margin_end: Annotated[Any, "E, B"]
     margin_before: Annotated[Any, "B"]  # of the element whose border is landed on

@@ -14,7 +14,7 @@ from solvers.compiled.parts import FIRST_END, GO_BEYOND, LAND, LAND_IN_TIME, par
 from solvers.exponential.contact.borders import UNRESOLVED, border_ahead, renew_all, renew_border
 from solvers.exponential.contact.crossings import first_bend
 from solvers.exponential.contact.landing import land, land_on_bend_or_border
-from solvers.exponential.contact.node_response import LANDED
+from solvers.exponential.contact.node_response import LANDED, SLOPE
 
 
 @part(LAND, types.UniTuple(types.int64, 2), types.int64, types.int64, REAL)
@@ -48,8 +48,8 @@ def first_end(problem, tables, state, scratch, node_set, level, is_new):
 def land_in_time(problem, tables, state, scratch, stop, first):
     """Land on the bend or border of ``stop``, ``first`` s ahead, or on a border reached before; (stop, success).
 
-    ``scratch.border`` holds the number of the border, -1 of a bend, before and after. "In time" as the variable is
-    `TIME`.
+    ``scratch.border`` holds the number of the border, -1 of a bend, before and after, ``scratch.ahead`` the slope of
+    its margin. "In time" as the variable is `TIME`.
     """
     border, guess = scratch.border[0], first
     for _ in range(problem.law.size + 1):
@@ -59,6 +59,7 @@ def land_in_time(problem, tables, state, scratch, stop, first):
         if scratch.border[0] < 0 or scratch.landed[0] < 0:
             break
         stop, border = scratch.landed[0], scratch.landed[1]
+        scratch.ahead[SLOPE] = 0.0
     return stop, False
 
 

@@ -69,7 +69,7 @@ from solvers.exponential.contact.first_step import (
 )
 from solvers.exponential.contact.kinks import longest_under_signals
 from solvers.exponential.contact.landing import LAST_RESORT, may_land
-from solvers.exponential.contact.node_response import force_of, free_response
+from solvers.exponential.contact.node_response import SLOPE, force_of, free_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_run, finish_step, record_forces, sample_step
 from solvers.exponential.contact.segment_ends import first_end, go_beyond, land_first, land_in_time
@@ -77,6 +77,7 @@ from solvers.exponential.energy.contact_balance import account_contact
 
 _ERROR_GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
+_SHORTLY_BEFORE = 0.9  # part of the time to a border after which a step ends, for a landing to follow
 _CROSSING_KNOWN = 8  # levels, √2 each, shorter at once: a step not resolved yet may see a crossing near its start
 NEITHER, MOVES_OUT, RESTS = range(3)  # what `_on_border` finds
 _ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # ratio of the errors of two steps whose lengths differ by √2, one level
@@ -208,7 +209,7 @@ def _try_friction_border(problem, tables, state, scratch, time_to_border):
     stop, level = scratch.landed[0], scratch.control[NEXT_LEVEL]
     if stop < 0 or not rubs(problem, stop):
         return False
-    scratch.border[0] = scratch.landed[1]
+    scratch.border[0], scratch.ahead[SLOPE] = scratch.landed[1], 0.0
     stop, landed = land_in_time(problem, tables, state, scratch, stop, time_to_border)
     if landed:
         _continue_after(problem, tables, state, scratch, stop, level, False)
@@ -216,17 +217,35 @@ def _try_friction_border(problem, tables, state, scratch, time_to_border):
 
 
 @merged
-def _try_border_ahead(problem, tables, state, scratch):
-    """Land on the border that a step crossed which was then made shorter; returns whether it was done."""
-    time, level = scratch.ahead[0] - state.now[T], scratch.control[NEXT_LEVEL]
+def _try_border_ahead(problem, tables, state, scratch, time_to_border):
+    """Land on a border that a step crossed which was then made shorter, or that is expected, before a surface.
+
+    Returns whether it was done, and the longest step, s, that ends well before a border that is only expected.
+    """
+    at, level, expected = scratch.ahead[0], scratch.control[NEXT_LEVEL], scratch.ahead_of[2] > 0
+    time = at - state.now[T]
     scratch.ahead[0] = 0.0
-    if not time > 0.0 or scratch.control[NEW]:
-        return False
+    if not 0.0 < time < time_to_border or scratch.control[NEW]:
+        return False, np.inf
     scratch.border[0] = scratch.ahead_of[1]
     stop, landed = land_in_time(problem, tables, state, scratch, scratch.ahead_of[0], time)
     if landed:
         _continue_after(problem, tables, state, scratch, stop, level, False)
-    return landed
+    elif expected:
+        scratch.ahead[0], scratch.ahead_of[2] = at, 0
+        return False, _SHORTLY_BEFORE * time
+    return landed, np.inf
+
+
+@inlined
+def _expect_border(state, scratch):
+    """Keep the border that the accepted step lets expect, but one that a step has crossed."""
+    time, known = state.now[T] + scratch.expected[0], scratch.ahead[0] > 0.0
+    same = scratch.ahead_of[0] == scratch.expected_of[0] and scratch.ahead_of[1] == scratch.expected_of[1]
+    if time < np.inf and (same or not known):
+        scratch.ahead[0], scratch.ahead[SLOPE] = time, scratch.expected[SLOPE]
+        scratch.ahead_of[0], scratch.ahead_of[1] = scratch.expected_of[0], scratch.expected_of[1]
+        scratch.ahead_of[2] = 0 if known else 1
 
 
 @merged
@@ -282,6 +301,8 @@ def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wan
         account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h)
     if state.event_record.shape[0]:
         record_forces(problem, state, scratch, STEP, end, node_set, level)
+    if problem.parts[FIRST_END] and crossing < 0:
+        _expect_border(state, scratch)
     finish_step(problem, tables, state, scratch, node_set, level)
     _adapt(tables, scratch, level, node_set, wanted, error)
     if crossing >= 0:  # crossed within the shortest step
@@ -307,12 +328,15 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
     if control[NEW] == ENTRY and problem.parts[PRESSED] and _switch_pressed(problem, state):
         begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
+    longest, wanted = 0.8 * time_to_border, control[NEXT_LEVEL]
+    if scratch.ahead[0] > 0.0:
+        landed, before = _try_border_ahead(problem, tables, state, scratch, time_to_border)
+        if landed:
+            return RUNNING
+        longest = min(longest, before)
     if _try_nearest(problem, tables, state, scratch, stop, direction, time_to_border):
         return RUNNING
-    if scratch.ahead[0] > 0.0 and _try_border_ahead(problem, tables, state, scratch):
-        return RUNNING
     node_set = control[NODE_SET] if control[NEW] else 0
-    longest, wanted = 0.8 * time_to_border, control[NEXT_LEVEL]
     if problem.table_dt.size:
         allowed = longest_under_signals(problem, tables, state, scratch, wanted)
         if allowed == 0.0:
@@ -338,8 +362,8 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
         state.count[REJECTED] += 1
         if crossing >= 0:  # end a step shortly before, so that the next one can land
             scratch.ahead[0] = state.now[T] + first if scratch.border[0] >= 0 else 0.0
-            scratch.ahead_of[0], scratch.ahead_of[1] = crossing, scratch.border[0]
-            level = min(max(level + 1, level_of(tables, 0.9 * first)), level + _CROSSING_KNOWN)
+            scratch.ahead_of[0], scratch.ahead_of[1], scratch.ahead_of[2] = crossing, scratch.border[0], 0
+            level = min(max(level + 1, level_of(tables, _SHORTLY_BEFORE * first)), level + _CROSSING_KNOWN)
             continue
         level = min(shortest, level + (1 + int(2.0 / _ORDER * math.log2(error / _ERROR_GOAL)) if error < np.inf else 2))
         wanted = level
