@@ -28,10 +28,11 @@ def angle_between(product, along):
     tangent = product / along
     if not (along > 0.0 and abs(tangent) <= SMALL_ANGLE):
         return math.atan2(product, along)
-    square, total = tangent * tangent, 0.0
-    for odd in (15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0):
-        total = square * (1.0 / odd - total)
-    return tangent - tangent * total
+    z = tangent * tangent
+    z_2 = z * z
+    low = (1.0 / 3.0 - z * (1.0 / 5.0)) + z_2 * (1.0 / 7.0 - z * (1.0 / 9.0))
+    high = (1.0 / 11.0 - z * (1.0 / 13.0)) + z_2 * (1.0 / 15.0)
+    return tangent - tangent * (z * (low + z_2 * z_2 * high))
 
 
 @inlined
@@ -92,7 +93,7 @@ def spring_stretch(radius, slider, xi):
     if radius == 0.0:
         return stretch
     turn = TURN * abs(radius)
-    return stretch - turn * math.floor(stretch / turn + 0.5)
+    return stretch if abs(stretch) < 0.5 * turn else stretch - turn * math.floor(stretch / turn + 0.5)
 
 
 @inlined

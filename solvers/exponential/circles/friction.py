@@ -100,14 +100,11 @@ def xi_and_rate_at_nodes(problem, scratch, s):
 @inlined
 def _small_arctangents(tangent):
     """Arctangents of eight numbers up to `SMALL_ANGLE` by their series, to rounding."""
-    square, total = tangent * tangent, splat8(-1.0 / 15.0)
-    total = splat8(1.0 / 13.0) + square * total
-    total = splat8(-1.0 / 11.0) + square * total
-    total = splat8(1.0 / 9.0) + square * total
-    total = splat8(-1.0 / 7.0) + square * total
-    total = splat8(1.0 / 5.0) + square * total
-    total = splat8(-1.0 / 3.0) + square * total
-    return tangent + tangent * square * total
+    z = tangent * tangent
+    z_2 = z * z
+    low = (splat8(1.0 / 3.0) - z * splat8(1.0 / 5.0)) + z_2 * (splat8(1.0 / 7.0) - z * splat8(1.0 / 9.0))
+    high = (splat8(1.0 / 11.0) - z * splat8(1.0 / 13.0)) + z_2 * splat8(1.0 / 15.0)
+    return tangent - tangent * (z * (low + z_2 * z_2 * high))
 
 
 @inlined

@@ -68,6 +68,7 @@ _FIRST_SHARE, _SHORTER, _MOST_SHARES = 0.1, 1e-2, 6  # shares of the time to the
 _UNDECIDED = 2  # events at one instant, after the first, from which on a stick is believed until a step denies it
 _LONGER = 8.0  # factor of the time of extrapolation until it is clear whether a margin rises
 _ROOT_FOUND = 1e-6  # value of the polynomial, in units of the largest margin, that ends the search for its root
+_ROOT_EXPECTED = 1e-4  # the same beyond the end of the step, where the polynomial is no better
 _SLOPE_STEP = 1e-5  # relative step in σ for the slope of this polynomial at its root
 _OFF_NODES = 1e-200  # keeps σ off a node where this polynomial is evaluated
 _MOST_ILLINOIS = 6  # iterations for a root of the polynomial through the nodes
@@ -230,17 +231,22 @@ def _root_before_node(tables, scratch, s, j, node_set, h, i, linear):
     below = scratch.margin[S * j + i] if i < S else _polynomial(tables, scratch, s, j, node_set, right)
     if not below < 0.0 < above:
         return linear, 0.0
-    return _root_of_polynomial(tables, scratch, s, j, node_set, h, left, right, above, below)
+    found = _ROOT_FOUND * scratch.largest[s, j]
+    return _root_of_polynomial(tables, scratch, s, j, node_set, h, (left, right, above, below), found)
 
 
 @inner
-def _root_of_polynomial(tables, scratch, s, j, node_set, h, left, right, above, below):
-    """(time, slope) of this polynomial's root between two places σ with the values given, by the Illinois rule."""
+def _root_of_polynomial(tables, scratch, s, j, node_set, h, bracket, found):
+    """(time, slope) of this polynomial's root by the Illinois rule; the value found is at most ``found``.
+
+    ``bracket`` is two places σ, then the values there, positive and negative.
+    """
+    left, right, above, below = bracket
     middle, last, value = right, 0.0, below
     for _ in range(_MOST_ILLINOIS):
         middle = right - (right - left) * below / (below - above)
         value = _polynomial(tables, scratch, s, j, node_set, middle)
-        if abs(value) <= _ROOT_FOUND * scratch.largest[s, j]:
+        if abs(value) <= found:
             break
         if value > 0.0:
             left, above, below = middle, value, below * (0.5 if last > 0.0 else 1.0)
@@ -268,7 +274,8 @@ def _expect(tables, scratch, s, j, node_set, h):
     below, above = _polynomial(tables, scratch, s, j, node_set, last), _polynomial(tables, scratch, s, j, node_set, 1.0)
     if not below < 0.0 < above:
         return
-    time, slope = _root_of_polynomial(tables, scratch, s, j, node_set, h, 1.0, last, above, below)
+    found = _ROOT_EXPECTED * scratch.largest[s, j]
+    time, slope = _root_of_polynomial(tables, scratch, s, j, node_set, h, (1.0, last, above, below), found)
     if time < scratch.expected[0]:
         scratch.expected[0], scratch.expected[SLOPE] = time, slope
         scratch.expected_of[0], scratch.expected_of[1] = s, j

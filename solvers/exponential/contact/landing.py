@@ -103,7 +103,7 @@ _ERROR_SHARE_FOURTH_ROOT = 3e-2  # the same with u = δ^{1/4}: terms t² = u⁸,
 _DERIVATIVE_SHARE, _MOST_FACTOR = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
 _ROUNDING = 1e-11  # rounding of a margin, in units of its largest
 SHARE_OF_CONTACT = 0.2  # longest landing in time on a border of friction, in units of the contact's duration × reach
-SHARE_SINCE_ENTRY = 0.04  # the same of one from the entry on
+SHARE_SINCE_ENTRY = 0.016  # the same of one from the entry on
 _NEAR_SURFACE = 1e-6  # δ, in units of its peak, below which its rounding may hide a border
 _LEAST_MARGIN = 0.1  # part of a margin's error that counts, in units of the tolerance of δ̇
 _ANY_ERROR = 1e300  # but NaN
@@ -656,8 +656,10 @@ def _locate(problem, tables, state, scratch, stop, border, search):
     variable, forward, span, longest, largest, tolerance, sign, slope = search
     x, span_before = scratch.stages[LANDED], 0.0
     w, begin, end = scratch.stages[START], scratch.margin_begin[stop], scratch.margin_end[stop]
-    value_before, sign = _event_function(problem, tables, state, scratch, stop, border, w, sign, begin)
-    begins_on_border = (value_before if border >= 0 else abs(value_before)) <= _ON_BORDER * largest
+    value_before, begins_on_border = np.inf, False
+    if slope == 0.0 or forward < 0.0 or problem.border_count[stop] > 1:  # else neither is asked for
+        value_before, sign = _event_function(problem, tables, state, scratch, stop, border, w, sign, begin)
+        begins_on_border = (value_before if border >= 0 else abs(value_before)) <= _ON_BORDER * largest
     shortest = 0.0 if border >= 0 and not begins_on_border else 0.1 * span
     if begins_on_border and slope == 0.0:  # the secant needs another point
         span_before = 0.9 * span
