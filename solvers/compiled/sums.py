@@ -26,14 +26,8 @@ def replace_values(old, new):
 
 
 @inlined
-def iterate_power_law(rows, free, force, motion, stiffness, rooted, damping, viscosity):
-    """One fixed-point iteration for the forces at eight nodes; returns Σ change² and Σ force², N².
-
-    ``rows`` (8, 16) are δ and δ̇ at all nodes per unit force at a node. Motion free + Σ_e force[e] rows[e] is written
-    to ``motion`` (2, 8), the new forces K d (1 + a δ̇) + c δ̇ to ``force`` (8,), with d = max(δ, 0), or d^{3/2} if
-    ``rooted``.
-    """
-    old, delta, rate = load8(force, 0), load8(free[0], 0), load8(free[1], 0)
+def add_response(rows, force, delta, rate):
+    """δ and δ̇ at eight nodes, to which those by eight forces are added: Σ_e force[e] rows[e], ``rows`` (8, 16)."""
     delta_2, rate_2 = splat8(0.0), splat8(0.0)  # two independent chains of sums run in parallel
     for e in range(0, WIDTH, 2):
         one, two = splat8(force[e]), splat8(force[e + 1])
@@ -41,7 +35,19 @@ def iterate_power_law(rows, free, force, motion, stiffness, rooted, damping, vis
         rate += one * load8(rows[e], WIDTH)
         delta_2 += two * load8(rows[e + 1], 0)
         rate_2 += two * load8(rows[e + 1], WIDTH)
-    delta, rate = delta + delta_2, rate + rate_2
+    return delta + delta_2, rate + rate_2
+
+
+@inlined
+def iterate_power_law(rows, free, force, motion, stiffness, rooted, damping, viscosity):
+    """One fixed-point iteration for the forces at eight nodes; returns Σ change² and Σ force², N².
+
+    ``rows`` (8, 16) are δ and δ̇ at all nodes per unit force at a node. Motion free + Σ_e force[e] rows[e] is written
+    to ``motion`` (2, 8), the new forces K d (1 + a δ̇) + c δ̇ to ``force`` (8,), with d = max(δ, 0), or d^{3/2} if
+    ``rooted``.
+    """
+    old = load8(force, 0)
+    delta, rate = add_response(rows, force, load8(free[0], 0), load8(free[1], 0))
     store8(motion[0], 0, delta)
     store8(motion[1], 0, rate)
     deep = positive8(delta)

@@ -22,7 +22,6 @@ from solvers.compiled.friction import (
     slip_sign,
     spring_stretch,
     xi_of,
-    xi_rate_of,
 )
 from solvers.compiled.kernels import (
     REAL,
@@ -44,7 +43,7 @@ from solvers.compiled.sums import above, combine
 from solvers.exponential.circles.contact import radial_forces, work_in_circle
 from solvers.exponential.contact.many_stops import pair_response
 from solvers.exponential.contact.nodes import S
-from solvers.problem.friction import ACROSS, ALONG, ANGLE, ARM, CODE, MU, SPIN, STIFFNESS
+from solvers.problem.friction import ACROSS, ALONG, ANGLE, ARM, CODE, MU, SLIDER, SPIN, STIFFNESS
 
 NODE_XI, NODE_XI_RATE, TANGENTIAL, SPARE = range(4)  # rows of `Scratch.slid`: ξ, ξ̇ and F_t at the nodes, scratch
 _TINY = 1e-300  # m²
@@ -89,12 +88,18 @@ def xi_continued(problem, scratch, s, t, x, i):
 @inner
 def xi_and_rate_at_nodes(problem, scratch, s):
     """ξ and ξ̇ at the nodes from the motion of the rows; ξ does not jump by a turn between two nodes."""
-    first, slider, radius = row_of(problem, s), slider_of(problem, s), radius_of(problem, s)
-    u, w, slid, third = scratch.motion[first], scratch.motion[first + 1], scratch.slid[s], count_of(problem, s) > 2
+    first, slider, out = row_of(problem, s), slider_of(problem, s), scratch.slid[s, NODE_XI_RATE]
+    u, w = load8(scratch.motion[first, 0], 0), load8(scratch.motion[first + 1, 0], 0)
+    u_dot, w_dot = load8(scratch.motion[first, 1], 0), load8(scratch.motion[first + 1, 1], 0)
     _xi_at_nodes(problem, scratch, s)
-    for i in range(S):
-        turning = -scratch.motion[first + 2, 1, i] if third else 0.0
-        slid[NODE_XI_RATE, i] = xi_rate_of(radius, slider, u[0, i], u[1, i], w[0, i], w[1, i], turning)
+    if not is_circle(problem, s):
+        store8(out, 0, splat8(0.0) - w_dot)
+        return
+    rate = splat8(abs(radius_of(problem, s))) * (u * w_dot - w * u_dot) / (u * u + w * w)
+    rate = rate + splat8(slider[ARM] * slider[SPIN])
+    if count_of(problem, s) > 2:
+        rate = rate - splat8(math.copysign(1.0, slider[ARM])) * load8(scratch.motion[first + 2, 1], 0)
+    store8(out, 0, rate)
 
 
 @inlined
@@ -160,6 +165,17 @@ def _add_friction(problem, scratch, s):
         store8(out[first + 2], 0, splat8(-math.copysign(1.0, slider_of(problem, s)[ARM])) * force)
 
 
+@inlined
+def _spring_forces(radius, slider, slid):
+    """F_t at the nodes of a slider that sticks."""
+    stretch = load8(slid[NODE_XI], 0) - splat8(slider[SLIDER])
+    store8(slid[TANGENTIAL], 0, splat8(slider[STIFFNESS]) * stretch)
+    if largest8(size8(stretch)) < 0.5 * TURN * abs(radius):
+        return
+    for i in range(S):
+        slid[TANGENTIAL, i] = slider[STIFFNESS] * spring_stretch(radius, slider, slid[NODE_XI, i])
+
+
 @inner
 def _forces(problem, tables, state, scratch, s):
     """Write N and the forces on the rows at the nodes into ``scratch.law_force``, F_t into ``scratch.slid``."""
@@ -173,8 +189,7 @@ def _forces(problem, tables, state, scratch, s):
         state.count[CALLS] += S
     if slider[CODE] == 0.0:
         _xi_at_nodes(problem, scratch, s)
-        for i in range(S):
-            slid[TANGENTIAL, i] = slider[STIFFNESS] * spring_stretch(radius, slider, slid[NODE_XI, i])
+        _spring_forces(radius, slider, slid)
     else:
         store8(slid[TANGENTIAL], 0, splat8(friction_by_normal(slider)) * positive8(load8(scratch.law_force[place], 0)))
     _add_friction(problem, scratch, s)

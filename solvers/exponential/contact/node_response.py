@@ -23,7 +23,7 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.simd import largest8, load8, size8, splat8, store8
 from solvers.compiled.state import CALLS, PEAK_FORCE, T, acts, rate_tolerance
-from solvers.compiled.sums import above, combine
+from solvers.compiled.sums import above, add_response, combine
 from solvers.exponential.circles.contact import radial_forces
 from solvers.exponential.circles.friction import rubbing_forces
 from solvers.exponential.contact.many_stops import (
@@ -295,11 +295,13 @@ def free_response(problem, tables, state, scratch, node_set, level):
 @inlined
 def respond(problem, tables, state, scratch, node_set, level, r):
     """Displacement and rate of row r at the nodes under the present forces, into ``scratch.motion``."""
-    motion, start = scratch.motion[r], scratch.free[r]
+    delta, rate = load8(scratch.free[r, 0], 0), load8(scratch.free[r, 1], 0)
     for u in range(problem.gap.size):
         if acts(problem, state, u):
-            combine(pair_response(problem, tables, scratch, node_set, level, r, u), scratch.force[u], S, start, motion)
-            start = motion
+            rows = pair_response(problem, tables, scratch, node_set, level, r, u)
+            delta, rate = add_response(rows, scratch.force[u], delta, rate)
+    store8(scratch.motion[r, 0], 0, delta)
+    store8(scratch.motion[r, 1], 0, rate)
 
 
 @inner
