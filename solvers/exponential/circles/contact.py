@@ -202,8 +202,7 @@ def work_in_circle(problem, tables, state, scratch, node_set, level, s):
         begin = dot(problem.read[r], state.x, size) - problem.gap[r]
         end = dot(problem.read[r], scratch.x_new, size) - problem.gap[r]
         combine(tables.work[node_set], force, S, None, scratch.trial)
-        for i in range(S):
-            work += scratch.trial[i] * (motion[0, i] - begin)
+        work += sum8(load8(scratch.trial, 0) * (load8(motion[0], 0) - splat8(begin)))
         work += sum8(load8(tables.work_end[node_set], 0) * load8(force, 0)) * (end - begin)
     return work
 

@@ -326,9 +326,7 @@ def _work_of_friction(problem, tables, scratch, node_set, level, s, begin, end):
         return h * sum8(load8(tables.plain[node_set], 0) * load8(slid[TANGENTIAL], 0) * load8(slid[NODE_XI_RATE], 0))
     combine(tables.work[node_set], slid[TANGENTIAL], S, None, slid[SPARE])
     work = sum8(load8(tables.work_end[node_set], 0) * load8(slid[TANGENTIAL], 0)) * (end - begin)
-    for i in range(S):
-        work += slid[SPARE, i] * (slid[NODE_XI, i] - begin)
-    return work
+    return work + sum8(load8(slid[SPARE], 0) * (load8(slid[NODE_XI], 0) - splat8(begin)))
 
 
 @part(RUB_WORK, REAL, *[types.int64] * 3)
