@@ -379,6 +379,12 @@ def _may_be_hidden(scratch, s, j):
     return ripple > scratch.noise[s, j] and lowest < ripple
 
 
+@inlined
+def _ends_with_contact(problem, s, j):
+    """Whether a margin is N or -N of a slider, which falls to zero at the opening anyway."""
+    return rubs(problem, s) and (j == PRESSES or slider_of(problem, s)[CODE] == FREE)
+
+
 @inner
 def border_ahead(problem, tables, state, scratch, node_set, level):
     """(time after the start of the step, element, border) of the first border that the step just tried crosses.
@@ -404,7 +410,7 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
                 return np.inf, UNRESOLVED, -1
             if time < first:
                 first, element, border, scratch.ahead[SLOPE] = time, s, j, slope
-            elif time == np.inf and not (rubs(problem, s) and j == PRESSES):  # at an opening N falls to zero anyway
+            elif time == np.inf and not _ends_with_contact(problem, s, j):
                 _expect(tables, scratch, s, j, node_set, h)
     return first, element, border
 

@@ -447,12 +447,17 @@ def _is_resolved(problem, tables, state, scratch, variable, stop):
     )
 
 
+@inlined
+def _least_distance(problem, state, stop, x):
+    """δ, m, below which a border of friction cannot be told from the opening."""
+    return min(WITHIN_ROUNDING * surface_tolerance(problem, stop, x), _NEAR_SURFACE * state.active[stop, PEAK_DELTA])
+
+
 @merged
 def _falls_on_surface(problem, state, scratch, stop, border):
     """Whether a border passed before the opening just landed on is too near to it to be told from it by δ."""
     x = scratch.stages[LANDED]
-    near = min(WITHIN_ROUNDING * surface_tolerance(problem, stop, x), _NEAR_SURFACE * state.active[stop, PEAK_DELTA])
-    time = near / abs(indentation_rate(problem, stop, x))
+    time = _least_distance(problem, state, stop, x) / abs(indentation_rate(problem, stop, x))
     margins_later(problem, state, scratch, stop, x[state.x.size], x, -time, scratch.margin_before)
     return scratch.margin_before[border] >= -scratch.noise[stop, border]
 
@@ -739,6 +744,8 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
     if scratch.landed[0] != -1:
         return False
     lower, upper = problem.knots[stop, state.segment[stop] - 1], problem.knots[stop, state.segment[stop]]
+    if rubs(problem, stop) and indentation_rate(problem, stop, x) < 0.0:
+        lower += _least_distance(problem, state, stop, x)
     if not lower < indentation(problem, stop, x) < upper:
         return False
     return accept_landing(problem, tables, state, scratch, variable, stop, np.inf, forward * span)
