@@ -93,6 +93,7 @@ _CLASSICAL_UP_TO = 4e-3  # the same by the classical rule, of order 4
 _ON_BORDER = 1e-6  # margin, in units of its largest, below which a landing begins on the border that it ends on
 _STAGNATION = 1e-10  # margin, in units of its largest, below which trials that do not halve it show its rounding
 _FOUND = 1e-6  # the same, up to which a landing has found its border
+_NEAR_ZERO = 1e-4  # the same, up to which another border may be reached together with the one landed on
 _MOST_ROUNDING = 0.01  # the same, up to which rounding of δ may hide a margin's zero
 _PROMISED = 0.01  # the same after a first trial whose slope is known, up to which the landing goes on
 _HALVINGS, _LEAST_SHARE = 30, 1e-3  # of an interval that contains a root; least share of the way to it
@@ -532,6 +533,16 @@ def _was_below(problem, state, scratch, s, border, value, time):
 
 
 @inlined
+def _others_near_zero(problem, scratch, s, border):
+    """Whether another margin of an element is near zero where a landing ends; else none shortly before it counts."""
+    near = False
+    for j in range(problem.border_count[s]):
+        near |= j != border and scratch.margin_end[s, j] <= _NEAR_ZERO * scratch.largest[s, j]
+        scratch.margin_before[j] = scratch.margin_begin[s, j]
+    return near
+
+
+@inlined
 def _may_end_at_opening(problem, tables, state, scratch, stop):
     """Whether a landing may end where a stop with friction opens; the motion is smooth only in u = δ^{1/κ} there."""
     delta, rate = scratch.start_motion[stop, 0], scratch.start_motion[stop, 1]
@@ -736,7 +747,7 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
     if not (found and _within_tolerance(problem, tables, state, scratch, variable, stop, time)):
         return False
     crossed_upward = slope > 0.0
-    if slope == 0.0:
+    if slope == 0.0 or _others_near_zero(problem, scratch, stop, border):
         crossed_upward = border >= 0 and _was_below(problem, state, scratch, stop, border, value, 1e-3 * time)
     if crossed_upward or before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
         return False  # the margin was below zero before, or another surface or bend is crossed first

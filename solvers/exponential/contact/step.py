@@ -194,11 +194,11 @@ def _attempt(problem, tables, state, scratch, node_set, level):
         first, crossing = first_end(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0)
     if crossing == UNRESOLVED:
         return np.inf, np.inf, -1
-    at_once = first == 0.0 and scratch.border[0] >= 0 and problem.table_dt.size > 0
+    at_once = first == 0.0 and scratch.border[0] >= 0 and (problem.table_dt.size > 0 or rubs(problem, crossing))
     if crossing >= 0 and (shortest or not at_once):
         return 1.0 if shortest else np.inf, first, crossing
     error = step_error(problem, tables, state, scratch, node_set, level)
-    if crossing >= 0:  # where a step does not resolve the onset of a load, nothing at its start can be told by it
+    if crossing >= 0:  # a step that does not resolve the motion cannot tell what happens at its start
         return (np.inf, first, crossing) if error <= 1.0 else (error, np.inf, -1)
     return min(error, 1.0) if shortest else error, first, crossing
 
