@@ -74,6 +74,7 @@ _OFF_NODES = 1e-200  # keeps σ off a node where this polynomial is evaluated
 _MOST_ILLINOIS = 6  # iterations for a root of the polynomial through the nodes
 _REST = 1e-14  # rate, in units of the reference speed, below which a rate at rest is rounding
 _INTERPOLATED = 4.0  # rounding of a margin at points around a node, in units of that at the nodes
+_LOWEST = 2  # place in `Scratch.ends`, once the rounding is known, of the lowest margin at the end or between nodes
 _WATCHED_BELOW = 0.2  # margin at a node, in units of the largest, below which the motion around the node is evaluated
 _CHECKED_BELOW = 0.5  # margin at an end of a landing, in the same units, below which a minimum inside is looked for
 _CLEAR = 0.03  # estimate of such a minimum, in the same units, that counts as positive
@@ -335,6 +336,7 @@ def _crossing_between_nodes(problem, tables, state, scratch, s, j, node_set, h):
     """
     ends, values = scratch.ends[ENDS * j : ENDS * (j + 1)], scratch.margin[S * j : S * j + S]
     watched, t = _WATCHED_BELOW * scratch.largest[s, j], tables.times[node_set]
+    ends[_LOWEST] = ends[1]
     for i in range(S):
         before, after = values[i - 1] if i > 0 else ends[0], values[i + 1] if i < S - 1 else ends[1]
         low = values[i] <= min(before, after, watched)
@@ -362,6 +364,7 @@ def _crossing_around(problem, tables, state, scratch, s, j, node_set, h, lowest)
         below[i] = -scratch.margin[S * j + i]
     deep, place = maximum_and_place(below, 1.0, scratch.clipped)
     _margins_at_nodes(problem, tables, state, scratch, s, node_set, h)
+    scratch.ends[ENDS * j + _LOWEST] = min(scratch.ends[ENDS * j + _LOWEST], -deep)
     if deep <= _INTERPOLATED * scratch.noise[s, j]:
         return np.inf
     begin, end = tables.local_interval[node_set, lowest, 0], tables.local_interval[node_set, lowest, 1]
@@ -371,9 +374,9 @@ def _crossing_around(problem, tables, state, scratch, s, j, node_set, h, lowest)
 
 @inlined
 def _may_be_hidden(scratch, s, j):
-    """Whether fast blocks, which the nodes do not resolve, may make a margin negative between them."""
+    """Whether fast blocks, which the nodes do not resolve, may make a margin negative at or between them."""
     ends = scratch.ends[ENDS * j : ENDS * (j + 1)]
-    ripple, lowest = abs(ends[4] - ends[0]) + abs(ends[5] - ends[0]), ends[1]
+    ripple, lowest = abs(ends[4] - ends[0]) + abs(ends[5] - ends[0]), ends[_LOWEST]
     for i in range(S):
         lowest = min(lowest, scratch.margin[S * j + i])
     return ripple > scratch.noise[s, j] and lowest < ripple
