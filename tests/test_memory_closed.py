@@ -46,6 +46,24 @@ def test_borders_of_one_law_that_fall_together_are_passed_one_after_the_other(me
     assert set(run.transitions.event) <= {"contact", "unload", "reload", "open"}
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-10])
+@pytest.mark.parametrize("depth", [1e-2, 1e-3, 1e-4, 1e-5])
+def test_every_short_reversal_of_a_slip_is_found(depth, rtol):
+    """δ̇ = V + A cos θ with A = V/(1 - depth): a slider too weak to be felt sticks where δ̇ < 0, about θ = π and 3π.
+
+    Steps are many radians long, and nothing but the margin tells them to be shorter.
+    """
+    slow, fast = 1e-4, 2640.0
+    swing = System.modal([slow, fast], 0.0, [element(Jenkins(1e-9, 1e-15), -1.0, -1.0)])
+    for phase in np.linspace(-2.5, 2.5, 21):
+        q, v = math.sin(phase) / (1.0 - depth) / fast, math.cos(phase) / (1.0 - depth)
+        run = integrate(swing, [-q, q], [1.0, v], (4.0 * math.pi - phase) / fast, method=Exponential(rtol))
+        assert list(run.transitions.event) == ["slip", "stick", "slip", "stick", "slip"]
+        half = math.acos(1.0 - depth)
+        before = [math.pi - half, 3.0 * math.pi - half]
+        np.testing.assert_allclose(run.transitions.t[1::2] * fast + phase, before, rtol=0, atol=rtol / half)
+
+
 # --- decay and rest --------------------------------------------------------------------------------------------------
 
 
