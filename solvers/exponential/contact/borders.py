@@ -33,6 +33,7 @@ from solvers.compiled.renewals import count_event, margins, margins_before, marg
 from solvers.compiled.simd import load8, splat8, sum8
 from solvers.compiled.sliding import DELTA, RATE
 from solvers.compiled.state import AT_ONCE, LAST_EVENT, PEAK_FORCE, T, rate_tolerance
+from solvers.exponential.circles.friction import TANGENTIAL
 from solvers.exponential.contact.crossings import extremum
 from solvers.exponential.contact.first_step import UNKNOWN
 from solvers.exponential.contact.node_response import (
@@ -283,6 +284,15 @@ def _expect(tables, scratch, s, j, node_set, h):
 
 
 @inlined
+def _has_kink(problem, scratch, s):
+    """Whether a margin of stick, μN - |F_t|, has a kink where F_t changes its sign on the step."""
+    if not (rubs(problem, s) and slider_of(problem, s)[CODE] == STICK):
+        return False
+    forces = scratch.slid[s, TANGENTIAL]
+    return forces[0] * forces[S - 1] < 0.0
+
+
+@inlined
 def _crossing_time(problem, tables, state, scratch, s, j, node_set, h):
     """(time after the start of the step, slope) where a margin falls below zero, by its values at the nodes and ends.
 
@@ -314,7 +324,8 @@ def _crossing_time(problem, tables, state, scratch, s, j, node_set, h):
             if begins_on and i == 0:
                 return 0.5 * after, 0.0
             share = max(before, 0.0) / (max(before, 0.0) - value)
-            return _root_before_node(tables, scratch, s, j, node_set, h, i, t + (after - t) * share)
+            time, slope = _root_before_node(tables, scratch, s, j, node_set, h, i, t + (after - t) * share)
+            return time, slope if not _has_kink(problem, scratch, s) else 0.0
         before, t = value, after
     first = h * tables.times[node_set, 0]
     return _before_first_node(problem, state, scratch, s, j, scratch.ends[ENDS * j], first, h), 0.0
@@ -413,7 +424,7 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
                 return np.inf, UNRESOLVED, -1
             if time < first:
                 first, element, border, scratch.ahead[SLOPE] = time, s, j, slope
-            elif time == np.inf and not _ends_with_contact(problem, s, j):
+            elif time == np.inf and not (_ends_with_contact(problem, s, j) or _has_kink(problem, scratch, s)):
                 _expect(tables, scratch, s, j, node_set, h)
     return first, element, border
 
