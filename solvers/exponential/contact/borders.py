@@ -394,9 +394,15 @@ def _may_be_hidden(scratch, s, j):
 
 
 @inlined
-def _ends_with_contact(problem, s, j):
-    """Whether a margin is N or -N of a slider, which falls to zero at the opening anyway."""
-    return rubs(problem, s) and (j == PRESSES or slider_of(problem, s)[CODE] == FREE)
+def _may_be_expected(problem, scratch, s, j):
+    """Whether the zero of a margin beyond the step can be told by its polynomial.
+
+    That of N or -N, which falls to zero at the opening anyway, is not asked for. Elements without friction are left
+    out: where they slip, steps are so long that what follows them cannot be told.
+    """
+    if not rubs(problem, s) or j == PRESSES:
+        return False
+    return slider_of(problem, s)[CODE] != FREE and not _has_kink(problem, scratch, s)
 
 
 @inner
@@ -424,7 +430,7 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
                 return np.inf, UNRESOLVED, -1
             if time < first:
                 first, element, border, scratch.ahead[SLOPE] = time, s, j, slope
-            elif time == np.inf and not (_ends_with_contact(problem, s, j) or _has_kink(problem, scratch, s)):
+            elif time == np.inf and _may_be_expected(problem, scratch, s, j):
                 _expect(tables, scratch, s, j, node_set, h)
     return first, element, border
 

@@ -673,7 +673,7 @@ def _locate(problem, tables, state, scratch, stop, border, search):
     x, span_before = scratch.stages[LANDED], 0.0
     w, begin, end = scratch.stages[START], scratch.margin_begin[stop], scratch.margin_end[stop]
     value_before, begins_on_border = np.inf, False
-    if slope == 0.0 or forward < 0.0 or problem.border_count[stop] > 1:  # else neither is asked for
+    if slope == 0.0 or forward < 0.0 or problem.border_count[stop] > 1 or not rubs(problem, stop):  # else not asked for
         value_before, sign = _event_function(problem, tables, state, scratch, stop, border, w, sign, begin)
         begins_on_border = (value_before if border >= 0 else abs(value_before)) <= _ON_BORDER * largest
     shortest = 0.0 if border >= 0 and not begins_on_border else 0.1 * span
@@ -691,7 +691,9 @@ def _locate(problem, tables, state, scratch, stop, border, search):
             take_step(problem, tables, state, scratch, variable, stop, forward * span)
         value, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
         if slope != 0.0 and forward > 0.0 and abs(value) > _PROMISED * largest:
-            return span, np.nan, rounding, 0.0  # what the polynomial of a step promised is not there
+            if rubs(problem, stop):
+                return span, np.nan, rounding, 0.0  # what the polynomial of a step promised is not there
+            slope = 0.0  # the step was too long for its polynomial
         if slope == 0.0:
             slope = (value - value_before) / (span - span_before)
             near = slope if abs(change) <= _CLASSICAL_UP_TO * span else 0.0
