@@ -6,7 +6,7 @@ distance g = -δ that opens at the rate v = -δ̇ cannot be reached before
     τ = (v + √(v² + 2 M g))/M,
 
 so steps of at most τ are safe. Close to a contact τ tends to the root from below; within reach of a Taylor
-polynomial of order 6 the root is found on that polynomial, which is exact to rounding there.
+polynomial of order 7 the root is found on that polynomial, which is exact to rounding there.
 
 Under sampled signals whole cells are crossed first. Within a cell of length h, δ exceeds the larger of its values at
 both ends by at most the error of linear interpolation, which one bound e covers for the next m cells:
