@@ -192,6 +192,28 @@ def test_stepping_through_a_coarse_table(dt):
     assert np.abs(ours.q - exact.q).max() < 1e-8 * np.abs(exact.q).max()
 
 
+CELLS = {  # value, slope, curvature of the load at both ends of a cell of 1 s, initial rate, gap, motion of a free mass
+    "quintic": ([[0.0, 0.0, 0.0], [1.0, 5.0, 20.0]], 0.01, 0.02, lambda t: 0.01 * t + t**7 / 42.0),
+    "there and back": ([[8.0, -16.0, 0.0], [-8.0, -16.0, 0.0]], -1.0, 0.4, lambda t: (4.0 - 8.0 / 3.0 * t) * t**2 - t),
+}
+
+
+@pytest.mark.parametrize("k", [0.0, 1e-12, 3.6e-4])
+@pytest.mark.parametrize("name", CELLS)
+def test_contacts_within_a_cell_that_is_short_for_the_structure(name, k):
+    """A mass that hardly moves in a cell but by the load meets a soft stop; it was missed, or met 0.04 s late."""
+    rows, rate, gap, free = CELLS[name]
+    table = Table(1.0, np.vstack([rows, np.zeros(3)]))
+    system = System([[1.0]], [[0.0]], [[k]], [Contact([-1.0], KelvinVoigt(1e-9, 0.0), gap)], [([1.0], table)])
+    ours, theirs = (integrate(system, [0.0], [rate], 1.0, method=m) for m in (Exponential(1e-9), DormandPrince(1e-12)))
+    assert len(theirs.contacts) == 1
+    assert ours.contacts.t_in == pytest.approx(theirs.contacts.t_in, abs=1e-12)
+    assert ours.contacts.speed_in == pytest.approx(theirs.contacts.speed_in, abs=1e-12)
+    if k <= 1e-12:
+        entry = brentq(lambda t: free(t) - gap, 0.5, theirs.contacts.t_in[0] + 0.02, xtol=1e-15)
+        assert ours.contacts.t_in == pytest.approx([entry], abs=1e-12)
+
+
 def test_tables_are_of_real_numbers_in_whatever_form():
     """Whole numbers and lists are tables, alone and beside others; others are refused with what they are."""
     rows = np.array([[1.0, -1.0, 0.0, 1.0, -1.0, 0.0], [0.0, 1.0, 0.0, 0.0, -1.0, 0.0], [1.0, 1.0, 0.0, 1.0, 1.0, 0.0]])

@@ -1,7 +1,7 @@
 """Exact flight: propagators of the blocks, polynomial signals, Taylor steps.
 
 A flight step multiplies every block by its tabulated propagator α I + β A and adds the response to the quintics
-of the sampled signals; a step below the shortest of the tables is a Taylor step of order 7, exact to rounding.
+of the sampled signals; a step below the shortest of the tables is a Taylor step of order 6, exact to rounding.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from solvers.compiled.kernels import at_end, copy, inlined, inner
 from solvers.compiled.simd import WIDTH, bit_pattern, load8, splat8, sqrt8, store8, sum8
 from solvers.compiled.sums import combine
 
-ORDER = 7  # of Taylor steps: signals are quintics of time within a cell, so that s⁽⁵⁾ moves a place by t⁷/5040
-DERIVATIVES = 6  # of a signal within a cell: s, s', …, s⁽⁵⁾
+ORDER = 6  # of Taylor steps
 _LOG_ERROR = int(0.345 * 2**50)  # four times 0.0863, the error of a logarithm linear between powers of two
 SERIES_TERMS = 14  # terms of a series that is exact to rounding up to |λ| x = SERIES_REACH: 0.6^14/14! = 9e-15
 SERIES_REACH = 0.6
@@ -128,7 +127,7 @@ def cross_cell(problem, tables, x, cell, result):
 
 @inner
 def taylor_terms(problem, x, t, terms, signal_terms):
-    """Rows y, y', ..., y⁽⁷⁾ at time t in flight: y⁽ⁱ⁺¹⁾ = A y⁽ⁱ⁾ + load s⁽ⁱ⁾."""
+    """Rows y, y', ..., y⁽⁶⁾ at time t in flight: y⁽ⁱ⁺¹⁾ = A y⁽ⁱ⁾ + load s⁽ⁱ⁾."""
     n = problem.k.size
     for e in range(2 * n):
         terms[0, e] = x[e]
@@ -138,7 +137,7 @@ def taylor_terms(problem, x, t, terms, signal_terms):
         for b in range(n):
             terms[i + 1, b] = terms[i, n + b]
             terms[i + 1, n + b] = -problem.k[b] * terms[i, b] - problem.c[b] * terms[i, n + b]
-        for j in range(problem.table_dt.size if i < DERIVATIVES else 0):
+        for j in range(problem.table_dt.size):
             load = problem.load[problem.table_load[j]]
             for e in range(2 * n):
                 terms[i + 1, e] += signal_terms[j, i] * load[e]
@@ -169,7 +168,7 @@ def fly_series(problem, tables, x, t, span, signal_terms, terms):
             store8(terms[order], i, p)
             store8(terms[order], width + i, v)
             by_p, by_v = splat8(0.0), splat8(0.0)  # of the signals: independent of the term before
-            if order < DERIVATIVES:
+            if order < 6:
                 for j in range(problem.table_dt.size):
                     rows, value = tables.load_rows[problem.table_load[j]], splat8(signal_terms[j, order])
                     by_p += value * load8(rows, i)

@@ -6,7 +6,7 @@ distance g = -δ that opens at the rate v = -δ̇ cannot be reached before
     τ = (v + √(v² + 2 M g))/M,
 
 so steps of at most τ are safe. Close to a contact τ tends to the root from below; within reach of a Taylor
-polynomial of order 7 the root is found on that polynomial, which is exact to rounding there.
+polynomial of order 6 the root is found on that polynomial, which is exact to rounding there.
 
 Under sampled signals whole cells are crossed first. Within a cell of length h, δ exceeds the larger of its values at
 both ends by at most the error of linear interpolation, which one bound e covers for the next m cells:
@@ -54,6 +54,7 @@ from solvers.exponential.flight import (
     weighted_norms,
 )
 
+_PART_OF_CELL = 0.01  # longest Taylor step, in cells of the signals: s⁽⁵⁾ t⁷/5040 of a quintic, left out, is rounding
 _REFRESH = 8  # flight steps between two evaluations of the bound
 _GROUP = 8  # cells that one bound covers: with more the bound grows, with fewer it is computed more often
 
@@ -227,7 +228,8 @@ def _safe_span(problem, tables, state, scratch, span, horizon, renew_bounds):
 def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell, dt_cell):
     """Move by up to ``span``: Taylor step with a search for roots, whole cell, or table. (time, stop or -1)."""
     size, now, stop, x = 2 * problem.k.size, state.now, -1, scratch.split_state
-    sampled, shortest = problem.table_dt.size > 0, tables.flight_step[tables.flight_step.size - 1]
+    sampled = problem.table_dt.size > 0
+    shortest = min(tables.flight_step[tables.flight_step.size - 1], _PART_OF_CELL * dt_cell)
     if span < shortest:
         taylor_terms(problem, state.x, now[T], scratch.terms, scratch.signal_terms)
         h = min(shortest, target - now[T], rest)

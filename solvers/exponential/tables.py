@@ -28,7 +28,7 @@ from solvers.exponential.phi_functions import quintic_responses, signal_response
 from solvers.exponential.responses import fill_propagators
 
 STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # places in `Tables.power_law`
-TAYLOR_REACH = 0.02  # |λ| h up to which a Taylor step is exact to rounding
+TAYLOR_REACH = 0.02  # |λ| h up to which a Taylor step of order 6 is exact to rounding
 _MOST_RADIANS = 2000.0  # |λ| h of the largest contact step
 _CONTACT_REACH = 1e-6  # |λ| h of the smallest one, at most
 _SLOWEST = 1e-9  # rate in units of the fastest, below which blocks do not lengthen the steps in the tables
