@@ -261,13 +261,6 @@ def _continue_after(problem, tables, state, scratch, stop, level, alone):
 
 
 @merged
-def _try_nearest(problem, tables, state, scratch, stop, direction, time_to_border):
-    """Land on the border reached first if that is worth a trial; returns whether it was done."""
-    worth = stop >= 0 and may_land(problem, tables, state, scratch, stop, direction, time_to_border)
-    return worth and _try_landing(problem, tables, state, scratch, stop, direction, time_to_border)
-
-
-@merged
 def _try_landing(problem, tables, state, scratch, stop, direction, time_to_border):
     """Land on the border reached first, and switch its stop; returns whether it was done."""
     stop, direction = land_first(problem, tables, state, scratch, stop, direction, time_to_border)
@@ -281,6 +274,23 @@ def _try_landing(problem, tables, state, scratch, stop, direction, time_to_borde
         if in_contact(state):
             begin_steps(problem, tables, state, scratch, stop)
     return True
+
+
+@merged
+def _try_landing_now(problem, tables, state, scratch, stop, direction, time_to_border):
+    """Land on a border that is known to be ahead, or on the surface reached first if that is worth a trial.
+
+    Returns whether it was done, and the longest step, s, that ends well before both.
+    """
+    longest = 0.8 * time_to_border
+    if scratch.ahead[0] > 0.0:
+        landed, before = _try_border_ahead(problem, tables, state, scratch, time_to_border)
+        if landed:
+            return True, longest
+        longest = min(longest, before)
+    worth = stop >= 0 and may_land(problem, tables, state, scratch, stop, direction, time_to_border)
+    landed = worth and _try_landing(problem, tables, state, scratch, stop, direction, time_to_border)
+    return landed, longest
 
 
 @part(ACCEPT, types.void, *[types.int64] * 3, REAL, types.int64)
@@ -311,6 +321,14 @@ def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wan
     state.count[STEPS] += 1
 
 
+@inlined
+def _end_before(tables, state, scratch, level, stop, first):
+    """Level of a step that ends shortly before what the step tried crosses, so that the next one can land there."""
+    scratch.ahead[0] = state.now[T] + first if scratch.border[0] >= 0 else 0.0
+    scratch.ahead_of[0], scratch.ahead_of[1], scratch.ahead_of[2] = stop, scratch.border[0], 0
+    return min(max(level + 1, level_of(tables, _SHORTLY_BEFORE * first)), level + _CROSSING_KNOWN)
+
+
 @part(CONTACT, types.int64)
 def advance_contact(problem, tables, energy_tables, state, scratch):
     """One accepted step in contact, a landing if a border is near, else by collocation; returns a status code."""
@@ -328,15 +346,10 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
     if control[NEW] == ENTRY and problem.parts[PRESSED] and _switch_pressed(problem, state):
         begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
-    longest, wanted = 0.8 * time_to_border, control[NEXT_LEVEL]
-    if scratch.ahead[0] > 0.0:
-        landed, before = _try_border_ahead(problem, tables, state, scratch, time_to_border)
-        if landed:
-            return RUNNING
-        longest = min(longest, before)
-    if _try_nearest(problem, tables, state, scratch, stop, direction, time_to_border):
+    landed, longest = _try_landing_now(problem, tables, state, scratch, stop, direction, time_to_border)
+    if landed:
         return RUNNING
-    node_set = control[NODE_SET] if control[NEW] else 0
+    node_set, wanted = control[NODE_SET] if control[NEW] else 0, control[NEXT_LEVEL]
     if problem.table_dt.size:
         allowed = longest_under_signals(problem, tables, state, scratch, wanted)
         if allowed == 0.0:
@@ -360,10 +373,8 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
             return LAW_NOT_FINITE if _force_not_finite(problem, state, scratch) else STEP_TOO_SMALL
         copy(scratch.side_at_begin, scratch.side, scratch.side.size)
         state.count[REJECTED] += 1
-        if crossing >= 0:  # end a step shortly before, so that the next one can land
-            scratch.ahead[0] = state.now[T] + first if scratch.border[0] >= 0 else 0.0
-            scratch.ahead_of[0], scratch.ahead_of[1], scratch.ahead_of[2] = crossing, scratch.border[0], 0
-            level = min(max(level + 1, level_of(tables, _SHORTLY_BEFORE * first)), level + _CROSSING_KNOWN)
+        if crossing >= 0:
+            level = _end_before(tables, state, scratch, level, crossing, first)
             continue
         level = min(shortest, level + (1 + int(2.0 / _ORDER * math.log2(error / _ERROR_GOAL)) if error < np.inf else 2))
         wanted = level
