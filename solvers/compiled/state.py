@@ -59,7 +59,7 @@ class State(NamedTuple):
 
     now: Annotated[Any, "6"]  # s: time, flight step, contact step, time of the last event, end of the run, see `summed`
     x: Annotated[Any, "X"]  # of the blocks, then the energy balance in J (impulses in N s), see `kernels`
-    rate: Annotated[Any, "X"]  # of x, per s; stepping methods only
+    rate: Annotated[Any, "X"]  # of x, per s, where a method needs it
     segment: Annotated[Any, "int E"]  # of the law: 0 in flight, j > 0 between the stop's knots j-1 and j
     entry_rate: Annotated[Any, "E"]  # m/s, latched
     active: Annotated[Any, "E, 3"]  # contacts under way, SI units, columns named above
