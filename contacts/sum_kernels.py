@@ -46,7 +46,7 @@ def _call(declared):
     return call
 
 
-_fill, _renew, _slopes = _call(SIGNATURE), _call(RENEW), _call(RENEW_GRADIENT)
+_fill, _renew, _renewal_slopes = _call(SIGNATURE), _call(RENEW), _call(RENEW_GRADIENT)
 
 
 @compiled(njit)
@@ -113,7 +113,7 @@ def parallel_renew_gradient(j, delta, delta_dot, entry_rate, parameters, out):
             mine = j - first if first <= j < first + borders else -1
             rate, own = max(entry_rate, parameters[at + FLOOR]), _from(parameters, at + HEAD)
             block = _from(out, row * width)
-            _slopes((int(parameters[at + RENEWAL_SLOPES]), mine, delta, delta_dot, rate, own, block))
+            _renewal_slopes((int(parameters[at + RENEWAL_SLOPES]), mine, delta, delta_dot, rate, own, block))
             _spread(block, row, count, width)
         first += borders
         row += count
@@ -121,7 +121,7 @@ def parallel_renew_gradient(j, delta, delta_dot, entry_rate, parameters, out):
 
 
 GATE = 5  # numbers before those of a law behind a gate: code, rate at entry, floor, two addresses
-_slopes_of = _call(GRADIENT)
+_force_slopes = _call(GRADIENT)
 
 
 @intrinsic
@@ -150,7 +150,7 @@ def _gate_slopes(delta, delta_dot, parameters):
     """Derivatives of the law behind an open gate by δ, its rate, and the rate at entry, which a floor may hide."""
     d, v, by_delta, by_rate, by_entry = _room(), _room(), _room(), _room(), _room()
     d[0], v[0], rate = max(delta, 0.0), delta_dot, max(parameters[1], parameters[2])
-    _slopes_of((int(parameters[4]), 1, d, v, rate, _from(parameters, GATE), by_delta, by_rate, by_entry))
+    _force_slopes((int(parameters[4]), 1, d, v, rate, _from(parameters, GATE), by_delta, by_rate, by_entry))
     return by_delta[0], by_rate[0], by_entry[0] if parameters[1] > parameters[2] else 0.0
 
 

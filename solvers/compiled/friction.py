@@ -16,7 +16,7 @@ from __future__ import annotations
 import math
 
 from solvers.compiled.decorators import inlined
-from solvers.problem.friction import ACROSS, ALONG, ANGLE, ARM, CODE, FREE, MU, SLIDER, SPIN, STIFFNESS
+from solvers.problem.friction import ACROSS, ALONG, ANGLE, ARM, CODE, FREE, MU, SLIDER, SPIN, STICK, STIFFNESS
 
 TURN = 2.0 * math.pi
 SMALL_ANGLE = 0.1  # tangent up to which the series of the arctangent to the fifteenth power is exact to rounding
@@ -102,7 +102,7 @@ def friction_force(radius, slider, xi, normal):
 
     A step that ends where N does, the slider being free from there on, has stages beyond.
     """
-    if slider[CODE] == 0.0:
+    if slider[CODE] == STICK:
         return slider[STIFFNESS] * spring_stretch(radius, slider, xi)
     if slider[CODE] == FREE:
         return 0.0

@@ -37,7 +37,7 @@ from solvers.compiled.packed import PackedType
 from solvers.compiled.parts import RADIAL_ACCELERATION, RADIAL_MOTION, RADIAL_PUSH, part
 from solvers.compiled.shortcuts import known_by_type
 from solvers.compiled.simd import WIDTH, load8, splat8, store8
-from solvers.problem.friction import ACCOUNTS, ARM, CODE
+from solvers.problem.friction import ACCOUNTS, ARM, CODE, STICK
 
 
 class Problem(NamedTuple):
@@ -491,7 +491,7 @@ def add_friction(problem, s, t, rows, normal, rate):
     """Add N and F_t of a stop in contact to the state's rate, and what its slider's integrals grow by."""
     u, u_dot, w, w_dot, turned, turning = rows
     slider, radius, account = slider_of(problem, s), radius_of(problem, s), problem.friction[s, 1]
-    xi = xi_of(radius, slider, t, u, w, turned) if slider[CODE] == 0.0 else 0.0
+    xi = xi_of(radius, slider, t, u, w, turned) if slider[CODE] == STICK else 0.0
     xi_rate, force = xi_rate_of(radius, slider, u, u_dot, w, w_dot, turning), friction_force(radius, slider, xi, normal)
     _add_to_rows(problem, s, u, w, normal, force, rate)
     rate[account], rate[account + 1], rate[account + 2] = force * xi_rate, force, slip_sign(slider) * xi_rate

@@ -47,11 +47,11 @@ def margins_in(problem, state, s, x, batch, out):
 
 
 @inner
-def margins_before(problem, state, s, delta, rate, time, batch, out):
-    """Margins at a time before the present state, which is extrapolated with its acceleration; after it if negative."""
+def margins_after(problem, state, s, delta, rate, time, batch, out):
+    """Margins a time after the present state, which is extrapolated by its acceleration; before it if negative."""
     acceleration = acceleration_of(problem, s, state.x, state.rate)
-    batch[0] = delta - time * (rate - 0.5 * time * acceleration)
-    batch[1] = rate - time * acceleration
+    batch[0] = delta + time * (rate + 0.5 * time * acceleration)
+    batch[1] = rate + time * acceleration
     margins(problem, state, s, 1, batch[0:1], batch[1:2], out)
 
 

@@ -59,6 +59,7 @@ from solvers.problem.friction import (
     SLIDER,
     SLIDES,
     SPIN,
+    STICK,
     STIFFNESS,
 )
 
@@ -87,7 +88,7 @@ def motion_without_accelerations(problem, s, t, x, point):
     radius, slider, rows = radius_of(problem, s), slider_of(problem, s), rows_at(problem, s, x)
     u, u_dot, w, w_dot, turned, turning = rows
     point[DELTA], point[RATE] = delta_of(radius, rows)
-    point[XI] = xi_of(radius, slider, t, u, w, turned) if slider[CODE] == 0.0 else 0.0
+    point[XI] = xi_of(radius, slider, t, u, w, turned) if slider[CODE] == STICK else 0.0
     point[XI_RATE] = xi_rate_of(radius, slider, u, u_dot, w, w_dot, turning)
     point[ACCELERATION] = point[XI_ACCELERATION] = 0.0
     return rows
@@ -162,9 +163,9 @@ def slider_force(problem, s, segment, entry_rate, t, x):
         return 0.0
     radius, slider, rows = radius_of(problem, s), slider_of(problem, s), rows_at(problem, s, x)
     u, _, w, _, turned, _ = rows
-    xi = xi_of(radius, slider, t, u, w, turned) if slider[CODE] == 0.0 else 0.0
+    xi = xi_of(radius, slider, t, u, w, turned) if slider[CODE] == STICK else 0.0
     normal = normal_force(problem, s, segment, entry_rate, *delta_of(radius, rows))
-    return friction_force(radius, slider, xi, normal if slider[CODE] == 0.0 else max(normal, 0.0))
+    return friction_force(radius, slider, xi, normal if slider[CODE] == STICK else max(normal, 0.0))
 
 
 @inner
@@ -191,7 +192,7 @@ def slider_margins(problem, s, segment, entry_rate, point, out):
     normal = normal_force(problem, s, segment, entry_rate, point[DELTA], point[RATE])
     if code == FREE:
         out[SLIDES] = -normal
-    elif code == 0.0:
+    elif code == STICK:
         out[SLIDES] = slider[MU] * normal - abs(friction_force(radius_of(problem, s), slider, point[XI], normal))
     else:
         out[SLIDES] = code * point[XI_RATE]
@@ -317,11 +318,11 @@ def renew_slider(problem, s, j, entry_rate, segment, t, x, rate_of_x, out):
         if not begins_beyond_zero(problem, s, entry_rate, segment, x):
             growth = normal_rate(problem, s, indentation_rate(problem, s, x), acceleration, entry_rate)
         _latch_stick_or_slip(slider, xi, xi_rate, growth)
-        return STUCK if slider[CODE] == 0.0 else SLIPPED
-    if slider[MU] == 0.0 and slider[CODE] != 0.0:
+        return STUCK if slider[CODE] == STICK else SLIPPED
+    if slider[MU] == 0.0 and slider[CODE] != STICK:
         slider[CODE] = -slider[CODE]
         return SLIPPED
-    if slider[CODE] == 0.0:
+    if slider[CODE] == STICK:
         xi_rounding, rate_rounding = xi_tolerances(problem, s, t, x)
         if abs(spring_stretch(radius, slider, xi)) > xi_rounding:
             slider[CODE] = math.copysign(1.0, force)

@@ -31,7 +31,7 @@ from solvers.compiled.parts import addresses_of
 from solvers.compiled.sliding import SLIPPED, begin_slider, end_slider, is_held, pulls, renew_slider, slider_force
 from solvers.problem import Array, Contact, Forcing, Law, Status, System
 from solvers.problem import event_list as at
-from solvers.problem.friction import ACCOUNTS, BEGUN, CODE, FREE, PEAK, SLIDES, STIFFNESS
+from solvers.problem.friction import ACCOUNTS, BEGUN, CODE, FREE, PEAK, SLIDES, STICK, STIFFNESS
 
 STATUSES = list(Status)
 DONE, RUNNING, STEP_TOO_SMALL, DIVERGED, CHATTER, LOG_FULL, LAW_NOT_FINITE, GAINED = (
@@ -162,7 +162,7 @@ def _begin_in_contact(problem, state, s, under_way):
     if slider[CODE] == FREE or (under_way and pulls(problem, s, state.entry_rate[s], state.x)):
         begin_slider(problem, s, state.now[T], state.x, state.entry_rate[s], under_way)
     slider[BEGUN] = slider_force(problem, s, state.segment[s], state.entry_rate[s], state.now[T], state.x)
-    if slider[CODE] != 0.0:
+    if slider[CODE] != STICK:
         state.x[problem.friction[s, 1] + 2] = abs(slider[BEGUN]) / slider[STIFFNESS]
 
 

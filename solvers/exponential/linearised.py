@@ -190,7 +190,7 @@ def _inside_segment(run, s, x):
 
 @inner
 def _update_sides(run, x):
-    """Force before its cut in a state of a landing, for laws cut at zero force, into ``scratch.unresolved``.
+    """Force before its cut in a state of a landing, for laws cut at zero force, into ``scratch.before_cut``.
 
     Where a landing begins or ends the force may be zero, or rounding; so the force of larger size is kept. Returns
     whether the side of a law has changed by this.
@@ -198,10 +198,10 @@ def _update_sides(run, x):
     problem, tables, past, scratch, changed = run.problem, run.tables, run.past, run.scratch, False
     for s in range(problem.law.size):
         if past.segment[s] > 0 and tables.bend[s] == FORCE:
-            force, before = side_at(problem, tables, past, s, x, scratch.trial), scratch.unresolved[s]
+            force, before = side_at(problem, tables, past, s, x, scratch.trial), scratch.before_cut[s]
             if abs(force) > abs(before):
                 changed |= (force > 0.0) != (before > 0.0)
-                scratch.unresolved[s] = force
+                scratch.before_cut[s] = force
     return changed
 
 
@@ -212,7 +212,7 @@ def _gradient(run, s, batch):
     d, v, rate = batch[0:1], batch[1:2], run.past.entry_rate[s]
     if tables.bend[s] != FORCE:
         contact_gradient(problem, s, d, v, rate, batch[2:3], batch[3:4], batch[4:5])
-    elif run.scratch.unresolved[s] > 0.0:
+    elif run.scratch.before_cut[s] > 0.0:
         batch[0] = max(batch[0], problem.knots[s, 0])
         results = batch[2:3], batch[3:4], batch[4:5]
         call_gradient(tables.uncut_gradient[s], 1, d, v, rate, tables.uncut_parameters[s], results)
@@ -230,7 +230,7 @@ def _force_of_side(run, side, uncut, s, batch, force):
     force[0] = 0.0
     if run.tables.bend[s] != FORCE:
         contact_forces(side, s, d, v, rate, force)
-    elif run.scratch.unresolved[s] > 0.0:
+    elif run.scratch.before_cut[s] > 0.0:
         call_force(run.tables.uncut[s], 1, d, v, rate, uncut, (force,))
 
 
@@ -283,12 +283,12 @@ def _land(run, row):
     w, width, span = scratch.stages[START], past.x.size, row[SPAN]
     start_landing(problem, tables, past, scratch, stop, variable)
     for s in range(problem.law.size):
-        scratch.unresolved[s] = 0.0
+        scratch.before_cut[s] = 0.0
     _update_sides(run, past.x)
     while True:
         landing_step(
             *(problem, tables, False, np.int64(STAGES), variable, stop, span, w, past.segment, past.entry_rate),
-            *(scratch.unresolved, scratch.stages),
+            *(scratch.before_cut, scratch.stages),
         )
         if not _update_sides(run, scratch.stages[LANDED]):
             break

@@ -23,10 +23,10 @@ from solvers.compiled.kernels import (
     slider_of,
     surface_tolerance,
 )
-from solvers.compiled.renewals import count_event, margins, margins_before, margins_in, renew
+from solvers.compiled.renewals import count_event, margins, margins_after, margins_in, renew
 from solvers.compiled.sliding import POINT, XI, XI_RATE, move_point, point_of, slider_margins, xi_tolerances
 from solvers.compiled.state import LAST_EVENT, T, rate_tolerance
-from solvers.problem.friction import CODE
+from solvers.problem.friction import CODE, STICK
 from solvers.stepping.events import NONE, bisection, golden_section, motion_of, point_at, polynomial
 
 _MISSED = 1e-3  # the most, in units of its largest, by which a margin may be negative after a landing on its border
@@ -143,7 +143,7 @@ def _extrapolated(known, time):
         slider_margins(problem, s, state.segment[s], state.entry_rate[s], space.point[1], space.one)
     else:
         delta, rate = indentation_and_rate(problem, s, state.x)
-        margins_before(problem, state, s, delta, rate, -time, space.trial, space.one)
+        margins_after(problem, state, s, delta, rate, time, space.trial, space.one)
     return space.one[j]
 
 
@@ -160,7 +160,7 @@ def _falls_from_zero(known, theta):
     place, highest_margin = golden_section(_margin_at, known, 0.0, theta)
     if highest_margin > space.rounding[s, j]:
         return _zero_between(known, place, theta)
-    if rubs(problem, s) and slider_of(problem, s)[CODE] == 0.0 and state.now[T] == state.now[LAST_EVENT]:
+    if rubs(problem, s) and slider_of(problem, s)[CODE] == STICK and state.now[T] == state.now[LAST_EVENT]:
         return theta
     now, after, before = _extrapolated(known, 0.0), _extrapolated(known, known[3]), _extrapolated(known, -known[3])
     rise, fall = after - before, 2.0 * now - after - before
@@ -268,7 +268,7 @@ def renew_together(problem, state, space, h, element, border):
             move_point(space.point[0], -_SHORTLY * h, space.point[1])
             slider_margins(problem, s, state.segment[s], state.entry_rate[s], space.point[1], space.one)
         else:
-            margins_before(problem, state, s, delta, rate, _SHORTLY * h, space.trial, space.one)
+            margins_after(problem, state, s, delta, rate, -_SHORTLY * h, space.trial, space.one)
         limit = space.at_start[s]
         for j in range(problem.border_count[s]):
             before, rounding, present = max(limit[j], space.one[j]), space.rounding[s, j], space.present[s, j]

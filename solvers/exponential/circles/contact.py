@@ -33,11 +33,12 @@ from solvers.compiled.parts import (
     CIRCLE_WORK,
     part,
 )
-from solvers.compiled.simd import load8, positive8, splat8, sqrt8, store8, sum8
+from solvers.compiled.simd import load8, positive8, splat8, sqrt8, store8
 from solvers.compiled.state import CALLS, T, acts
-from solvers.compiled.sums import above, combine
+from solvers.compiled.sums import above
 from solvers.exponential.contact.many_stops import pair_response
 from solvers.exponential.contact.nodes import S
+from solvers.exponential.contact.step_integrals import resolves_rates, work_by_places, work_by_rates
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 
 _TINY = 1e-300  # m²: makes δ̇ at the centre, where there is no direction, 0 instead of NaN
@@ -190,20 +191,16 @@ def linearise_circle(problem, tables, state, scratch, node_set, level, s, begin)
 
 @part(CIRCLE_WORK, REAL, *[types.int64] * 3)
 def work_in_circle(problem, tables, state, scratch, node_set, level, s):
-    """Work, J, of the forces on all rows of an element over the step just solved; each as in `contact.outputs`."""
+    """Work, J, of the forces on all rows of an element over the step just solved; each as in `step_integrals`."""
     size, h, work = 2 * problem.k.size, tables.contact_step[level], 0.0
-    weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
-    weights = tables.weights[node_set] if weighted else tables.plain[node_set]
     for r in range(problem.first[s], problem.first[s + 1]):
         force, motion = scratch.force[r], scratch.motion[r]
-        if weighted or h * tables.fastest <= 1.0:
-            work += h * sum8(load8(weights, 0) * load8(force, 0) * load8(motion[1], 0))
+        if resolves_rates(tables, node_set, s, h):
+            work += work_by_rates(tables, node_set, s, h, force, motion[1])
             continue
         begin = dot(problem.read[r], state.x, size) - problem.gap[r]
         end = dot(problem.read[r], scratch.x_new, size) - problem.gap[r]
-        combine(tables.work[node_set], force, S, None, scratch.trial)
-        work += sum8(load8(scratch.trial, 0) * (load8(motion[0], 0) - splat8(begin)))
-        work += sum8(load8(tables.work_end[node_set], 0) * load8(force, 0)) * (end - begin)
+        work += work_by_places(tables, node_set, force, motion[0], (begin, end), scratch.trial)
     return work
 
 

@@ -39,15 +39,15 @@ from solvers.compiled.kernels import (
 from solvers.compiled.parts import RUB_FORCES, RUB_GUESS, RUB_NEWTON, RUB_WITHIN, RUB_WORK, part
 from solvers.compiled.simd import largest8, least8, load8, positive8, size8, splat8, store8, sum8
 from solvers.compiled.state import CALLS, T, acts
-from solvers.compiled.sums import above, combine
+from solvers.compiled.sums import above
 from solvers.exponential.circles.contact import radial_forces, work_in_circle
 from solvers.exponential.contact.many_stops import pair_response
 from solvers.exponential.contact.nodes import S
-from solvers.problem.friction import ACROSS, ALONG, ANGLE, ARM, CODE, MU, SLIDER, SPIN, STIFFNESS
+from solvers.exponential.contact.step_integrals import resolves_rates, weights_of, work_by_places, work_by_rates
+from solvers.problem.friction import ACROSS, ALONG, ANGLE, ARM, CODE, MU, SLIDER, SPIN, STICK, STIFFNESS
 
 NODE_XI, NODE_XI_RATE, TANGENTIAL, SPARE = range(4)  # rows of `Scratch.slid`: ξ, ξ̇ and F_t at the nodes, scratch
 _TINY = 1e-300  # m²
-_BRIEF = 1.0  # radians of the fastest block up to which nodes resolve rates
 
 
 @inlined
@@ -187,7 +187,7 @@ def _forces(problem, tables, state, scratch, s):
         above(motion[0], problem.knots[s, 0], scratch.clipped)
         law_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], scratch.law_force[place])
         state.count[CALLS] += S
-    if slider[CODE] == 0.0:
+    if slider[CODE] == STICK:
         _xi_at_nodes(problem, scratch, s)
         _spring_forces(radius, slider, slid)
     else:
@@ -253,7 +253,7 @@ def row_directions(problem, s, u, w, a):
 @inlined
 def friction_by_xi(slider):
     """∂F_t/∂ξ, N/m."""
-    return slider[STIFFNESS] if slider[CODE] == 0.0 else 0.0
+    return slider[STIFFNESS] if slider[CODE] == STICK else 0.0
 
 
 @inlined
@@ -314,19 +314,15 @@ def linearise_rubbing(problem, tables, state, scratch, node_set, level, s, begin
 
 @inner
 def _work_of_friction(problem, tables, scratch, node_set, level, s, begin, end):
-    """∫ F_t dξ, J, over the step just solved, in which ξ goes from ``begin`` to ``end``; see `contact.outputs`."""
+    """∫ F_t dξ, J, over the step just solved, in which ξ goes from ``begin`` to ``end``; see `step_integrals`."""
     slider, slid, h = slider_of(problem, s), scratch.slid[s], tables.contact_step[level]
-    if slider[CODE] == 0.0:
+    if slider[CODE] == STICK:
         radius = radius_of(problem, s)
         first, last = spring_stretch(radius, slider, begin), spring_stretch(radius, slider, end)
         return 0.5 * slider[STIFFNESS] * (last - first) * (last + first)
-    if s == node_set - 1 and tables.weight_exponent[node_set] > 0.0:
-        return h * sum8(load8(tables.weights[node_set], 0) * load8(slid[TANGENTIAL], 0) * load8(slid[NODE_XI_RATE], 0))
-    if h * tables.fastest <= _BRIEF:
-        return h * sum8(load8(tables.plain[node_set], 0) * load8(slid[TANGENTIAL], 0) * load8(slid[NODE_XI_RATE], 0))
-    combine(tables.work[node_set], slid[TANGENTIAL], S, None, slid[SPARE])
-    work = sum8(load8(tables.work_end[node_set], 0) * load8(slid[TANGENTIAL], 0)) * (end - begin)
-    return work + sum8(load8(slid[SPARE], 0) * (load8(slid[NODE_XI], 0) - splat8(begin)))
+    if resolves_rates(tables, node_set, s, h):
+        return work_by_rates(tables, node_set, s, h, slid[TANGENTIAL], slid[NODE_XI_RATE])
+    return work_by_places(tables, node_set, slid[TANGENTIAL], slid[NODE_XI], (begin, end), slid[SPARE])
 
 
 @part(RUB_WORK, REAL, *[types.int64] * 3)
@@ -337,9 +333,7 @@ def work_with_friction(problem, tables, state, scratch, node_set, level, s):
     begin = xi_continued(problem, scratch, s, t, state.x, 0)
     end = xi_continued(problem, scratch, s, t + h, scratch.x_new, S - 1)
     work = _work_of_friction(problem, tables, scratch, node_set, level, s, begin, end)
-    weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
-    weights = tables.weights[node_set] if weighted else tables.plain[node_set]
-    impulse = h * sum8(load8(weights, 0) * load8(slid[TANGENTIAL], 0))
+    impulse = h * sum8(weights_of(tables, node_set, s) * load8(slid[TANGENTIAL], 0))
     state.x[account] += work
     state.x[account + 1] += impulse
     state.x[account + 2] += slip_sign(slider) * (end - begin)

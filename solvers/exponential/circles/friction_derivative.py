@@ -56,7 +56,7 @@ from solvers.exponential.circles.friction import (
     xi_and_rate_at_nodes,
 )
 from solvers.exponential.contact.nodes import S
-from solvers.problem.friction import ARM, CODE, FREE, SLIDER, SPIN, STIFFNESS
+from solvers.problem.friction import ARM, CODE, FREE, SLIDER, SPIN, STICK, STIFFNESS
 
 _OF_SLIDER = 1  # index of s among the latched numbers of an element
 
@@ -100,7 +100,7 @@ def latch_begin(run, s):
     for c in range(derivatives.y.shape[0]):
         change = xi_change(run, past.x, c, s, t) + xi_rate * derivatives.shift[c, s]
         change += explicit if is_parameter(run, c) else 0.0
-        derivatives.latched[c, place] = change if slider[CODE] == 0.0 else 0.0
+        derivatives.latched[c, place] = change if slider[CODE] == STICK else 0.0
     _copy_slider(run, s)
 
 
@@ -177,7 +177,7 @@ def pass_slider(run, s, j):
         else:
             change += (xi_rate - share * normal_rate) * shift
             add_tangential(problem, s, -friction_jump * shift, past.x, derivatives.y[c])
-        derivatives.latched[c, _latched_place(problem, s)] = change if slider[CODE] == 0.0 else 0.0
+        derivatives.latched[c, _latched_place(problem, s)] = change if slider[CODE] == STICK else 0.0
     _copy_slider(run, s)
 
 

@@ -29,7 +29,7 @@ from solvers.compiled.kernels import (
     surface_tolerance,
 )
 from solvers.compiled.parts import BEHIND, PASSED, part
-from solvers.compiled.renewals import count_event, margins, margins_before, margins_in, renew
+from solvers.compiled.renewals import count_event, margins, margins_after, margins_in, renew
 from solvers.compiled.simd import load8, splat8, sum8
 from solvers.compiled.sliding import DELTA, RATE
 from solvers.compiled.state import AT_ONCE, LAST_EVENT, PEAK_FORCE, T, rate_tolerance
@@ -98,7 +98,7 @@ def margins_later(problem, state, scratch, s, t, x, time, out):
         return
     rhs(problem, t, x, state.segment, state.entry_rate, state.rate, scratch.trial)
     delta, rate = indentation_and_rate(problem, s, x)
-    margins_before(problem, state, s, delta, rate, -time, scratch.trial, out)
+    margins_after(problem, state, s, delta, rate, time, scratch.trial, out)
 
 
 @inlined
@@ -212,7 +212,7 @@ def _before_first_node(problem, state, scratch, s, j, start, time, h):
 
 
 @inner
-def _polynomial(tables, scratch, s, j, node_set, sigma):
+def _polynomial(tables, scratch, j, node_set, sigma):
     """Value at σ of the polynomial through margin j at the nodes: Π (σ - σ_i) Σ w_i margin_i/(σ - σ_i)."""
     nodes, product = tables.nodes[node_set], 1.0
     for i in range(S):
@@ -229,16 +229,16 @@ def _root_before_node(tables, scratch, s, j, node_set, h, i, linear):
     """
     left = tables.nodes[node_set, i - 1] if i > 0 else 0.0
     right = tables.nodes[node_set, i] if i < S else 1.0
-    above = scratch.margin[S * j + i - 1] if i > 0 else _polynomial(tables, scratch, s, j, node_set, left)
-    below = scratch.margin[S * j + i] if i < S else _polynomial(tables, scratch, s, j, node_set, right)
+    above = scratch.margin[S * j + i - 1] if i > 0 else _polynomial(tables, scratch, j, node_set, left)
+    below = scratch.margin[S * j + i] if i < S else _polynomial(tables, scratch, j, node_set, right)
     if not below < 0.0 < above:
         return linear, 0.0
     found = _ROOT_FOUND * scratch.largest[s, j]
-    return _root_of_polynomial(tables, scratch, s, j, node_set, h, (left, right, above, below), found)
+    return _root_of_polynomial(tables, scratch, j, node_set, h, (left, right, above, below), found)
 
 
 @inner
-def _root_of_polynomial(tables, scratch, s, j, node_set, h, bracket, found):
+def _root_of_polynomial(tables, scratch, j, node_set, h, bracket, found):
     """(time, slope) of this polynomial's root by the Illinois rule; the value found is at most ``found``.
 
     ``bracket`` is two places σ, then the values there, positive and negative.
@@ -247,7 +247,7 @@ def _root_of_polynomial(tables, scratch, s, j, node_set, h, bracket, found):
     middle, last, value = right, 0.0, below
     for _ in range(_MOST_ILLINOIS):
         middle = right - (right - left) * below / (below - above)
-        value = _polynomial(tables, scratch, s, j, node_set, middle)
+        value = _polynomial(tables, scratch, j, node_set, middle)
         if abs(value) <= found:
             break
         if value > 0.0:
@@ -256,7 +256,7 @@ def _root_of_polynomial(tables, scratch, s, j, node_set, h, bracket, found):
             right, below, above = middle, value, above * (0.5 if last < 0.0 else 1.0)
         last = value
     step, kappa = _SLOPE_STEP * middle, tables.time_exponent[node_set]
-    slope = (_polynomial(tables, scratch, s, j, node_set, middle + step) - value) / step
+    slope = (_polynomial(tables, scratch, j, node_set, middle + step) - value) / step
     return h * middle**kappa, slope / (h * kappa * middle ** (kappa - 1.0))
 
 
@@ -273,11 +273,11 @@ def _expect(tables, scratch, s, j, node_set, h):
     bent = (fall - before) / (1.0 - nodes[S - 2]) * (last - nodes[S - 1])
     if end <= 0.0 or fall <= 0.0 or end > (fall + bent) * (last - 1.0):
         return
-    below, above = _polynomial(tables, scratch, s, j, node_set, last), _polynomial(tables, scratch, s, j, node_set, 1.0)
+    below, above = _polynomial(tables, scratch, j, node_set, last), _polynomial(tables, scratch, j, node_set, 1.0)
     if not below < 0.0 < above:
         return
     found = _ROOT_EXPECTED * scratch.largest[s, j]
-    time, slope = _root_of_polynomial(tables, scratch, s, j, node_set, h, (1.0, last, above, below), found)
+    time, slope = _root_of_polynomial(tables, scratch, j, node_set, h, (1.0, last, above, below), found)
     if time < scratch.expected[0]:
         scratch.expected[0], scratch.expected[SLOPE] = time, slope
         scratch.expected_of[0], scratch.expected_of[1] = s, j

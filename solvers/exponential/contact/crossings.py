@@ -93,7 +93,7 @@ def _rate_changes_sign(rates, begin, end, up, down):
 
 
 @merged
-def _leaves_between_points(problem, tables, state, scratch, node_set, h, s, lower, upper):
+def _leaves_between_points(problem, tables, scratch, node_set, h, s, lower, upper):
     """Whether δ of stop s leaves [lower, upper] at a node or the end of the step, or between two of them."""
     motion = motion_of(problem, scratch, s)
     t, delta, rate = 0.0, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
@@ -194,15 +194,13 @@ def leaves_segment(problem, tables, state, scratch, node_set, level):
             return True
         if segment == 0 and largest_indentation(problem, tables, state, scratch, node_set, h, s) > upper + tolerance:
             return True
-        if _leaves_between_points(
-            problem, tables, state, scratch, node_set, h, s, lower - tolerance, upper + tolerance
-        ):
+        if _leaves_between_points(problem, tables, scratch, node_set, h, s, lower - tolerance, upper + tolerance):
             return True
     return False
 
 
 @inlined
-def _sides(problem, tables, state, s, n, delta, rate, out):
+def _sides(tables, state, s, n, delta, rate, out):
     """Event function of a bend, δ̇ or the force before its cut, at n points with δ >= 0, into ``out``."""
     if tables.bend[s] == RATE:
         copy(rate, out, n)
@@ -215,7 +213,7 @@ def side_at(problem, tables, state, s, x, batch):
     """The same in the state x; ``batch`` holds three numbers."""
     batch[0] = max(indentation(problem, s, x), problem.knots[s, 0])
     batch[1] = indentation_rate(problem, s, x)
-    _sides(problem, tables, state, s, 1, batch[0:1], batch[1:2], batch[2:3])
+    _sides(tables, state, s, 1, batch[0:1], batch[1:2], batch[2:3])
     return batch[2]
 
 
@@ -241,7 +239,7 @@ def first_bend(problem, tables, state, scratch, node_set, level, is_new):
         values, begin = scratch.bend_values, side_at(problem, tables, state, s, state.x, scratch.trial)
         motion = motion_of(problem, scratch, s)
         above(motion[0], problem.knots[s, 0], scratch.clipped)
-        _sides(problem, tables, state, s, S, scratch.clipped, motion[1], values)
+        _sides(tables, state, s, S, scratch.clipped, motion[1], values)
         values[S] = side_at(problem, tables, state, s, scratch.x_new, scratch.trial)
         largest = abs(begin)
         for i in range(S + 1):
@@ -287,7 +285,7 @@ def _bend_between_nodes(problem, tables, state, scratch, node_set, h, s, begin, 
             continue
         motion_around(problem, tables, state, scratch, node_set, h, s, i)
         above(scratch.local_motion[DELTAS], problem.knots[s, 0], scratch.clipped)
-        _sides(problem, tables, state, s, S, scratch.clipped, scratch.local_motion[RATES], there)
+        _sides(tables, state, s, S, scratch.clipped, scratch.local_motion[RATES], there)
         for j in range(S):
             there[j] *= -side
         deep, place = maximum_and_place(there, 1.0, scratch.clipped)
@@ -297,53 +295,85 @@ def _bend_between_nodes(problem, tables, state, scratch, node_set, h, s, begin, 
     return np.inf
 
 
+@inlined
+def _leaves_on_landing(problem, state, s, w, x, slopes, long):
+    """Stop s if its δ has left its segment where a landing ends, `TOO_LONG` if it has done so in between, or `CLEAR`.
+
+    ``slopes`` are its δ̇ in the states w and x; a landing that is not ``long`` is not looked into.
+    """
+    width, segment = state.x.size, state.segment[s]
+    a, b, tolerance = indentation(problem, s, w), indentation(problem, s, x), surface_tolerance(problem, s, x)
+    upper = problem.knots[s, segment] + tolerance
+    lower = problem.knots[s, segment - 1] - tolerance if segment > 0 else -np.inf
+    if not lower <= b <= upper:
+        return s
+    if long and _cubic_leaves(x[width] - w[width], a, slopes[0], b, slopes[1], lower, upper):
+        return TOO_LONG
+    return CLEAR
+
+
+@inlined
+def _crosses_bend(problem, tables, state, scratch, s, w, x):
+    """Whether a stop crosses its bend on a landing that is not on it."""
+    side = scratch.side[s]
+    before = side * side_at(problem, tables, state, s, w, scratch.trial)
+    if side * side_at(problem, tables, state, s, x, scratch.trial) < -_TOGETHER * abs(before):
+        return True
+    turns = tables.bend[s] == RATE and not is_circle(problem, s)
+    return turns and _turns_inside(problem, scratch.stages, s, side, _TOGETHER * abs(before), state.x.size)
+
+
+@inlined
+def _passes_cut(problem, tables, state, scratch, stop, s, w, x):
+    """Whether a force that is cut at zero falls to zero, or is no longer cut, on a landing of ``stop`` on a knot.
+
+    The force of a light dashpot may change its sign behind the last stage.
+    """
+    if _pulls_inside(scratch.stages, 2 * problem.k.size + 3 + 2 * s, state.x.size):
+        return True
+    if s != stop:
+        return False
+    if scratch.side[s] > 0.0:
+        return side_at(problem, tables, state, s, x, scratch.trial) < 0.0
+    return scratch.side[s] < 0.0 and _pushes_at_end(problem, tables, state, scratch, s, w, x)
+
+
+@inlined
+def _peaks_on_landing(problem, tables, state, scratch, stop, s, slopes):
+    """Whether δ or the force of stop s has a maximum inside a landing; δ of one with a bend at δ̇ = 0 may end on it."""
+    # a law that opens may have a border where δ̇ falls to zero
+    rest = -_TOGETHER * slopes[0] if problem.opening[s] >= 0 else 0.0
+    if slopes[0] > 0.0 and slopes[1] < rest and (s != stop or tables.bend[s] != RATE):
+        return True
+    column, known = 2 * problem.k.size + 3 + 2 * s, state.active[s, PEAK_FORCE]
+    return force_turns(scratch.stages, column, state.x.size, known, 1.0)
+
+
 @inner
 def before_landing(problem, tables, state, scratch, stop, bends, w, x):
     """Whether anything but the landing of ``stop`` happens between the states w and x, which end in times.
 
-    Returns `CLEAR`, `TOO_LONG`, or another stop that has crossed a border of its segment. ``bends`` tells that the
-    landing is on a bend or border; then a maximum of δ of ``stop`` counts, too. No peak may lie inside a landing, which
-    has no dense output.
+    Returns `CLEAR`, `TOO_LONG`, or another stop that has left its segment. ``bends`` tells that the landing is on a
+    bend or border; then a maximum of δ of ``stop`` counts, too. No peak may lie inside a landing, which has no dense
+    output.
     """
-    size, width = 2 * problem.k.size, state.x.size
-    d = x[width] - w[width]
-    long = d > 4.0 * tables.contact_step[tables.contact_step.size - 1]
+    width = state.x.size
+    long = x[width] - w[width] > 4.0 * tables.contact_step[tables.contact_step.size - 1]
     for s in range(problem.law.size):
-        segment, slope_a, slope_b = state.segment[s], 0.0, 0.0
+        slopes = 0.0, 0.0
         if s != stop or bends:
-            slope_a, slope_b = indentation_rate(problem, s, w), indentation_rate(problem, s, x)
+            slopes = indentation_rate(problem, s, w), indentation_rate(problem, s, x)
         if s != stop:
-            a, b = indentation(problem, s, w), indentation(problem, s, x)
-            tolerance = surface_tolerance(problem, s, x)
-            upper = problem.knots[s, segment] + tolerance
-            lower = problem.knots[s, segment - 1] - tolerance if segment > 0 else -np.inf
-            if not lower <= b <= upper:
-                return s
-            if long and _cubic_leaves(d, a, slope_a, b, slope_b, lower, upper):
-                return TOO_LONG
-        if not long or segment == 0 or is_open(problem, s):
+            found = _leaves_on_landing(problem, state, s, w, x, slopes, long)
+            if found != CLEAR:
+                return found
+        if not long or state.segment[s] == 0 or is_open(problem, s) or not begins_and_ends(problem, s):
             continue
-        if not begins_and_ends(problem, s):
-            continue
-        # a law that opens may have a border where δ̇ falls to zero
-        rest = -_TOGETHER * slope_a if problem.opening[s] >= 0 else 0.0
-        if slope_a > 0.0 and slope_b < rest and (s != stop or tables.bend[s] != RATE):
+        if s != stop and tables.bend[s] > 0.0 and _crosses_bend(problem, tables, state, scratch, s, w, x):
             return TOO_LONG
-        if s != stop and tables.bend[s] > 0.0:
-            before = scratch.side[s] * side_at(problem, tables, state, s, w, scratch.trial)
-            if scratch.side[s] * side_at(problem, tables, state, s, x, scratch.trial) < -_TOGETHER * abs(before):
-                return TOO_LONG
-            turns = tables.bend[s] == RATE and not is_circle(problem, s)
-            if turns and _turns_inside(problem, scratch.stages, s, scratch.side[s], _TOGETHER * abs(before), width):
-                return TOO_LONG
-        if not bends and tables.bend[s] == FORCE:
-            if _pulls_inside(scratch.stages, size + 3 + 2 * s, width):
-                return TOO_LONG
-            if s == stop and scratch.side[s] > 0.0 and side_at(problem, tables, state, s, x, scratch.trial) < 0.0:
-                return TOO_LONG  # behind the last stage, where the force of a light dashpot turns
-            if s == stop and scratch.side[s] < 0.0 and _pushes_at_end(problem, tables, state, scratch, s, w, x):
-                return TOO_LONG  # its cut ends on the way
-        if force_turns(scratch.stages, size + 3 + 2 * s, width, state.active[s, PEAK_FORCE], 1.0):
+        if not bends and tables.bend[s] == FORCE and _passes_cut(problem, tables, state, scratch, stop, s, w, x):
+            return TOO_LONG
+        if _peaks_on_landing(problem, tables, state, scratch, stop, s, slopes):
             return TOO_LONG
     return CLEAR
 
@@ -354,7 +384,7 @@ def _pushes_at_end(problem, tables, state, scratch, s, w, x):
     batch = scratch.trial
     batch[0] = max(indentation(problem, s, x), _JUST_INSIDE * indentation(problem, s, w))
     batch[1] = indentation_rate(problem, s, x)
-    _sides(problem, tables, state, s, 1, batch[0:1], batch[1:2], batch[2:3])
+    _sides(tables, state, s, 1, batch[0:1], batch[1:2], batch[2:3])
     return batch[2] > 0.0
 
 

@@ -23,15 +23,14 @@ from solvers.exponential.contact.first_step import (
     latest_entered,
 )
 from solvers.exponential.contact.landing import (
-    SHARE_OF_CONTACT,
-    SHARE_SINCE_ENTRY,
     accept_landing,
     error_in_time,
     longest_time,
+    promising_time,
     take_step,
 )
 from solvers.exponential.contact.landing_step import SINCE, TIME, start_landing
-from solvers.exponential.contact.node_response import LANDED, REACH, START
+from solvers.exponential.contact.node_response import LANDED, START
 from solvers.exponential.flight import cell_of
 
 
@@ -51,12 +50,12 @@ def _time_to_kink(problem, t, horizon):
 
 
 @inlined
-def _promising(problem, tables, state, scratch, share):
+def _promising(problem, tables, state, scratch, variable):
     """Length, s, of a landing in time above which it would hardly be within the tolerance."""
     longest = longest_time(problem, tables, state, scratch)
     for s in range(problem.law.size):
-        if state.segment[s] > 0 and scratch.duration[s] > 0.0:
-            longest = min(longest, share * scratch.accuracy[REACH] * scratch.duration[s])
+        if state.segment[s] > 0:
+            longest = min(longest, promising_time(scratch, variable, s))
     return longest
 
 
@@ -67,7 +66,7 @@ def _land(problem, tables, state, scratch, time):
     if control[NEW] == ENTRY and control[NODE_SET] > 0:
         stop, variable = control[NODE_SET] - 1, np.int64(SINCE)
         span = time ** (1.0 / tables.time_exponent[stop + 1])
-    if time > _promising(problem, tables, state, scratch, SHARE_OF_CONTACT if variable == TIME else SHARE_SINCE_ENTRY):
+    if time > _promising(problem, tables, state, scratch, variable):
         return False
     start_landing(problem, tables, state, scratch, stop, variable)
     w, x = scratch.stages[START], scratch.stages[LANDED]
@@ -94,7 +93,7 @@ def step_to_kink(problem, tables, state, scratch, horizon):
 
 
 @inner
-def longest_under_signals(problem, tables, state, scratch, level):
+def land_on_kink_or_limit(problem, tables, state, scratch, level):
     """Longest step, s, that sampled loads allow: to their next kink, if a step of a level reaches so far, and a cell
     beyond the end of the run. It is 0 if a step to the kink has been done.
     """

@@ -23,6 +23,7 @@ is too strong for an explicit step. A landing stays within a cell of sampled sig
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -83,7 +84,7 @@ from solvers.exponential.contact.node_response import (
 )
 from solvers.exponential.contact.peaks import state_peaks
 from solvers.exponential.contact.slider_margins import margin_rounding
-from solvers.problem.friction import CODE, FREE, MU, PEAK, SLIDES, STIFFNESS
+from solvers.problem.friction import CODE, FREE, MU, PEAK, SLIDES, STICK, STIFFNESS
 
 OPENED = 2  # place in `Scratch.landed`: 1 + stop whose opening the step in ``scratch.stages`` ends at, or 0
 LAST_RESORT = 3  # the same: 1 where no step could end before the border, nor the landing last longer than one
@@ -103,8 +104,8 @@ _ERROR_SHARE = 0.1  # part of the embedded difference that counts as the error
 _ERROR_SHARE_FOURTH_ROOT = 3e-2  # the same with u = δ^{1/4}: terms t² = u⁸, exact in the step, make up the difference
 _DERIVATIVE_SHARE, _MOST_FACTOR = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
 _ROUNDING = 1e-11  # rounding of a margin, in units of its largest
-SHARE_OF_CONTACT = 0.2  # longest landing in time on a border of friction, in units of the contact's duration × reach
-SHARE_SINCE_ENTRY = 0.016  # the same of one from the entry on
+_SHARE_OF_CONTACT = 0.2  # longest landing in time on a border of friction, in units of the contact's duration × reach
+_SHARE_SINCE_ENTRY = 0.016  # the same of one from the entry on
 _NEAR_SURFACE = 1e-6  # δ, in units of its peak, below which its rounding may hide a border
 _LEAST_MARGIN = 0.1  # part of a margin's error that counts, in units of the tolerance of δ̇
 _ANY_ERROR = 1e300  # but NaN
@@ -112,6 +113,19 @@ _LEAST_RATE = 0.5  # δ̇ at the end of a landing, in units of that at its start
 _LEAST_RATE_FOURTH_ROOT = 0.8  # the same with u = δ^{1/4}: under constant deceleration the difference is zero at 0.65
 _LAST_STEP = 0.09  # indentation, in units of the deepest, below which a landing on δ = 0 is tried
 _LAST_STEP_ROOT, _MOST_ROOT = 0.2, 0.25  # the same with u = δ^{1/2}, over reach², and at most: errors grow like u⁹
+
+
+class Search(NamedTuple):
+    """How a landing on a bend or border is looked for."""
+
+    variable: int  # of the step, see the module
+    forward: float  # 1, or -1 where the variable falls
+    first: float  # length of the first trial
+    longest: float  # length up to which a zero is looked for
+    largest: float  # scale of the event function
+    tolerance: float  # value of the event function that is zero
+    sign: float  # of the slip that begins, see `_event_function`; 0 if none does
+    slope: float  # of the event function at the first trial; 0 if it is not known
 
 
 def landing_reach(rtol: float) -> float:
@@ -322,7 +336,7 @@ def accept_landing(problem, tables, state, scratch, variable, stop, level, span)
     if is_planar(problem):
         for s in range(problem.friction.shape[0]):
             turns = rubs(problem, s) and state.segment[s] > 0 and _friction_peaks_inside(problem, scratch, size, s)
-            scratch.unresolved[s] = 1.0 if turns else 0.0
+            scratch.turns[s] = 1 if turns else 0
     copy(x, state.x, size)
     while True:
         due = state.due[state.count[SAMPLED]]
@@ -342,7 +356,7 @@ def accept_landing(problem, tables, state, scratch, variable, stop, level, span)
             break
     if is_planar(problem):
         for s in range(problem.friction.shape[0]):
-            if scratch.unresolved[s] > 0.0:
+            if scratch.turns[s] > 0:
                 _locate_friction_peak(problem, tables, state, scratch, variable, stop, span, s)
     if state.event_record.shape[0]:
         write_event(state, LANDING, t, landed, span, variable, stop, w)
@@ -385,19 +399,19 @@ def _derivative_factor(problem, tables, state, stop, w, x):
 
 @inlined
 def _knot(problem, state, stop, direction):
-    """Indentation, m, at the upper (direction 1) or lower (-1) border of the stop's segment."""
+    """Indentation, m, at the upper (direction 1) or lower (-1) knot of the stop's segment."""
     return problem.knots[stop, state.segment[stop] - (1 if direction < 0 else 0)]
 
 
 @inlined
-def may_land(problem, tables, state, scratch, stop, direction, time_to_border):
-    """Whether a landing on the border of ``stop`` in a direction, about ``time_to_border`` s ahead, is worth a trial.
+def may_land(problem, tables, state, scratch, stop, direction, time_to_knot):
+    """Whether a landing on the knot of ``stop`` in a direction, about ``time_to_knot`` s ahead, is worth a trial.
 
     It reads δ and δ̇ at the start of the step from ``scratch.start_motion``. What moves the other way turns first.
-    One just entered, which the landing of another sees leave, lies on the border: it would leave at once, for ever.
+    One just entered, which the landing of another sees leave, lies on the knot: it would leave at once, for ever.
     """
     delta, rate = scratch.start_motion[stop, 0], scratch.start_motion[stop, 1]
-    if time_to_border > longest_time(problem, tables, state, scratch) or direction * rate <= rate_tolerance(
+    if time_to_knot > longest_time(problem, tables, state, scratch) or direction * rate <= rate_tolerance(
         problem, stop, state.x
     ):
         return False
@@ -464,15 +478,15 @@ def _falls_on_surface(problem, state, scratch, stop, border):
 
 
 @merged
-def land(problem, tables, state, scratch, stop, direction, time_to_border):
-    """Try to land on the border of ``stop`` in a direction, 1 up or -1 down, about ``time_to_border`` s ahead.
+def land(problem, tables, state, scratch, stop, direction, time_to_knot):
+    """Try to land on the knot of ``stop`` in a direction, 1 up or -1 down, about ``time_to_knot`` s ahead.
 
     Returns ``stop`` after a landing, another stop if that crosses a border before, else -1. If -1 is due to a border of
     a law with memory that is crossed before, ``scratch.landed`` holds its element and number.
     """
     size, t, rate = state.x.size, state.now[T], scratch.start_motion[stop, 1]
     scratch.landed[0], scratch.landed[OPENED] = -1, 0
-    if not may_land(problem, tables, state, scratch, stop, direction, time_to_border):
+    if not may_land(problem, tables, state, scratch, stop, direction, time_to_knot):
         return -1
     longest, kappa = longest_time(problem, tables, state, scratch), tables.time_exponent[1 + stop]
     leaving = direction < 0 and state.segment[stop] == 1
@@ -483,7 +497,7 @@ def land(problem, tables, state, scratch, stop, direction, time_to_border):
     take_step(problem, tables, state, scratch, variable, stop, span)
     landed = x[size]
     time_rounding = surface_tolerance(problem, stop, state.x) / abs(rate)  # the distance may be rounding
-    if not t <= landed <= t + min(4.0 * time_to_border, longest) + time_rounding:
+    if not t <= landed <= t + min(4.0 * time_to_knot, longest) + time_rounding:
         return -1
     if not _is_resolved(problem, tables, state, scratch, variable, stop):
         return -1
@@ -552,7 +566,7 @@ def _may_end_at_opening(problem, tables, state, scratch, stop):
 
 
 @inlined
-def _margin_before_opening(problem, scratch, stop, kappa, sign, begin, end, force):
+def _margin_before_opening(problem, scratch, stop, sign, begin, end, force):
     """Coefficients of 1, r, r^κ, r^{κ+1} and r^{2κ} of a margin before the opening, r = 1 at the start and 0 there.
 
     N is proportional to r^{κ+1}, the time to r^κ. A slider that sticks has μN - σF_t with F_t of second order in time,
@@ -560,7 +574,7 @@ def _margin_before_opening(problem, scratch, stop, kappa, sign, begin, end, forc
     ``scratch.point`` is that of the start.
     """
     slider, rate = slider_of(problem, stop), scratch.point[1, XI_RATE]
-    if slider[CODE] == 0.0:
+    if slider[CODE] == STICK:
         change = sign * force + end
         slope = sign * slider[STIFFNESS] * rate * scratch.start_motion[stop, 0] / scratch.start_motion[stop, 1]
         return end, 0.0, slope - 2.0 * change, begin + abs(force), change - slope
@@ -595,7 +609,7 @@ def _guess_before_opening(problem, tables, state, scratch, stop, border, guess, 
     ``opened`` tells that the step to the opening has been made.
     """
     u, delta, slider = scratch.stages[START, state.x.size + 1], scratch.start_motion[stop, 0], slider_of(problem, stop)
-    w, kappa, sticks = scratch.stages[START], tables.time_exponent[1 + stop], 1.0 if slider[CODE] == 0.0 else 0.0
+    w, kappa, sticks = scratch.stages[START], tables.time_exponent[1 + stop], 1.0 if slider[CODE] == STICK else 0.0
     margins, x, radius = scratch.margin_end[stop], scratch.stages[LANDED], radius_of(problem, stop)
     if not opened:
         take_step(problem, tables, state, scratch, np.int64(ROOT), stop, -u)
@@ -607,7 +621,7 @@ def _guess_before_opening(problem, tables, state, scratch, stop, border, guess, 
     rounding = margin_rounding(problem, state, stop, border, state.now[T], state.x)
     scratch.largest[stop, border], scratch.noise[stop, border] = largest, max(_ROUNDING * largest, 2.0 * rounding)
     if end < 0.0 and border == SLIDES and slider[CODE] != FREE:
-        coefficients = _margin_before_opening(problem, scratch, stop, kappa, sign, begin, end, force)
+        coefficients = _margin_before_opening(problem, scratch, stop, sign, begin, end, force)
         r, slope = _root_before_opening(coefficients, kappa)
         if r < 1.0 - _LEAST_SHARE:
             return u * (1.0 - r), sign, -slope / u
@@ -616,12 +630,12 @@ def _guess_before_opening(problem, tables, state, scratch, stop, border, guess, 
 
 
 @inlined
-def _promising(problem, scratch, variable, stop):
-    """Length, s, of a landing in time above which it would hardly be within the tolerance, by a contact's duration."""
-    if not rubs(problem, stop) or scratch.duration[stop] == 0.0:
+def promising_time(scratch, variable, s):
+    """Length, s, of a landing in time above which it would hardly be within the tolerance, by the contact of stop s."""
+    if scratch.duration[s] == 0.0:
         return np.inf
-    share = SHARE_SINCE_ENTRY if variable == SINCE else SHARE_OF_CONTACT
-    return share * scratch.accuracy[REACH] * scratch.duration[stop]
+    share = _SHARE_SINCE_ENTRY if variable == SINCE else _SHARE_OF_CONTACT
+    return share * scratch.accuracy[REACH] * scratch.duration[s]
 
 
 @inlined
@@ -660,20 +674,34 @@ def _rounded(problem, tables, scratch, stop, size):
     return time / max(kappa * raised(abs(x[size + 1]), kappa - 1.0), 1e-300)
 
 
+@inlined
+def _try_length(problem, tables, state, scratch, search, stop, span, before):
+    """Take the step of length ``span``; if the last trial, of length ``before``, is near, by a short step from there.
+
+    Returns whether it was near.
+    """
+    change, variable = span - before, search.variable
+    if abs(change) > _CLASSICAL_UP_TO * span:
+        take_step(problem, tables, state, scratch, variable, stop, search.forward * span)
+        return False
+    count = 2 if abs(change) <= _MIDPOINT_UP_TO * span else 4
+    _short_step(problem, tables, state, scratch, variable, stop, search.forward * change, count)
+    return True
+
+
 @merged
 def _locate(problem, tables, state, scratch, stop, border, search):
     """Locate a zero of the event function by the secant rule, safeguarded by a bracket.
 
     Returns (length, remaining value, its rounding, by that of δ too, slope there or 0 if it is not known). The value is
     NaN if there is no zero up to ``longest``. Trials that differ little are short steps from the last one.
-    ``search`` is (variable, sign of its direction, first trial, longest, scale of the event function, tolerance,
-    sign of `_event_function`, slope at the first trial or 0).
     """
     variable, forward, span, longest, largest, tolerance, sign, slope = search
     x, span_before = scratch.stages[LANDED], 0.0
     w, begin, end = scratch.stages[START], scratch.margin_begin[stop], scratch.margin_end[stop]
     value_before, begins_on_border = np.inf, False
-    if slope == 0.0 or forward < 0.0 or problem.border_count[stop] > 1 or not rubs(problem, stop):  # else not asked for
+    # With a known slope and no other margin of friction to compare, the value at the start is not needed.
+    if slope == 0.0 or forward < 0.0 or problem.border_count[stop] > 1 or not rubs(problem, stop):
         value_before, sign = _event_function(problem, tables, state, scratch, stop, border, w, sign, begin)
         begins_on_border = (value_before if border >= 0 else abs(value_before)) <= _ON_BORDER * largest
     shortest = 0.0 if border >= 0 and not begins_on_border else 0.1 * span
@@ -683,12 +711,7 @@ def _locate(problem, tables, state, scratch, stop, border, search):
         value_before, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
     low, high, rounding, near = span_before if value_before > 0.0 else 0.0, longest, 0.0, slope
     for _ in range(_MOST_BORDER_TRIALS):
-        change = span - span_before
-        if abs(change) <= _CLASSICAL_UP_TO * span:
-            count = 2 if abs(change) <= _MIDPOINT_UP_TO * span else 4
-            _short_step(problem, tables, state, scratch, variable, stop, forward * change, count)
-        else:
-            take_step(problem, tables, state, scratch, variable, stop, forward * span)
+        is_near = _try_length(problem, tables, state, scratch, search, stop, span, span_before)
         value, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
         if slope != 0.0 and forward > 0.0 and abs(value) > _PROMISED * largest:
             if rubs(problem, stop):
@@ -696,7 +719,7 @@ def _locate(problem, tables, state, scratch, stop, border, search):
             slope = 0.0  # the step was too long for its polynomial
         if slope == 0.0:
             slope = (value - value_before) / (span - span_before)
-            near = slope if abs(change) <= _CLASSICAL_UP_TO * span else 0.0
+            near = slope if is_near else 0.0
         rounding = _STAGNATION * largest
         if rubs(problem, stop) and variable != TIME:
             of_delta = slope * _rounded(problem, tables, scratch, stop, state.x.size)
@@ -732,7 +755,8 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
     variable, exponent, forward = np.int64(TIME), 1.0, 1.0  # a literal would be compiled for itself
     if border >= 0 and scratch.control[NEW] and scratch.control[NODE_SET] == stop + 1:
         variable, exponent = np.int64(SINCE), 1.0 / tables.time_exponent[stop + 1]
-    if not 0.0 < guess <= min(limit, _promising(problem, scratch, variable, stop)):
+    promising = promising_time(scratch, variable, stop) if rubs(problem, stop) else np.inf
+    if not 0.0 < guess <= min(limit, promising):
         return False
     start_landing(problem, tables, state, scratch, stop, variable)
     w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
@@ -742,7 +766,7 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
         variable, forward, limit = np.int64(ROOT), -1.0, w[size + 1]
         span, sign, slope = _guess_before_opening(problem, tables, state, scratch, stop, border, guess, opened)
         largest, tolerance = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
-    search = variable, forward, span, limit, largest, tolerance, sign, slope
+    search = Search(variable, forward, span, limit, largest, tolerance, sign, slope)
     span, value, rounding, slope = _locate(problem, tables, state, scratch, stop, border, search)
     time = span if variable == TIME else x[size] - w[size]
     found = abs(value) <= max(_FOUND * largest, rounding)

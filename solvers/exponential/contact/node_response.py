@@ -41,9 +41,14 @@ from solvers.exponential.flight import quintic
 
 SHORT = STAGES
 DIFFERENCE, BATCH, LANDED, WITHIN, START = STAGES + 1, *range(STAGES + 4, STAGES + 8)
-"""Rows of `Scratch.stages` behind the stages of a landing's Runge–Kutta step: four of a short step, the second of them
-before that the embedded difference; numbers for one law call; trial states, at last the one landed on; a state within a
-step, for the energy balance; the state at the start of a landing, or at the end of a run within a step."""
+"""Rows of `Scratch.stages` behind the stages of a landing's Runge–Kutta step:
+
+    SHORT .. SHORT + 3   stages of a short step; outside of one, SHORT + 1 is DIFFERENCE, an embedded difference
+    BATCH                numbers for one law call
+    LANDED               trial states, at last the one landed on
+    WITHIN               a state within a step, for the energy balance
+    START                the state at the start of a landing, or at the end of a run within a step
+"""
 DELTAS, RATES, FORCES, KNOWN = range(4)
 """Rows of `Scratch.local_motion`: m, m/s, N at points around a node, and the values they are interpolated from."""
 RTOL, REACH = range(2)  # places in Scratch.accuracy
@@ -90,6 +95,9 @@ class Scratch(NamedTuple):
     first_step_share: Annotated[Any, "E"]  # of a contact's duration that its first step may take; 0: unknown
     force_tolerance: Annotated[Any, "E"]  # N: change of a force in an iteration below which it counts as converged
     unresolved: Annotated[Any, "R"]  # N s: impulse that the polynomials of a step leave out
+    before_cut: Annotated[Any, "E"]  # N: force before its cut at zero in a landing, for derivatives
+    turns: Annotated[Any, "int E"]  # 1 if the force of friction has a maximum inside the landing just taken
+    marked: Annotated[Any, "1"]  # s: time from which on the energy of a flight is accounted for
     guess: Annotated[Any, "R, S"]  # forces from which the iterations begin
     viscous: Annotated[Any, "E"]  # N s/m: slope of a force by its rate, from the last Newton iteration; 0 if not needed
     local_motion: Annotated[Any, "4, 3*S"]  # rows as named above, see `peaks`

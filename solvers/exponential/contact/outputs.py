@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from solvers.compiled.kernels import copy, indentation, inlined, inner, is_circle, merged, rubs
-from solvers.compiled.simd import load8, splat8, sum8
+from solvers.compiled.kernels import copy, indentation, inner, is_circle, merged, rubs
+from solvers.compiled.simd import load8, sum8
 from solvers.compiled.state import (
     HEAD,
     PART,
@@ -20,16 +20,14 @@ from solvers.compiled.state import (
     move_clock,
     write_event,
 )
-from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import work_in_circle
 from solvers.exponential.circles.friction import work_with_friction
 from solvers.exponential.contact.node_response import START, force_of, largest_size, motion_of
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
 from solvers.exponential.contact.slider_margins import peak_of_friction
+from solvers.exponential.contact.step_integrals import resolves_rates, weights_of, work_by_places, work_by_rates
 from solvers.exponential.energy.quadrature import state_within
-
-_BRIEF = 1.0  # radians of the fastest block up to which nodes resolve δ̇; δ - δ₀ may be rounding of δ
 
 
 @merged
@@ -80,43 +78,25 @@ def record_forces(problem, state, scratch, kind, ended, node_set, level):
     write_event(state, kind, state.now[T], ended, ended - state.now[T], node_set, level, state.x)
 
 
-@inlined
-def _work(problem, tables, scratch, node_set, s):
-    """Work, J, of a plain force over the step: ∫ F dδ with F interpolated in the nodes, δ in nodes and ends.
-
-    The quadrature of F δ̇ at the nodes would be wrong where the force hardly changes: there steps grow until fast
-    blocks oscillate between the nodes. A constant force does the work F × (change of δ), whatever the motion in
-    between.
-    """
-    begin, force = scratch.start_motion[s, 0], force_of(problem, scratch, s)
-    combine(tables.work[node_set], force, S, None, scratch.trial)
-    end = sum8(load8(tables.work_end[node_set], 0) * load8(force, 0))
-    within = sum8(load8(scratch.trial, 0) * (load8(motion_of(problem, scratch, s)[0], 0) - splat8(begin)))
-    return within + end * (indentation(problem, s, scratch.x_new) - begin)
-
-
 @merged
 def finish_step(problem, tables, state, scratch, node_set, level):
     """Move the state to the end of the converged step; update works, impulses and peaks of the contacts."""
     size, h = 2 * problem.k.size, tables.contact_step[level]
-    brief = h * tables.fastest <= _BRIEF
     for s in range(problem.law.size):
         if state.segment[s] > 0:
             motion, force = motion_of(problem, scratch, s), force_of(problem, scratch, s)
-            weighted = s == node_set - 1 and tables.weight_exponent[node_set] > 0.0
-            weights = tables.weights[node_set] if weighted else tables.plain[node_set]
-            impulses = load8(weights, 0) * load8(force, 0)
             if rubs(problem, s):
                 work = work_with_friction(problem, tables, state, scratch, node_set, level, s)
                 peak_of_friction(problem, tables, state, scratch, node_set, h, s, 1.0)
                 state.x[size + 2 + 2 * s] += work
             elif is_circle(problem, s):
                 state.x[size + 2 + 2 * s] += work_in_circle(problem, tables, state, scratch, node_set, level, s)
-            elif weighted or brief:
-                state.x[size + 2 + 2 * s] += h * sum8(impulses * load8(motion[1], 0))
+            elif resolves_rates(tables, node_set, s, h):
+                state.x[size + 2 + 2 * s] += work_by_rates(tables, node_set, s, h, force, motion[1])
             else:
-                state.x[size + 2 + 2 * s] += _work(problem, tables, scratch, node_set, s)
-            state.x[size + 3 + 2 * s] += h * sum8(impulses)
+                ends = scratch.start_motion[s, 0], indentation(problem, s, scratch.x_new)
+                state.x[size + 2 + 2 * s] += work_by_places(tables, node_set, force, motion[0], ends, scratch.trial)
+            state.x[size + 3 + 2 * s] += h * sum8(weights_of(tables, node_set, s) * load8(force, 0))
             if is_open(problem, s):
                 continue
             if begins_and_ends(problem, s):

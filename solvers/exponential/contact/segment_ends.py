@@ -18,10 +18,10 @@ from solvers.exponential.contact.node_response import LANDED, SLOPE
 
 
 @part(LAND, types.UniTuple(types.int64, 2), types.int64, types.int64, REAL)
-def land_first(problem, tables, state, scratch, stop, direction, time_to_border):
-    """Land on the border reached first, be it that of another stop; (stop, direction), or (-1, 0) on failure."""
+def land_first(problem, tables, state, scratch, stop, direction, time_to_knot):
+    """Land on the knot reached first, be it that of another stop; (stop, direction), or (-1, 0) on failure."""
     for _ in range(problem.law.size + 1):
-        landed = land(problem, tables, state, scratch, stop, direction, time_to_border)
+        landed = land(problem, tables, state, scratch, stop, direction, time_to_knot)
         if landed == stop or landed < 0:
             return landed, direction
         above = indentation(problem, landed, scratch.stages[LANDED]) > problem.knots[landed, state.segment[landed]]

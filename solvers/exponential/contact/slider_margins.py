@@ -58,7 +58,7 @@ from solvers.exponential.contact.nodes import LOCAL_SLOPES, S
 from solvers.exponential.contact.peaks import local_maximum, motion_around
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR
 from solvers.exponential.tables import STIFFNESS as ELASTICITY
-from solvers.problem.friction import CODE, CUT, FREE, MU, PEAK, PRESSES, SLIDES, STIFFNESS
+from solvers.problem.friction import CODE, CUT, FREE, MU, PEAK, PRESSES, SLIDES, STICK, STIFFNESS
 
 ENDS = 6  # margins in `Scratch.ends` for a border: at start, end; at the start with rounding, then ripple, in δ and δ̇
 _ROUNDING = 1e-11  # rounding of a margin, in units of its largest on the step
@@ -87,7 +87,7 @@ def margin_rounding(problem, state, s, j, t, x):
     normal_force(problem, s, state.segment[s], state.entry_rate[s], max(delta, least), rate)
     by_delta, by_rate, _ = slopes_of(problem, s, state.entry_rate[s])
     of_normal = abs(by_delta) * least + abs(by_rate) * rate_tolerance(problem, s, x)
-    return of_normal if slider[CODE] != 0.0 else slider[MU] * of_normal + slider[STIFFNESS] * of_way
+    return of_normal if slider[CODE] != STICK else slider[MU] * of_normal + slider[STIFFNESS] * of_way
 
 
 @inlined
@@ -111,7 +111,7 @@ def slider_margins_in(problem, state, scratch, s, t, x, later, out):
     ``scratch.point`` is left with its motion in both.
     """
     point, moved = scratch.point[0], scratch.point[1]
-    if later != 0.0 or (slider_of(problem, s)[CODE] != 0.0 and _rate_dependent(problem, s)):
+    if later != 0.0 or (slider_of(problem, s)[CODE] != STICK and _rate_dependent(problem, s)):
         rhs(problem, t, x, state.segment, state.entry_rate, state.rate, scratch.numbers)
         point_of(problem, s, t, x, state.rate, point)
         move_point(point, later, moved)
@@ -291,7 +291,7 @@ def _add_rounding(problem, state, scratch, s, by, ripple, faster):
     of_delta, of_rate, of_normal, of_its_rate = by
     slider, slips = slider_of(problem, s), _slips(slider_of(problem, s))
     xi, xi_rate = xi_tolerances(problem, s, state.now[T], state.x)
-    rest, of_way = _REST * scratch.reference_speed[s], slider[STIFFNESS] if slider[CODE] == 0.0 else 0.0
+    rest, of_way = _REST * scratch.reference_speed[s], slider[STIFFNESS] if slider[CODE] == STICK else 0.0
     delta, rate = surface_tolerance(problem, s, state.x), max(rate_tolerance(problem, s, state.x), rest)
     for j in range(problem.border_count[s]):
         by, of_speed = (of_delta, of_rate, of_way), 1.0 if slips else 0.0
@@ -377,7 +377,7 @@ def peak_of_friction(problem, tables, state, scratch, node_set, h, s, limit):
         return
     motion_around(problem, tables, state, scratch, node_set, h, s, highest)
     values = slid[SPARE]
-    if slider[CODE] == 0.0:
+    if slider[CODE] == STICK:
         shift = slid[NODE_XI, highest] - slid[TANGENTIAL, highest] / slider[STIFFNESS]
         _tangential_motion_around(problem, tables, state, scratch, node_set, h, s, highest)
         for i in range(S):

@@ -1,7 +1,10 @@
-"""One step in contact: land on a border that is near, else collocate the forces on the longest step that meets rtol.
+"""One step in contact: land on a knot or border that is near, else collocate forces on the longest step in tolerance.
 
 The error of a step is the largest over all stops, each in units of rtol × its own reference speed: the speed of entry,
-or a tenth of the speed the motion could reach there. The borders of all stops are checked, in contact or not.
+or a tenth of the speed the motion could reach there. All stops are checked, in contact or not.
+
+A *knot* is an end of a segment of a law, the surface δ = 0 among them; a *border* is the zero of a margin of a law with
+memory or of friction, see `borders`.
 """
 
 from __future__ import annotations
@@ -67,7 +70,7 @@ from solvers.exponential.contact.first_step import (
     latest_entered,
     level_of,
 )
-from solvers.exponential.contact.kinks import longest_under_signals
+from solvers.exponential.contact.kinks import land_on_kink_or_limit
 from solvers.exponential.contact.landing import LAST_RESORT, may_land
 from solvers.exponential.contact.node_response import SLOPE, force_of, free_response
 from solvers.exponential.contact.nodes import S
@@ -79,7 +82,7 @@ _ERROR_GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
 _SHORTLY_BEFORE = 0.9  # part of the time to a border after which a step ends, for a landing to follow
 _CROSSING_KNOWN = 8  # levels, √2 each, shorter at once: a step not resolved yet may see a crossing near its start
-NEITHER, MOVES_OUT, RESTS = range(3)  # what `_on_border` finds
+NEITHER, MOVES_OUT, RESTS = range(3)  # what `_leave_or_rest` finds
 _ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # ratio of the errors of two steps whose lengths differ by √2, one level
 
 
@@ -101,8 +104,8 @@ def _switch_pressed(problem, state):
 
 
 @merged
-def _nearest_surface(problem, state, scratch):
-    """(time, stop, direction) of the border of a segment that is reached first if all δ̇ stay, or (inf, -1, 0).
+def _nearest_knot(problem, state, scratch):
+    """(time, stop, direction) of the knot, or surface, that is reached first if all δ̇ stay, or (inf, -1, 0).
 
     δ and δ̇ go to ``scratch.start_motion``. Reference speeds are raised to |δ̇|, which may exceed that at entry.
     """
@@ -126,18 +129,18 @@ def _nearest_surface(problem, state, scratch):
 
 
 @inner
-def _on_border(problem, tables, state, scratch, stop, time_to_border):
-    """What is so near a border that no step can end before it: `MOVES_OUT` if it was switched, `RESTS`, or neither.
+def _leave_or_rest(problem, tables, state, scratch, stop, time_to_knot):
+    """Leave the segment where no step can end before its knot: `MOVES_OUT` if that was done, `RESTS`, or neither.
 
-    One that is within rounding of the border at a rate that is rounding rests there and need not land. Otherwise a
-    landing of any error is allowed, unless it may last longer than the shortest step: by the rounding of δ at the rate.
+    What is within rounding of the knot at a rate that is rounding rests there and need not land. Otherwise a landing of
+    any error is allowed, unless it may last longer than the shortest step: by the rounding of δ at the rate.
     """
     if switch_on_surface(problem, state, True):
         return MOVES_OUT
-    if not time_to_border < tables.contact_step[tables.contact_step.size - 1]:
+    if not time_to_knot < tables.contact_step[tables.contact_step.size - 1]:
         return NEITHER
     rate, rounding = abs(scratch.start_motion[stop, 1]), surface_tolerance(problem, stop, state.x)
-    if abs(time_to_border) * rate <= OUTSIDE * rounding and rate <= rate_tolerance(problem, stop, state.x):
+    if abs(time_to_knot) * rate <= OUTSIDE * rounding and rate <= rate_tolerance(problem, stop, state.x):
         return RESTS
     scratch.landed[LAST_RESORT] = rounding <= tables.contact_step[tables.contact_step.size - 1] * rate
     return NEITHER
@@ -204,28 +207,28 @@ def _attempt(problem, tables, state, scratch, node_set, level):
 
 
 @merged
-def _try_friction_border(problem, tables, state, scratch, time_to_border):
-    """Land on a border of friction that a landing on the surface would have crossed; returns whether it was done."""
+def _try_friction_border(problem, tables, state, scratch, time_to_knot):
+    """Land on a border of friction that a landing on a knot would have crossed; returns whether it was done."""
     stop, level = scratch.landed[0], scratch.control[NEXT_LEVEL]
     if stop < 0 or not rubs(problem, stop):
         return False
     scratch.border[0], scratch.ahead[SLOPE] = scratch.landed[1], 0.0
-    stop, landed = land_in_time(problem, tables, state, scratch, stop, time_to_border)
+    stop, landed = land_in_time(problem, tables, state, scratch, stop, time_to_knot)
     if landed:
         _continue_after(problem, tables, state, scratch, stop, level, False)
     return landed
 
 
 @merged
-def _try_border_ahead(problem, tables, state, scratch, time_to_border):
-    """Land on a border that a step crossed which was then made shorter, or that is expected, before a surface.
+def _try_border_ahead(problem, tables, state, scratch, time_to_knot):
+    """Land on a border that a step crossed which was then made shorter, or that is expected, before a knot.
 
     Returns whether it was done, and the longest step, s, that ends well before a border that is only expected.
     """
     at, level, expected = scratch.ahead[0], scratch.control[NEXT_LEVEL], scratch.ahead_of[2] > 0
     time = at - state.now[T]
     scratch.ahead[0] = 0.0
-    if not 0.0 < time < time_to_border or scratch.control[NEW]:
+    if not 0.0 < time < time_to_knot or scratch.control[NEW]:
         return False, np.inf
     scratch.border[0] = scratch.ahead_of[1]
     stop, landed = land_in_time(problem, tables, state, scratch, scratch.ahead_of[0], time)
@@ -261,12 +264,12 @@ def _continue_after(problem, tables, state, scratch, stop, level, alone):
 
 
 @merged
-def _try_landing(problem, tables, state, scratch, stop, direction, time_to_border):
-    """Land on the border reached first, and switch its stop; returns whether it was done."""
-    stop, direction = land_first(problem, tables, state, scratch, stop, direction, time_to_border)
+def _try_landing(problem, tables, state, scratch, stop, direction, time_to_knot):
+    """Land on the knot reached first, and switch its stop; returns whether it was done."""
+    stop, direction = land_first(problem, tables, state, scratch, stop, direction, time_to_knot)
     if stop < 0:
         if is_planar(problem):
-            return _try_friction_border(problem, tables, state, scratch, time_to_border)
+            return _try_friction_border(problem, tables, state, scratch, time_to_knot)
         return False
     state.count[STEPS] += 1
     if state.now[T] < state.now[T_END]:
@@ -277,19 +280,19 @@ def _try_landing(problem, tables, state, scratch, stop, direction, time_to_borde
 
 
 @merged
-def _try_landing_now(problem, tables, state, scratch, stop, direction, time_to_border):
-    """Land on a border that is known to be ahead, or on the surface reached first if that is worth a trial.
+def _try_landing_now(problem, tables, state, scratch, stop, direction, time_to_knot):
+    """Land on a border that is known to be ahead, or on the knot reached first if that is worth a trial.
 
     Returns whether it was done, and the longest step, s, that ends well before both.
     """
-    longest = 0.8 * time_to_border
+    longest = 0.8 * time_to_knot
     if scratch.ahead[0] > 0.0:
-        landed, before = _try_border_ahead(problem, tables, state, scratch, time_to_border)
+        landed, before = _try_border_ahead(problem, tables, state, scratch, time_to_knot)
         if landed:
             return True, longest
         longest = min(longest, before)
-    worth = stop >= 0 and may_land(problem, tables, state, scratch, stop, direction, time_to_border)
-    landed = worth and _try_landing(problem, tables, state, scratch, stop, direction, time_to_border)
+    worth = stop >= 0 and may_land(problem, tables, state, scratch, stop, direction, time_to_knot)
+    landed = worth and _try_landing(problem, tables, state, scratch, stop, direction, time_to_knot)
     return landed, longest
 
 
@@ -331,41 +334,42 @@ def _end_before(tables, state, scratch, level, stop, first):
 
 @part(CONTACT, types.int64)
 def advance_contact(problem, tables, energy_tables, state, scratch):
-    """One accepted step in contact, a landing if a border is near, else by collocation; returns a status code."""
+    """One accepted step in contact, a landing on what is near, else by collocation; returns a status code."""
     control, shortest = scratch.control, tables.contact_step.size - 1
-    time_to_border, stop, direction = _nearest_surface(problem, state, scratch)
+    time_to_knot, stop, direction = _nearest_knot(problem, state, scratch)
     scratch.landed[LAST_RESORT] = 0
-    if time_to_border < tables.contact_step[shortest] or control[NEXT_LEVEL] == shortest:
-        found = _on_border(problem, tables, state, scratch, stop, time_to_border)
+    if time_to_knot < tables.contact_step[shortest] or control[NEXT_LEVEL] == shortest:
+        found = _leave_or_rest(problem, tables, state, scratch, stop, time_to_knot)
         if found == MOVES_OUT:
             if in_contact(state):
                 begin_steps(problem, tables, state, scratch, latest_entered(state))
             return RUNNING
         if found == RESTS:
-            time_to_border, stop, direction = np.inf, -1, 0
+            time_to_knot, stop, direction = np.inf, -1, 0
     if control[NEW] == ENTRY and problem.parts[PRESSED] and _switch_pressed(problem, state):
         begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
-    landed, longest = _try_landing_now(problem, tables, state, scratch, stop, direction, time_to_border)
+    landed, longest = _try_landing_now(problem, tables, state, scratch, stop, direction, time_to_knot)
     if landed:
         return RUNNING
     node_set, wanted = control[NODE_SET] if control[NEW] else 0, control[NEXT_LEVEL]
     if problem.table_dt.size:
-        allowed = longest_under_signals(problem, tables, state, scratch, wanted)
-        if allowed == 0.0:
+        allowed = land_on_kink_or_limit(problem, tables, state, scratch, wanted)
+        if allowed == 0.0:  # the step to the kink is done
             return RUNNING
-        longest = min(longest, allowed)  # 0 beside a surface that is left or entered at rest
+        longest = min(longest, allowed)
+    # `longest` may be 0, beside a surface that is left or entered at rest
     level = level_of(tables, longest) if longest < tables.contact_step[wanted] else wanted
     copy(scratch.side, scratch.side_at_begin, scratch.side.size)
     while True:
         error, first, crossing = _attempt(problem, tables, state, scratch, node_set, level)
         if error <= 1.0 and (crossing < 0 or not rubs(problem, crossing)):
             break
-        landed, landed_on = first == 0.0 and scratch.border[0] >= 0, crossing  # the step begins on the border
-        if crossing >= 0 and not landed:
-            landed_on, landed = land_in_time(problem, tables, state, scratch, crossing, first)
-        if landed:
-            _continue_after(problem, tables, state, scratch, landed_on, max(level, wanted), first == 0.0)
+        ended, on_it = crossing, first == 0.0 and scratch.border[0] >= 0  # the step begins on the border
+        if crossing >= 0 and not on_it:
+            ended, on_it = land_in_time(problem, tables, state, scratch, crossing, first)
+        if on_it:
+            _continue_after(problem, tables, state, scratch, ended, max(level, wanted), first == 0.0)
             return RUNNING
         if error <= 1.0:  # the step is the shortest, and no landing is possible within it
             break

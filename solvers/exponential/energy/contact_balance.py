@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from numba import types
 
-from solvers.compiled.kernels import REAL, copy, inlined, merged, reordered
+from solvers.compiled.kernels import REAL, copy, element_of, inlined, merged, reordered
 from solvers.compiled.parts import ACCOUNT_CONTACT, part
 from solvers.compiled.simd import load8, splat8, store8, sum8
 from solvers.compiled.state import acts
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.many_stops import enters
 from solvers.exponential.contact.node_response import WITHIN
 from solvers.exponential.contact.nodes import S
+from solvers.exponential.contact.step_integrals import is_weighted
 from solvers.exponential.energy.contact_tables import BEGAN, ENTERING, SQUARES
 from solvers.exponential.energy.quadrature import state_within
 
@@ -109,7 +109,7 @@ def _block_forces(problem, tables, state, scratch, node_set, b, y):
     for u in range(problem.gap.size):
         if acts(problem, state, u):
             force = splat8(problem.push[u, size + b]) * load8(scratch.force[u], 0)
-            if enters(problem, node_set, u) and tables.weight_exponent[node_set] > 0.0:
+            if is_weighted(tables, node_set, element_of(problem, u)):
                 entering += force
             else:
                 plain += force

@@ -33,7 +33,6 @@ from solvers.exponential.flight import (
 )
 
 _MARK, _MOVING, _WITHIN = 3, 4, 5  # indices in Scratch.split_state: state at the mark, two that are moved on
-_MARKED = 9  # row of Scratch.stages: time of the mark
 _EXACT = 1e-14  # relative size of the last term of a series, as that of a series of all terms
 _EXCHANGED = types.UniTuple(REAL, 2)
 """Work and damping, J. They are returned, and states are named by their index, since parts are slow with arrays."""
@@ -43,7 +42,7 @@ _EXCHANGED = types.UniTuple(REAL, 2)
 def start_account(problem, state, scratch):
     """Set the mark to the state; its balance must be complete."""
     split(problem, state.x, scratch.split_state[_MARK])
-    scratch.stages[_MARKED, 0] = state.now[T]
+    scratch.marked[0] = state.now[T]
 
 
 @inner
@@ -75,7 +74,7 @@ def add_to_balance(problem, row, exchanged):
 @part(ACCOUNT_FLIGHT, types.void, REAL, VECTOR)
 def account_until(problem, tables, energy_tables, scratch, t, row):
     """Add work and damping of the flight from the mark to t, within one cell, to the balance of ``row``."""
-    begin = scratch.stages[_MARKED, 0]
+    begin = scratch.marked[0]
     copy_split(scratch.split_state[_MARK], scratch.split_state[_MOVING])
     span = t - begin
     if energy_tables.closed > 0.0 and abs(span - energy_tables.spacing) <= _time_rounding(problem, energy_tables, t):
@@ -94,7 +93,7 @@ def account_output(problem, tables, energy_tables, state, scratch, t, row):
     if problem.table_dt.size == 0:
         copy(row[2 * problem.k.size :], state.x[2 * problem.k.size :], 2)
         split(problem, row, scratch.split_state[_MARK])
-        scratch.stages[_MARKED, 0] = t
+        scratch.marked[0] = t
 
 
 @inner

@@ -14,6 +14,7 @@ from solvers.compiled.kernels import (
     REAL,
     VECTOR,
     dot,
+    element_of,
     inlined,
     inner,
     is_circle,
@@ -31,8 +32,8 @@ from solvers.compiled.state import acts
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import work_within_circle
 from solvers.exponential.circles.friction import work_within_rubbing
-from solvers.exponential.contact.many_stops import enters
 from solvers.exponential.contact.nodes import S
+from solvers.exponential.contact.step_integrals import is_weighted
 
 _PANEL_RADIANS = 3.0  # up to which the energy of a damped block is off by 5e-11 ζ of its own, and its motion by less
 _TERMS, _REACH = 14, 0.4  # of Taylor's series, and its radians of the fastest block: exact to 3e-17
@@ -101,7 +102,8 @@ def _forces(problem, tables, state, scratch, node_set):
     for u in range(scratch.force.shape[0]):
         if u < problem.gap.size and not acts(problem, state, u):
             continue
-        weighted, row = enters(problem, node_set, u) and tables.weight_exponent[node_set] > 0.0, between[PACE + 1 + u]
+        weighted = u < problem.gap.size and is_weighted(tables, node_set, element_of(problem, u))
+        row = between[PACE + 1 + u]
         scales, value = tables.lagrange[node_set, 1 if weighted else 0], splat8(0.0)
         for j in range(S):
             value += splat8(scales[j] * scratch.force[u, j]) * load8(between[j], 0)
