@@ -135,6 +135,31 @@ def test_sampled_loads_together_move_as_the_sum_of_each_alone():
         assert np.abs(both - alone).max() < 1e-9 * size, (one, other)
 
 
+def under_straight_lines(records, omega, duration):
+    """[q, q̇] of an undamped oscillator from rest at every node of records of straight lines, by closed form."""
+    nodes = np.unique(np.round(np.concatenate([one.t[one.t < duration] for one in records] + [[duration]]), 12))
+    force = sum(one(nodes) for one in records) / omega**2
+    motion, q, v = [(0.0, 0.0)], 0.0, 0.0
+    for h, start, end in zip(np.diff(nodes), force[:-1], force[1:], strict=True):
+        slope = (end - start) / h
+        free, rate = q - start, (v - slope) / omega
+        c, s = math.cos(omega * h), math.sin(omega * h)
+        q, v = end + free * c + rate * s, slope + omega * (rate * c - free * s)
+        motion.append((q, v))
+    return np.array(motion)
+
+
+@pytest.mark.parametrize("omega", [0.1, 1.0, 10.0, 100.0, 1000.0])
+@pytest.mark.parametrize("step", [0.75, 2.0 / 3.0, math.sqrt(0.5), 0.5])
+def test_two_records_of_unequal_steps(step, omega):
+    """Their nodes coincide here and there, or never; one step of the first is ``omega`` radians."""
+    records = [record(1.0, 19), record(step, int(10.3 / step) + 9)]
+    system = System.modal([omega], [0.0], [], [([1.0], one) for one in records])
+    run = integrate(system, [0.0], [0.0], 10.3, method=Exponential(1e-10))
+    exact = under_straight_lines(records, omega, 10.3)
+    assert (np.abs([run.q[-1, 0], run.q_dot[-1, 0]] - exact[-1]) / np.abs(exact).max(axis=0)).max() < 1e-9
+
+
 # --- kinks --------------------------------------------------------------------------------------------------------
 
 

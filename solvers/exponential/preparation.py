@@ -139,7 +139,7 @@ class Prepared(NamedTuple):
 
 def prepare_run(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
     """The forcing without resonant tones and on one grid, and the tables with its sampled values."""
-    taken = on_one_grid(without_resonance(system, forcing, duration, rtol), duration)
+    taken = on_one_grid(without_resonance(system, forcing, duration, rtol), duration, float(_speeds(system).max()))
     prepared = prepare_system(system, taken)
     kind = type_of(prepared.problem.value)
     if taken.table.shape[1] > 3:

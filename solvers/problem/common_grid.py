@@ -5,8 +5,8 @@ too. They hardly do where the signal is smooth on its grid, and much where it ha
 quintic of another grid that goes across a node cannot jump there. So the grid divides that of the roughest table, and
 those of the others if it can: then nothing changes. Others are carried over such that their moments ∫ s tᵏ dt, k = 0
 ... 5, stay around each of their nodes. Of the response to a jump of the third derivative, at the frequency ω, a part of
-(ω dt)^10/10⁸ is then wrong, and within a cell of the node more. Two coarse tables of unequal steps are therefore cut
-finely.
+(ω dt)^10/10⁸ is then wrong, and within a cell of the node more. Two coarse tables without a common part are therefore
+cut finely: to ω dt <= 0.3 of the fastest block, unless that takes more than 500 000 cells.
 """
 
 from __future__ import annotations
@@ -23,15 +23,16 @@ from solvers.problem.signals import Forcing, joined
 _ROUGH = 1e-2  # jump of derivative p = 1, 2, 3 in units of max|s|/dtᵖ; of a smooth signal at most 1e-3 (rtol <= 1e-6)
 _KINKS_FIRST = 1e6  # weight of jumps of slope and curvature: the grid divides the table that has them
 _CELLS_A_STEP = 160  # of a rough table whose nodes are not on the grid
-_FEWEST_CELLS = 4096  # where two tables are rough: what is left falls with the fourth power of the step
+_FEWEST_CELLS = 4096  # where two tables are rough and no grid has the nodes of both
+_RESOLVED, _MOST_CELLS = 0.3, 500_000  # ω dt of the fastest block there, unless that takes more cells than these
 
 
-def on_one_grid(forcing: Forcing, duration: float) -> Forcing:
-    """The same forcing with all node tables on one grid."""
+def on_one_grid(forcing: Forcing, duration: float, fastest: float) -> Forcing:
+    """The same forcing with all node tables on one grid, for a structure whose ``fastest`` rate is in rad/s."""
     if not forcing.table_dt.size or np.ptp(forcing.table_dt) == 0.0:
         return forcing
     given, steps = np.split(forcing.table, forcing.table_start[1:-1]), forcing.table_dt.tolist()
-    dt = _common_step(given, steps, duration)
+    dt = _common_step(given, steps, duration, fastest)
     cells = math.ceil(duration / dt * (1.0 - 1e-12))
     tables = [
         rows[: cells + 1] if own == dt else (_cut if _divides(dt, own) else _carried_over)(rows, own, dt, cells)
@@ -45,17 +46,22 @@ def on_one_grid(forcing: Forcing, duration: float) -> Forcing:
     )
 
 
-def _common_step(tables: list[Array], steps: list[float], duration: float) -> float:
-    """The finest step, or not above it a part of the step of the roughest table; shorter where others are rough too."""
+def _common_step(tables: list[Array], steps: list[float], duration: float, fastest: float) -> float:
+    """The finest step, or not above it a part of the step of the roughest table; shorter where others are rough too.
+
+    It divides the steps of all rough tables if a part that is not too small does.
+    """
     rough = [_roughness(rows, own) for rows, own in zip(tables, steps, strict=True)]
     worst, most = int(np.argmax(rough)), min(steps)
     if rough[worst] <= _ROUGH:
         return most
     dt = _part_of(steps[worst], most)
-    others = [i for i in np.flatnonzero(np.array(rough) > _ROUGH) if not _divides(dt, steps[i])]
-    if not others:
-        return dt
-    return _part_of(steps[worst], min([most, duration / _FEWEST_CELLS, *(steps[i] / _CELLS_A_STEP for i in others)]))
+    others = [steps[i] for i in np.flatnonzero(np.array(rough) > _ROUGH)]
+    for parts in range(round(steps[worst] / dt), _CELLS_A_STEP + 1):
+        if all(_divides(steps[worst] / parts, step) for step in others):
+            return steps[worst] / parts
+    resolved = max(_RESOLVED / max(fastest, 1e-300), duration / _MOST_CELLS)
+    return _part_of(steps[worst], min(most, duration / _FEWEST_CELLS, resolved, min(others) / _CELLS_A_STEP))
 
 
 def _roughness(rows: Array, dt: float) -> float:
@@ -88,13 +94,14 @@ def _cut(rows: Array, own: float, dt: float, cells: int) -> Array:
 
 def _carried_over(rows: Array, own: float, dt: float, cells: int) -> Array:
     """A node table on a grid not coarser than its own."""
-    pieces, t = _derivatives(rows, own), np.arange(cells + 1) * dt
-    piece = np.clip((t / own).astype(np.int64), 0, len(pieces) - 1)
-    out = _moved(pieces[piece], t - piece * own)[:, :3]
+    pieces, node = _derivatives(rows, own), np.arange(cells + 1)
     place = np.arange(1.0, len(pieces)) * own / dt
-    within = place < cells
-    place, cell = place[within], place[within].astype(np.int64)
-    changes = _moments_kept(place - cell, _jumps(rows, own)[within] * dt ** np.arange(1.0, 6.0))
+    # A node of the table on one of the grid ends the cell before it, x = 1, and what follows it begins there.
+    piece = np.searchsorted(place, node, side="right")
+    out = _moved(pieces[piece], node * dt - piece * own)[:, :3]
+    place = place[place < cells]
+    cell = np.ceil(place).astype(np.int64) - 1
+    changes = _moments_kept(place - cell, _jumps(rows, own)[: len(place)] * dt ** np.arange(1.0, 6.0))
     for end in range(2):
         np.add.at(out, cell + end, changes[:, end] / dt ** np.arange(3.0))
     return out
