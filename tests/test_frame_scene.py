@@ -10,7 +10,7 @@ import fembeam as fb
 import reduction
 import solvers
 from contacts import Hysteretic, KelvinVoigt
-from fembeam.response import coordinates
+from fembeam.response import modal_accelerations
 from fembeam.scene import with_value
 
 STEEL = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
@@ -103,7 +103,7 @@ def test_reactions_balance_inertia():
     made, position = model.matrices.assembled, model.scene.beam.position
     r = rigid_motions(made, position)
     M = model.matrices.loosened(replace(model.scene, supports=())).M
-    motion = model.matrices.spread @ model.basis.vectors @ coordinates(run).T
+    motion = model.matrices.spread @ model.basis.vectors @ modal_accelerations(run).T
     for i, signal in enumerate(model.scene.base.values()):
         motion += np.outer(made.translations[:, i], signal.derivative(2)(run.t))
     reaction = run.reactions()[0]

@@ -6,6 +6,7 @@ from problems import PAPER_BEAM
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, PiecewiseLinear
+from fembeam.response import modal_accelerations
 
 SQUARE = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.01)
 L, G = 0.4, 9.81
@@ -93,18 +94,12 @@ def test_momentum_and_angular_momentum_balance_at_every_sample():
         z = (nodes[:-1, None] + np.diff(nodes)[:, None] * (0.5 + x / 2)).ravel()
         mass = scene.beam.section.line_mass * (np.diff(nodes)[:, None] * w / 2).ravel()
         along = run.acceleration(z) + frame[:, None]
-        tip, turning = run.acceleration(0.24445) + frame, coordinates(run) @ model.phi(0.24445, 1)
+        tip, turning = run.acceleration(0.24445) + frame, modal_accelerations(run) @ model.phi(0.24445, 1)
         lump = 25.4e-3 * (tip + 0.01 * turning)
         momentum, angular = along @ mass + lump, along @ (mass * z) + lump * 0.25445 + 3.0e-6 * turning
         size = max(np.abs(force).max() for _, force in pushes)
         np.testing.assert_allclose(sum(force for _, force in pushes), momentum, atol=1e-9 * size)
         np.testing.assert_allclose(sum(z * force for z, force in pushes) + turns, angular, atol=1e-10 * size)
-
-
-def coordinates(run):
-    from fembeam.response import coordinates
-
-    return coordinates(run)
 
 
 def test_all_modes_are_the_residual_of_the_unreduced_equations():
@@ -119,7 +114,7 @@ def test_all_modes_are_the_residual_of_the_unreduced_equations():
     free = model.matrices.dofs.ravel() >= 0
     u, a = np.zeros((2, len(run.t), len(free)))
     u[:, free] = run.q @ model.basis.vectors.T
-    a[:, free] = coordinates(run) @ model.basis.vectors.T
+    a[:, free] = modal_accelerations(run) @ model.basis.vectors.T
     a[:, ::2] += scene.base.derivative(2)(run.t)[:, None]
     residual = (loose.K @ u.T + loose.M @ a.T)[~free]
     clamp, pin = run.reactions()

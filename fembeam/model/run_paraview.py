@@ -152,7 +152,8 @@ def _of_beams(run: Run) -> tuple[Vector, dict[str, tuple[Vector, Vector]]]:
 def _fields(run: Run) -> Callable[[int], dict[str, Vector]]:
     """The fields at the points as a function of the sample, of shapes (p, 3, n) and (p, n)."""
     moved, numbers = (_of_places if run.shapes.named else _of_beams)(run)
-    q, q_dot = (run.with_supports(rates, run.shapes.moving, order) for order, rates in enumerate((run.q, run.q_dot)))
+    q = run.with_supports(run.q, run.shapes.moving)
+    q_dot = run.with_supports(run.q_dot, run.shapes.moving, 1)
 
     def at(sample: int) -> dict[str, Vector]:
         vectors = {"displacement": moved @ q[sample], "velocity": moved @ q_dot[sample]}

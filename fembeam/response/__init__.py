@@ -11,7 +11,7 @@ from fembeam.response.backbone import backbone
 from fembeam.response.contact_force import forces, latched_before
 from fembeam.response.contact_log import PlacedLog, Site, site
 from fembeam.response.friction import losses_by_friction, read_back, sliding, states
-from fembeam.response.histories import Histories, coordinates, directed, frame_motion
+from fembeam.response.histories import Histories, directed, frame_motion, modal_accelerations
 from fembeam.response.mean_force import mean_force
 from fembeam.response.placed_shapes import PlacedShapes, placed_shapes
 from fembeam.response.readout import READOUT_FINITE, READOUT_UNITS, Readout, expected_readout, packed, unpacked

@@ -127,7 +127,7 @@ class Histories:
         instant's value, not a mean over the sample. Under a short contact it holds what the kept modes carry of the
         force, Σ φ_i(z) φ_i(z_s) F, and grows with their number.
         """
-        return self._motion(coordinates(self), z, direction, body, absolute, 2)
+        return self._motion(modal_accelerations(self), z, direction, body, absolute, 2)
 
     def motion(self, place: Any, body: int = 0) -> Vector:
         """All components (k, c) of a place, m and rad: those of `shapes.components`; of a beam u and u_z."""
@@ -137,8 +137,8 @@ class Histories:
             return self._q_of(body) @ shapes.motion_with_supports(place).T
         return self._q_of(body) @ np.array([shapes.rows_with_supports(place, i) for i in (0, 1)]).T
 
-    def _motion(self, rates: Vector, z: Any, direction: Any, body: int, absolute: bool, order: int) -> Vector:
-        """A derivative of u at z (k,) or (k, j), with that of the frame's motion if absolute."""
+    def _motion(self, coordinates: Vector, z: Any, direction: Any, body: int, absolute: bool, order: int) -> Vector:
+        """u, u̇ or ü at z (k,) or (k, j) from q, q̇ or q'' (k, n), with that of the frame's motion if absolute."""
         if is_whole(direction):  # (z, body, absolute) by position, as where places are numbers
             direction, body, absolute = None, direction, absolute or body is True
         shapes = self._beam(body)
@@ -150,7 +150,7 @@ class Histories:
         else:
             require(direction in (None, "y"), "a Beam moves along y", direction, "Run", "leave the direction out")
             rows = shapes.rows_with_supports(at)
-        values = self.with_supports(rates, shapes.moving, order) @ rows.T
+        values = self.with_supports(coordinates, shapes.moving, order) @ rows.T
         if not absolute:
             return values
         if not shapes.named:
@@ -159,9 +159,9 @@ class Histories:
         moved = np.array([frame_motion(self, order, way) for way in ways]).T
         return values + (moved if isinstance(at, list) else moved[:, 0])
 
-    def with_supports(self, rates: Vector, moving: int, order: int = 0) -> Vector:
-        """Coordinates (k, n) or derivatives of them, then the same derivative of each support dof that moves."""
-        values = self._at_samples(rates)
+    def with_supports(self, coordinates: Vector, moving: int, order: int = 0) -> Vector:
+        """q, q̇ or q'' (k, n) by ``order``, then the same derivative of each support dof that moves."""
+        values = self._at_samples(coordinates)
         return np.hstack([values, self.readout.loads[order : 3 * moving : 3].T]) if moving else values
 
     def slope(self, z: ArrayLike, body: int = 0) -> Vector:
@@ -408,7 +408,7 @@ class Histories:
         return stop
 
 
-def coordinates(run: Histories) -> Vector:
+def modal_accelerations(run: Histories) -> Vector:
     """Modal accelerations q'' (k, n) at the samples, m √kg/s², with the contact forces of the laws there.
 
     Not from differences of the samples: contacts shorter than a sample would be lost, and digits with them.

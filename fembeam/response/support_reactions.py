@@ -21,7 +21,7 @@ from scipy import sparse
 
 from fembeam.beams import bending_root, hermite_rows
 from fembeam.response.body_reactions import BodyHeld, rigid_shapes, static_solver
-from fembeam.response.histories import coordinates
+from fembeam.response.histories import modal_accelerations
 from fembeam.scene import BodyMatrices, Spring, contact_rows, loads, support_loads, told, unsupported
 from fembeam.structures import COMPONENTS
 from fembeam.support import Part, Printed, is_finite, is_whole, require
@@ -159,7 +159,7 @@ def reactions(run: Histories) -> Reactions:
     """The reactions at the samples; `Run.reactions` explains them."""
     parts, rows = run.readout.reactions
     q_dot = run._at_samples(run.q_dot)
-    histories = np.vstack([run._forces, run.readout.loads, coordinates(run).T, q_dot.T])
+    histories = np.vstack([run._forces, run.readout.loads, modal_accelerations(run).T, q_dot.T])
     pairs = zip(parts, rows, strict=True)
     beams = (run.shapes, *run.others)
     found: list[Reaction] = []
