@@ -81,7 +81,7 @@ def _tangent(directions: Vector, one: ContactRow) -> Vector:
 
 @dataclass(frozen=True, eq=False)
 class ModalEquations:
-    """A scene on n coordinates, as matrices, contacts and loads; the fields are told at `Model`."""
+    """A scene on n coordinates, as matrices, contacts and loads; `Model` explains the fields."""
 
     scene: Scene
     matrices: Matrices
@@ -222,9 +222,9 @@ class ModalEquations:
 
     def _pushed(self, row: sparse.csr_matrix) -> Vector:
         """(n,): what a load (1, N) does to each coordinate; nothing instead of rounding, of which stops would hear."""
-        return self._told(row, self.basis.project(row.T).T)
+        return self._without_rounding(row, self.basis.project(row.T).T)
 
-    def _told(self, row: sparse.csr_matrix, pushed: Vector) -> Vector:
+    def _without_rounding(self, row: sparse.csr_matrix, pushed: Vector) -> Vector:
         """A projected load (1, n) as (n,), zero where it is rounding."""
         return np.asarray(np.where(self._beyond_rounding(row, pushed), pushed, 0.0)[0])
 
@@ -235,7 +235,7 @@ class ModalEquations:
         return [slice(a, b) for a, b in pairwise(ends)]
 
     @cached_property
-    def told_by_runs(self) -> dict[str, Any]:
+    def run_fields(self) -> dict[str, Any]:
         """What every run keeps of its scene and contacts, by the name of its attribute; the arrays are read-only."""
         rows = self.contact_rows
         along = [one.z if is_finite(one.z) and one.direction is None else np.nan for one in rows]
@@ -296,7 +296,7 @@ class ModalEquations:
         own = self.matrices.base_loads
         signals = [(way, motion.derivative(2)) for way, motion in scene.motions.items()]
         return [
-            (-self._told(sparse.csr_matrix(own[way][None]), self.participation_along(way)[None]), signal)
+            (-self._without_rounding(sparse.csr_matrix(own[way][None]), self.participation_along(way)[None]), signal)
             for way, signal in (*signals, *weight(scene).items())
         ]
 

@@ -16,7 +16,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 import reduction
 from contacts.path import borders
-from fembeam.scene import BodyMatrices, support_loads, tangent, told
+from fembeam.scene import BodyMatrices, quoted, support_loads, tangent
 from fembeam.support import numbers, require, require_finite
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def _check_impactors(model: Model, q: Vector) -> None:
         if kind == "impactor" and model.matrices.impactors[number].stiffness == 0:
             delta = float(-direction @ q - contact.gap)
             scale = float(np.abs(direction) @ np.abs(q)) + contact.gap
-            at = told(contact.z) + " m" * (contact.direction is None)
+            at = quoted(contact.z) + " m" * (contact.direction is None)
             require(delta <= 1e-9 * scale, f"impactor {number} ({at}) must start outside the beam: δ ≤ 0",
                     delta, "Model.state", "widen its gap")  # fmt: skip
 

@@ -120,7 +120,7 @@ class Run(Histories, Printed):
             reached=reached,
             taken=taken,
             made=made,
-            **model.told_by_runs,
+            **model.run_fields,
         )
 
     @property

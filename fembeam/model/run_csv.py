@@ -11,7 +11,7 @@ import numpy as np
 
 from fembeam.model.watched_places import places as usual_places
 from fembeam.response import BodyReaction
-from fembeam.scene import is_directed, place_words, said, unit_of
+from fembeam.scene import directed_words, is_directed, place_words, unit_of
 from fembeam.support import is_finite, require, tuples
 from solvers.problem import dataframe, optional
 
@@ -128,7 +128,7 @@ def _at_places(run: Run, asked: Sequence[str], places: Sequence[Any] | None) -> 
             units = {what: UNITS[what]} if what in forces else {name: _unit_of_force(name) for name in forces}
             found |= {f"{name} at {place_words(own)} [{units[name]}]": x for name, x in forces.items()}
         along = [at] if is_directed(at) else [(at, way) for way in run.shapes.components]
-        ways |= {f"at {said(one)}": one for one in along}
+        ways |= {f"at {directed_words(one)}": one for one in along}
     for name, one in ways.items():
         found |= {f"{what} {name} [{_unit(what, one)}]": _at(run, what, one) for what in asked if what not in SECTIONS}
     return found
@@ -207,7 +207,7 @@ def to_xarray(run: Run, z: ArrayLike | None = None) -> Any:
     }
     axes = {
         "t": ("t", run.t, {"units": "s"}),
-        "z": ("z", [said(at) for at in place], {}) if named else ("z", place, {"units": "m"}),
+        "z": ("z", [directed_words(at) for at in place], {}) if named else ("z", place, {"units": "m"}),
         "stop": np.arange(len(run.stops)),
     }
     sites = run.contacts.sites

@@ -222,7 +222,7 @@ class _Varied:
         """Models near the present one, where modes change."""
         if not changes_structure(self.path):
             return None
-        with self._told():
+        with self._rewording_refusals():
             step = STRUCTURE * abs(self.value) or self._felt()
         found = self._near(lambda value: self.model.again(self._scene(value)), step)
         sizes = {len(one.omega) for one in found.systems}
@@ -283,11 +283,11 @@ class _Varied:
 
     def _near(self, make: Any, step: float) -> Nearby:
         """What is made at five-point formulas' values."""
-        with self._told():
+        with self._rewording_refusals():
             return Nearby.of(make, self.value, step)
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
+    def _rewording_refusals(self) -> Iterator[None]:
         """Says of values that a scene refuses that there is no derivative."""
         try:
             yield

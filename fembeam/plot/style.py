@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.scene import said
+from fembeam.scene import directed_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,7 +66,7 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 def place_name(z: Any) -> str:
     """A place in mm, beyond 1 m in m; one by name with its direction."""
     if isinstance(z, tuple):
-        return said(z)
+        return directed_words(z)
     if isinstance(z, str):  # of a part
         return z
     return f"z = {z:.5g} m" if abs(z) > 1.0 else f"z = {1e3 * z:.5g} mm"
@@ -80,7 +80,7 @@ def displacement_name(z: Any) -> str:
     >>> displacement_name(0.25), displacement_name(("lever", "x"))
     ('u(0.25 m)', 'u(lever, x)')
     """
-    return f"u({said(z) if isinstance(z, tuple) else f'{z:.4g} m'})"
+    return f"u({directed_words(z) if isinstance(z, tuple) else f'{z:.4g} m'})"
 
 
 def round_factor(factor: float) -> float:

@@ -64,12 +64,12 @@ def site(acting: Any, push: float, body: int, rotation: bool, always: bool, plan
     z = float(place) if plane and not body else np.nan
     side = "" if always or not plane else "below" if push > 0 else "above"
     if push == 0.0:
-        return Site(z, words, "", ", ".join(_told(one) for one in way))
+        return Site(z, words, "", ", ".join(_direction_words(one) for one in way))
     own = tuple(-push * part for part in (TURN if rotation else UP))
-    return Site(z, words, side, named(own) if way is None else _told(way))
+    return Site(z, words, side, named(own) if way is None else _direction_words(way))
 
 
-def _told(way: Any) -> str:
+def _direction_words(way: Any) -> str:
     """A direction in words."""
     return named(direction_of(way, "a contact"))
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.scene import At, BodyMatrices, LocalCoordinate, at_parts, said, split, told
+from fembeam.scene import At, BodyMatrices, LocalCoordinate, at_parts, directed_words, quoted, split
 from fembeam.structures import COMPONENTS, direction_of, named, nearest, require_components, turns
 from fembeam.support import is_numbered, is_pair, require, tuples
 
@@ -143,7 +143,7 @@ class PlacedShapes:
     def _row(self, at: Any) -> Vector:
         """(n + k,) of one (place, direction)."""
         place, along = split(at, self.components)
-        require_components(along, self.components, f"the place {told(place)}", "phi")
+        require_components(along, self.components, f"the place {quoted(place)}", "phi")
         part = np.array([along[COMPONENTS.index(component)] for component in self.components])
         return np.asarray(part @ self.motion_with_supports(place))
 
@@ -212,4 +212,4 @@ def _usual(body: BodyMatrices, loaded: Sequence[LocalCoordinate]) -> dict[str, A
     points = getattr(body.beam, "points", {}) or _places(body)[-1:]
     found += [(place, c) for place in points for c in ask(place) if c in COMPONENTS[:3]]
     moved = [at for at in found if not turns(direction_of(at[1], "a place"))]  # figures of them are in m
-    return {said(at): at for at in dict.fromkeys(moved or found or [(p, c) for p in points for c in ask(p)])}
+    return {directed_words(at): at for at in dict.fromkeys(moved or found or [(p, c) for p in points for c in ask(p)])}

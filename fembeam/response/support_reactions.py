@@ -22,7 +22,7 @@ from scipy import sparse
 from fembeam.beams import bending_root, hermite_rows
 from fembeam.response.body_reactions import BodyHeld, rigid_shapes, static_solver
 from fembeam.response.histories import modal_accelerations
-from fembeam.scene import BodyMatrices, Spring, contact_rows, loads, support_loads, told, unsupported
+from fembeam.scene import BodyMatrices, Spring, contact_rows, loads, quoted, support_loads, unsupported
 from fembeam.structures import COMPONENTS
 from fembeam.support import Part, Printed, is_finite, is_whole, require
 
@@ -60,7 +60,7 @@ class Reaction:
         """The name of the part, else such as "Clamped at z = 0 m"."""
         if self.part.name is not None:
             return str(self.part.name)
-        at = f"z = {self.part.z:g} m" if is_finite(self.part.z) else told(self.part.z)
+        at = f"z = {self.part.z:g} m" if is_finite(self.part.z) else quoted(self.part.z)
         return f"{type(self.part).__name__} at {at}" + (f" of beam {self.body}" if self.body else "")
 
     def __repr__(self) -> str:

@@ -76,8 +76,8 @@ def frequency_response(
     """The response of a model without its contacts; `Model.frequency_response` explains it."""
     shapes = model.body_shapes(body, WHERE)
     output, driven = shapes.place(output), _named_input(model, driven)
-    for name, told in (("absolute", absolute), ("slipping", slipping)):
-        require(isinstance(told, (bool, np.bool_)), f"{name} must be True or False", told, WHERE, "leave it out")
+    for name, flag in (("absolute", absolute), ("slipping", slipping)):
+        require(isinstance(flag, (bool, np.bool_)), f"{name} must be True or False", flag, WHERE, "leave it out")
     moved = isinstance(driven, str) and driven.split(".")[0] == "base"
     require(not absolute or moved, "absolute is for the input 'base'", driven, WHERE, "leave it out")
     if model.scene.named and isinstance(output, np.ndarray):

@@ -40,7 +40,7 @@ from fembeam.scene.parts import (
     Spring,
     Stop,
 )
-from fembeam.scene.places import At, Place, is_directed, is_place, place_words, said, split, told
+from fembeam.scene.places import At, Place, directed_words, is_directed, is_place, place_words, quoted, split
 from fembeam.scene.rotors import Disk, Unbalance
 from fembeam.scene.rubbing import Friction, spin_of
 from fembeam.scene.scene import FEATURES, Scene

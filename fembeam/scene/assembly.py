@@ -37,7 +37,7 @@ from fembeam.beams import (
     spread,
     wavenumber,
 )
-from fembeam.scene.places import place_words, told
+from fembeam.scene.places import place_words, quoted
 from fembeam.scene.signals import support_motion
 from fembeam.structures import COMPONENTS, Six, require_components
 from fembeam.support import is_whole, require, require_finite
@@ -167,7 +167,7 @@ class Matrices:
 
     def own_row(self, place: Any, along: Six) -> sparse.csr_matrix:
         """`row` on the body's own dofs: of a beam u along y and -u_z about x."""
-        require_components(along, ("y", "rx"), "a Beam bends in one plane: its places", f"{told(place)} of a Beam")
+        require_components(along, ("y", "rx"), "a Beam bends in one plane: its places", f"{quoted(place)} of a Beam")
         return along[1] * self.interpolation(place) - along[3] * self.interpolation(place, 1)
 
     def carried_row(self, place: LocalCoordinate) -> Vector:

@@ -17,7 +17,7 @@ from scipy import sparse
 
 import reduction
 from fembeam.scene.assembly import DEFAULT_MODES, UNIT, Matrices, Vector, moved_by_rows, moving
-from fembeam.scene.places import place_words, told
+from fembeam.scene.places import place_words, quoted
 from fembeam.scene.rotors import Disk, gyroscopic, shaft_axes
 from fembeam.scene.signals import support_motion
 from fembeam.structures import (
@@ -303,10 +303,10 @@ def _held(scene: Scene, assembled: Assembled) -> Any:
             if row is None or not row.nnz:
                 continue
             single = row.nnz == 1 and abs(row.data[0] - 1.0) < UNIT
-            require(single, "a support must hold a node of the body", f"{dof} at {told(support.z)}",
+            require(single, "a support must hold a node of the body", f"{dof} at {quoted(support.z)}",
                     f"supports[{index}] of Scene", "given modes have theirs")  # fmt: skip
             number = int(row.indices[0])
-            require(number not in found, f"supports must not hold one dof twice ({dof} at {told(support.z)}, which "
+            require(number not in found, f"supports must not hold one dof twice ({dof} at {quoted(support.z)}, which "
                     "another one holds under another name, or by a joint)", index, f"supports[{index}] of Scene",
                     "keep one")  # fmt: skip
             found.add(number)

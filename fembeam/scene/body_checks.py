@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from fembeam.scene.annular_stop import AnnularStop
 from fembeam.scene.parts import Guided, PointMoment
-from fembeam.scene.places import told
+from fembeam.scene.places import quoted
 from fembeam.scene.rotors import Disk, check_shaft
 from fembeam.scene.signals import support_motion
 from fembeam.structures import COMPONENTS, direction_of, named, require_components
@@ -37,7 +37,7 @@ def components_at(body: Any, place: Any) -> tuple[str, ...]:
 def check_feature(body: Any, feature: Any, name: str, where: str) -> None:
     """Raise ValueError unless a part of a scene has a place on the body and says along what it acts."""
     body.check_place(feature.z, where)
-    have, what = components_at(body, feature.z), f"the place {told(feature.z)}"
+    have, what = components_at(body, feature.z), f"the place {quoted(feature.z)}"
     if name == "supports":
         _check_support(feature, have, where)
     if isinstance(feature, AnnularStop):
@@ -66,7 +66,7 @@ def _check_support(support: Any, have: tuple[str, ...], where: str) -> None:
             "write Fixed(place, 'rx') or so, with the rotations it holds")  # fmt: skip
     every = support.dofs in (COMPONENTS, COMPONENTS[:3])
     missing = [dof for dof in support.dofs if dof not in have]
-    told_at = f"the place {told(support.z)} has {', '.join(have)}"
+    told_at = f"the place {quoted(support.z)} has {', '.join(have)}"
     require(
         every or not missing, f"a support must hold dofs that exist; {told_at}", missing, where, "name some of these"
     )
@@ -96,11 +96,11 @@ def check_end(body: Any, place: Any, along: Any, key: str, where: str) -> None:
     """Raise ValueError unless a second place exists on a body and moves along a direction."""
     if is_body(body):
         body.check_place(place, f"{key} of {where}")
-        require_components(along, components_at(body, place), f"the place {told(place)} of {key}", where)
+        require_components(along, components_at(body, place), f"the place {quoted(place)} of {key}", where)
         return
     inside = is_finite(place) and 0 <= place <= body.length
     require(inside, f"z of {key} must lie on the beam, 0 to {body.length} m", place, where, "move it")
-    require_components(along, ("y", "rx"), f"a Beam bends in one plane: the place {told(place)} of {key}", where)
+    require_components(along, ("y", "rx"), f"a Beam bends in one plane: the place {quoted(place)} of {key}", where)
 
 
 def check_conflicts(scene: Scene) -> None:
@@ -111,7 +111,7 @@ def check_conflicts(scene: Scene) -> None:
             if dof not in components_at(scene.beam, support.z):
                 continue
             key = (scene.beam.node(support.z) if hasattr(scene.beam, "node") else support.z), dof
-            require(key not in held, f"supports must not hold one dof twice ({dof} at {told(support.z)})",
+            require(key not in held, f"supports must not hold one dof twice ({dof} at {quoted(support.z)})",
                     (held.get(key), index), "supports of Scene", "keep one")  # fmt: skip
             held[key] = index
     _check_moved(scene)
@@ -123,7 +123,7 @@ def check_conflicts(scene: Scene) -> None:
             ways = [named(place.along) for place in stop.coordinates]
         else:
             ways = [named(direction_of(stop.direction, "Stop"))]
-        at = f"{told(stop.z)}, {' and '.join(ways)}"
+        at = f"{quoted(stop.z)}, {' and '.join(ways)}"
         require(one not in known, f"stops must not share one place and direction ({at})", (known.get(one), index),
                 "stops of Scene", "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
         known[one] = index

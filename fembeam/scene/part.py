@@ -6,7 +6,7 @@ Annotations are evaluated here: the classes derived from this one stand in files
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from fembeam.scene.places import Place, place_words, said, told
+from fembeam.scene.places import Place, directed_words, place_words, quoted
 from fembeam.structures import Six, direction_of
 from fembeam.support import is_whole, require, require_place
 
@@ -28,7 +28,7 @@ class ScenePart:
         require_place(self.z, self)
         name: object = self.name
         text = isinstance(name, str) and bool(name.strip()) and name.isprintable()
-        where = f"{type(self).__name__} at {told(self.z)}"
+        where = f"{type(self).__name__} at {quoted(self.z)}"
         require(name is None or text, "name must be text of one line, not empty", name, where,
                 "give one such as 'valve', or leave it out")  # fmt: skip
         for key in ("direction", "tangent"):
@@ -50,7 +50,7 @@ class ScenePart:
     @property
     def where(self) -> str:
         """For messages: "Stop at z = 0.2", "Stop 'valve' at z = 0.2"."""
-        return f"{self.titled} at {told(self.z)}"
+        return f"{self.titled} at {quoted(self.z)}"
 
     @property
     def titled(self) -> str:
@@ -73,7 +73,7 @@ class ScenePart:
             return self.name
         direction: Any = getattr(self, "direction", None)
         place = str(self.z) if named and is_whole(self.z) else place_words(self.z)
-        at = place if direction is None else said((self.z, direction))
+        at = place if direction is None else directed_words((self.z, direction))
         return self._made(at + (f" of beam {body}" if body else ""))
 
     def _made(self, at: str) -> str:

@@ -64,16 +64,16 @@ def is_place(value: Any) -> bool:
     return is_finite(value) or is_name(value)
 
 
-def told(place: Any) -> str:
-    """Where something is, in words.
+def quoted(place: Any) -> str:
+    """Where something is, as messages have it: names in quotation marks, a number as z.
 
     Examples
     --------
-    >>> told(0.25), told("lever"), told(("A-B", 0.4)), told((1, "lever"))
+    >>> quoted(0.25), quoted("lever"), quoted(("A-B", 0.4)), quoted((1, "lever"))
     ('z = 0.25', "'lever'", "0.4 m along 'A-B'", "'lever' of body 1")
     """
     if is_numbered(place):
-        return f"{told(place[1]).removeprefix('z = ')} of body {place[0]}"
+        return f"{quoted(place[1]).removeprefix('z = ')} of body {place[0]}"
     if is_pair(place):
         return f"{place[1]} m along {place[0]!r}"
     return f"{place!r}" if isinstance(place, str) else f"z = {place}"
@@ -129,15 +129,15 @@ def split(at: Any, components: Sequence[str] = COMPONENTS) -> tuple[Any, Six]:
         return at, direction_of(components[0], "a place")
     require(pair, f"a place of a frame or structure needs a direction of {', '.join(components)}", at, "a place",
             f"write ({at!r}, {components[0]!r})")  # fmt: skip
-    return at[0], direction_of(at[1], f"the place {told(at[0])}")
+    return at[0], direction_of(at[1], f"the place {quoted(at[0])}")
 
 
-def said(at: At) -> str:
-    """A place and its direction in words.
+def directed_words(at: At) -> str:
+    """A place and its direction, as names have them.
 
     Examples
     --------
-    >>> said(("lever", "-z"))
+    >>> directed_words(("lever", "-z"))
     'lever, -z'
     """
     place, along = at

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fembeam.scene.local_coordinate import LocalCoordinate
-from fembeam.scene.places import told
+from fembeam.scene.places import quoted
 from fembeam.scene.rotors import carrier
 from fembeam.structures import COMPONENTS, Six, direction_of, turns
 from fembeam.support import require, require_positive
@@ -81,7 +81,7 @@ def spin_of(body: Any, stop: Any) -> float:
 def check_spin(body: Any, stop: Any, where: str) -> None:
     """Raise ValueError for friction on a shaft that spins whose radius is not known."""
     spins = stop.friction is not None and stop.radius is None and spin_of(body, stop) != 0.0
-    require(not spins, f"friction on a shaft that spins needs radius= ({told(stop.z)})", stop.radius, where,
+    require(not spins, f"friction on a shaft that spins needs radius= ({quoted(stop.z)})", stop.radius, where,
             "give the radius of the shaft there, m")  # fmt: skip
 
 

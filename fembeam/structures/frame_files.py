@@ -115,11 +115,11 @@ def _names(mesh: Any) -> dict[int, str]:
 
 def _numbered(names: list[str]) -> list[str]:
     """Names, each one of several alike numbered but for empty ones."""
-    sizes, seen, told = Counter(names), Counter[str](), []
+    sizes, seen, numbered = Counter(names), Counter[str](), []
     for name in names:
         seen[name] += 1
-        told.append(name if sizes[name] == 1 or not name else f"{name} {seen[name]}")
-    return told
+        numbered.append(name if sizes[name] == 1 or not name else f"{name} {seen[name]}")
+    return numbered
 
 
 def _chains(

@@ -167,7 +167,7 @@ class JoinedBodies:
 
     def places(self) -> list[Any]:
         """Names of all places: of the first body as they are, of others with the number of the body."""
-        return [self._told(number, place) for number, body in enumerate(self.bodies) for place in body.places()]
+        return [self._numbered(number, place) for number, body in enumerate(self.bodies) for place in body.places()]
 
     @property
     def points(self) -> list[Any]:
@@ -175,10 +175,11 @@ class JoinedBodies:
         named = [(n, getattr(body, "points", None) or body.places()[-1:]) for n, body in enumerate(self.bodies)]
         ends = {self._end(joint) for joint in self.joints}
         each = [(number, place) for number, points in named for place in points]
-        return [self._told(n, place) for n, place in each if (n, _node(self.bodies[n], place)) not in ends]
+        return [self._numbered(n, place) for n, place in each if (n, _node(self.bodies[n], place)) not in ends]
 
     @staticmethod
-    def _told(number: int, place: Any) -> Any:
+    def _numbered(number: int, place: Any) -> Any:
+        """A place as others name it: with the number of its body, but on the first one."""
         return (number, place) if number else place
 
     def position(self, place: Any) -> Vector | None:
@@ -195,7 +196,7 @@ class JoinedBodies:
     def edges(self) -> list[tuple[Any, Any]]:
         """Pairs of places that figures join."""
         each = [(number, getattr(body, "edges", ())) for number, body in enumerate(self.bodies)]
-        return [(self._told(number, a), self._told(number, b)) for number, edges in each for a, b in edges]
+        return [(self._numbered(number, a), self._numbered(number, b)) for number, edges in each for a, b in edges]
 
     def check(self) -> list[str]:
         """What the bodies given by matrices say."""

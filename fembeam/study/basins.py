@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam import plot
 from fembeam.model import Attractor, Model, Orbit, load_period, observed
-from fembeam.scene import Place, said
+from fembeam.scene import Place, directed_words
 from fembeam.study.execution.checkpoint import Checkpoint, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.result import Result
@@ -280,9 +280,9 @@ def _direction(model: Model, kind: Any, z: Any) -> tuple[Vector, str]:
     """The direction an axis goes, and its name."""
     n = len(model.omega)
     if isinstance(kind, str) and kind == "displacement":
-        return np.concatenate((_pulled(model, z), np.zeros(n))), f"displacement at {_told(z)} / m"
+        return np.concatenate((_pulled(model, z), np.zeros(n))), f"displacement at {_place_words(z)} / m"
     if isinstance(kind, str) and kind == "velocity":
-        return np.concatenate((np.zeros(n), _shape(model, z, np.ones(n)))), f"velocity at {_told(z)} / (m/s)"
+        return np.concatenate((np.zeros(n), _shape(model, z, np.ones(n)))), f"velocity at {_place_words(z)} / (m/s)"
     if is_whole(kind):
         require(
             bool(0 <= kind < 2 * n), f"the number of a state must lie in [0, {2 * n})", kind, WHERE, "q first, then q̇"
@@ -296,9 +296,9 @@ def _direction(model: Model, kind: Any, z: Any) -> tuple[Vector, str]:
     return vector, "along the given vector"
 
 
-def _told(z: Any) -> str:
-    """A place in words."""
-    return said(z) if isinstance(z, tuple) else f"{z:g} m"
+def _place_words(z: Any) -> str:
+    """A place with its direction, of a beam with m, as labels have it."""
+    return directed_words(z) if isinstance(z, tuple) else f"{z:g} m"
 
 
 def _pulled(model: Model, z: Any) -> Vector:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from fembeam import plot
 from fembeam.response import ResponseSpectrum
-from fembeam.scene import is_directed, place_words, said
+from fembeam.scene import directed_words, is_directed, place_words
 from fembeam.structures import COMPONENTS
 from fembeam.study.result import Result
 from fembeam.support import Part, require
@@ -114,4 +114,4 @@ def _along(run: Run, place: Any) -> dict[str, Any]:
     if not run.shapes.named:
         return {place_words(place): place}
     ways = [place] if is_directed(place) else [(place, c) for c in run.shapes.components if c in COMPONENTS[:3]]
-    return {said(at): at for at in ways}
+    return {directed_words(at): at for at in ways}

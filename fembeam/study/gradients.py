@@ -131,7 +131,7 @@ def gradient(trial: Trial, point: Vector) -> Vector:
                 return _of_settled(trial, model)
             return _of_run(trial, model)
     except (ArithmeticError, ValueError, solvers.SolverError, solvers.OrbitError, AccuracyError) as error:
-        raise NoGradientError(f"no gradient at {trial.told(point.tolist())}: {error}") from error
+        raise NoGradientError(f"no gradient at {trial.words(point.tolist())}: {error}") from error
 
 
 def _of_run(trial: Trial, model: Model) -> Vector:

@@ -260,12 +260,12 @@ class _Search:
         failures = computed(self.trial, points, self.kept, executor, progress)
         if failures:
             i, reason = failures[0]
-            raise RuntimeError(f"a run failed at {self.trial.told(points[i])}: {reason}; narrow the bounds")
+            raise RuntimeError(f"a run failed at {self.trial.words(points[i])}: {reason}; narrow the bounds")
         new = collected(self.trial, points, self.kept, (), ()).values
         for point, value in zip(points, new, strict=True):
             missing = [n for n, v in zip(self.trial.asked.names, value, strict=True) if not np.isfinite(v)]
             require(not missing, f"{', '.join(missing)} must have a value at every point", float("nan"),
-                    self.trial.told(point), "take one that has, such as peak_force, 0 without contact")  # fmt: skip
+                    self.trial.words(point), "take one that has, such as peak_force, 0 without contact")  # fmt: skip
         self.shares += list(shares)
         self.values += list(new)
 
@@ -411,7 +411,7 @@ def _found(search: _Search, tolerance: float, converged: bool) -> Minimum:
     limited = list(zip(tried.quantities[1:], search.bounds.tolist(), values[best, 1:].tolist(), strict=True))
     if any(value > bound for _, bound, value in limited):
         told = ", ".join(f"{name} = {value:.6g} (at most {bound:g})" for name, bound, value in limited)
-        where = search.trial.told(tried.points[best])
+        where = search.trial.words(tried.points[best])
         raise RuntimeError(f"no point keeps the constraints; the nearest is {where} with {told}")
     around = np.abs(shares - shares[best]).max(axis=1) <= NEAR * tolerance
     pressing = np.atleast_1d((values[around, 1:] > search.bounds).any(axis=0) | search.pressing)

@@ -114,14 +114,14 @@ class Trial:
             return self.names
         return tuple(axis_name(name, self.scene) for name in self.names)
 
-    def told(self, point: Sequence[float]) -> str:
+    def words(self, point: Sequence[float]) -> str:
         """A point as text."""
         return ", ".join(f"{name} = {value:.6g}" for name, value in zip(self.called, point, strict=True))
 
     def at(self, point: Sequence[float]) -> Scene:
         """The scene at a point; ValueError names the point."""
         values = dict(zip(self.names, map(float, point), strict=True))
-        with _placed(f"at {self.told(point)}"):
+        with _placed(f"at {self.words(point)}"):
             if not isinstance(self.scene, Scene):
                 return self.scene(**values)
             scene = self.scene
@@ -151,7 +151,7 @@ class Trial:
             if isinstance(model, Refused):
                 return model
             with whole_runs():
-                return values_of(self.asked, runs(model, self.plan, self.asked, self.method), self.told(point))
+                return values_of(self.asked, runs(model, self.plan, self.asked, self.method), self.words(point))
         except (solvers.SolverError, AccuracyError) as error:
             return f"{type(error).__name__}: {error}"
 

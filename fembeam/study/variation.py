@@ -188,7 +188,7 @@ def vary(
     failures = computed(trial, points, kept, executor, WHERE if progress else None)
     if failures:
         i, reason = failures[0]
-        message = f"{len(failures)} of {len(points)} points failed; {trial.told(points[i])}: {reason}"
+        message = f"{len(failures)} of {len(points)} points failed; {trial.words(points[i])}: {reason}"
         warnings.warn(message, UserWarning, stacklevel=2)
     return collected(trial, points, kept, axes, failures)
 
@@ -209,7 +209,7 @@ def computed(
 
     spread(trial, [tuple(points[i].tolist()) for i in missing], executor, progress, seen)
     if len(failed) == len(points) and all(isinstance(reason, Refused) for _, reason in failed):
-        raise ValueError(f"{failed[0][1]} (at {trial.told(points[failed[0][0]])}, and at all others)")
+        raise ValueError(f"{failed[0][1]} (at {trial.words(points[failed[0][0]])}, and at all others)")
     return tuple(sorted(failed))
 
 

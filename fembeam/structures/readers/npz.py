@@ -88,8 +88,8 @@ def _arrays(path: Path) -> dict[str, Any]:
 
 def _broken(path: Path, error: Exception) -> ValueError:
     """The error of a damaged file."""
-    told = "something else" if "pickle" in str(error) else error  # NumPy's advice is to trust the file
-    return wrong(path, "as a whole", "arrays of numbers in a .npz", told)
+    found = "something else" if "pickle" in str(error) else error  # NumPy's advice is to trust the file
+    return wrong(path, "as a whole", "arrays of numbers in a .npz", found)
 
 
 def read_npy(path: Path) -> Given:

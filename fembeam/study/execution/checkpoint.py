@@ -104,12 +104,12 @@ def scene_identity(scene: Scene | Callable[..., Scene]) -> dict[str, str]:
     from fembeam import __version__
 
     parts = [f.name for f in fields(scene)] if is_dataclass(scene) else []
-    about = {name: _told(getattr(scene, name), name) for name in parts} or {"scene": _told(scene, "scene")}
+    about = {name: _digested(getattr(scene, name), name) for name in parts} or {"scene": _digested(scene, "scene")}
     return about | {"fembeam": __version__}
 
 
-def _told(value: Any, name: str) -> str:
-    """A part of a scene, to be read and to be compared."""
+def _digested(value: Any, name: str) -> str:
+    """A part of a scene as text to be read, then its digest to be compared."""
     readable = re.sub(" at 0x[0-9a-f]+", "", repr(value)).replace(" #", " ")
     return f"{readable} #{fingerprint(value, name)}"
 
