@@ -26,6 +26,8 @@ from fembeam.scene import (
     contact_rows,
     load_signals,
     loads,
+    loads_of_dof,
+    loads_of_order,
     signals_of,
     static_rows,
     support_loads,
@@ -266,8 +268,9 @@ class ModalEquations:
         contacts = [_contact(self.directions[own], one) for own, one in zip(self.rows_of, same, strict=True)]
         rows = [(self._pushed(row), signal) for row, signal in loads(scene, self.matrices)]
         for i, q in enumerate(self.following):  # damping acts on what does not follow the supports
-            vector, signal = rows[3 * i + 1]
-            rows[3 * i + 1] = vector + self._damping_of(scene) * q, signal
+            _, of_speed, _ = loads_of_dof(i)
+            vector, signal = rows[of_speed]
+            rows[of_speed] = vector + self._damping_of(scene) * q, signal
         pushed = [*rows, *self._frame_loads(scene)]
         return solvers.System(np.eye(n), C, np.diag(self.omega**2), contacts, pushed, self.turning)
 
@@ -278,7 +281,8 @@ class ModalEquations:
     @cached_property
     def following(self) -> Vector:
         """(k, n): coordinates of the shapes by which the structure follows a unit motion of each moving support dof."""
-        rows = [row for row, _ in support_loads(self.scene, self.matrices)[::3]]
+        by_displacement = support_loads(self.scene, self.matrices)[loads_of_order(0, self.shapes.moving)]
+        rows = [row for row, _ in by_displacement]
         projected = np.array([self.basis.project(row.T)[:, 0] for row in rows]).reshape(len(rows), len(self.omega))
         square = np.where(self.omega > 0.0, self.omega**2, np.inf)
         return np.asarray(projected / square)

@@ -16,7 +16,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 import reduction
 from contacts.path import borders
-from fembeam.scene import BodyMatrices, quoted, support_loads, tangent
+from fembeam.scene import BodyMatrices, loads_of_dof, quoted, support_loads, tangent
 from fembeam.support import numbers, require, require_finite
 
 if TYPE_CHECKING:
@@ -37,8 +37,9 @@ def rest(model: ModalEquations) -> Vector:
     """[q, q_dot] (2n,): zero but for the impactors' velocities, and for supports that move, which all follow."""
     n = len(model.omega)
     start = np.zeros(2 * n)
+    moved = [signal for _, signal in support_loads(model.scene, model.matrices)]
     for i, shape in enumerate(model.following):
-        displacement, speed, _ = (signal for _, signal in support_loads(model.scene, model.matrices)[3 * i : 3 * i + 3])
+        displacement, speed, _ = (moved[number] for number in loads_of_dof(i))
         start[:n] += float(np.squeeze(displacement(np.zeros(1)))) * shape
         start[n:] += float(np.squeeze(speed(np.zeros(1)))) * shape
     if impactors := model.matrices.impactors:

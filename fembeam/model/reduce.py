@@ -103,12 +103,10 @@ def _of_beam(
 ) -> reduction.Basis:
     """The basis of one beam by itself, static shapes where it is loaded included."""
     if interface:
-        rows = [_rows(beam, places), *([] if beam.coupling is None else [beam.coupling[::3]])]
+        rows = [_rows(beam, places), *beam.following_loads]
         return reduction.craig_bampton(beam.M, beam.K, sparse.vstack(rows).T, len(chosen), beam.root)
     basis = _modes(beam, chosen)
-    rows = [_rows(beam, places)] if residual and places else []
-    if beam.coupling is not None:  # the static shapes of supports that move
-        rows.append(beam.coupling[::3])
+    rows = [*([_rows(beam, places)] if residual and places else []), *beam.following_loads]
     if rows:
         basis = reduction.with_residual(basis, beam.M, beam.K, sparse.vstack(rows).T, beam.root)
     return basis

@@ -17,7 +17,7 @@ from fembeam.response.contact_log import PlacedLog
 from fembeam.response.mean_force import mean_force
 from fembeam.response.readout import Readout
 from fembeam.response.section_forces import extremes, frame_forces_of, rows_of
-from fembeam.scene import split, unit_of
+from fembeam.scene import loads_of_order, split, unit_of
 from fembeam.structures import COMPONENTS, UP, Six
 from fembeam.support import is_whole, numbers, require
 from solvers.problem import FrictionLog, Losses
@@ -162,7 +162,7 @@ class Histories:
     def with_supports(self, coordinates: Vector, moving: int, order: int = 0) -> Vector:
         """q, q̇ or q'' (k, n) by ``order``, then the same derivative of each support dof that moves."""
         values = self._at_samples(coordinates)
-        return np.hstack([values, self.readout.loads[order : 3 * moving : 3].T]) if moving else values
+        return np.hstack([values, self.readout.loads[loads_of_order(order, moving)].T]) if moving else values
 
     def slope(self, z: ArrayLike, body: int = 0) -> Vector:
         """u_z(z, t), rad."""

@@ -95,9 +95,8 @@ def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | Fram
     first = sum(before.M.shape[0] for before in model.matrices.beams[:body])
     mine = slice(first, first + beam.M.shape[0])
     vectors = model.basis.vectors[mine]
-    rows = sparse.vstack([sparse.csr_matrix((0, beam.M.shape[0])), *(at.row(beam) for at in loaded(model.scene, body))])
-    if beam.coupling is not None:
-        rows = sparse.vstack([rows, beam.coupling[::3]])
+    places = (at.row(beam) for at in loaded(model.scene, body))
+    rows = sparse.vstack([sparse.csr_matrix((0, beam.M.shape[0])), *places, *beam.following_loads])
     inertia, load = _inertia(beam, vectors, model.omega, rows.toarray().T)
     inertia, carried = beam.spread @ inertia, carried_on(model.scene, beam, body)
     moved = np.hstack([beam.spread @ vectors, carried])

@@ -22,7 +22,7 @@ from scipy import sparse
 from fembeam.beams import bending_root, hermite_rows
 from fembeam.response.body_reactions import BodyHeld, rigid_shapes, static_solver
 from fembeam.response.histories import modal_accelerations
-from fembeam.scene import BodyMatrices, Spring, contact_rows, loads, quoted, support_loads, unsupported
+from fembeam.scene import PER_DOF, BodyMatrices, Spring, contact_rows, loads, loads_of_order, quoted, unsupported
 from fembeam.structures import COMPONENTS
 from fembeam.support import Part, Printed, is_finite, is_whole, require
 
@@ -181,7 +181,8 @@ def reaction_rows(model: Model) -> tuple[list[tuple[Any, int]], Vector]:
     columns, first = _acting(model, full), len(model.directions)  # where the loads begin
     parts, rows, done = [], [], 0
     named = any(beam.named for beam in full.beams)
-    feet = last = first + len(support_loads(model.scene, full))  # where those of feet begin
+    moving = model.shapes.moving
+    feet = first + PER_DOF * moving  # where those of feet begin
     for body, scene in enumerate((model.scene, *model.scene.bodies)):
         size = full.beams[body].M.shape[0]
         mine, known, loose = columns[done : done + size], model.matrices.beams[body], full.beams[body]
@@ -194,7 +195,7 @@ def reaction_rows(model: Model) -> tuple[list[tuple[Any, int]], Vector]:
         for part in (*scene.supports, *scene.springs):
             row = np.array(held.by(part))
             if isinstance(part, Spring):
-                row[:, first:last:3] -= _with_supports(part, "stiffness", model, body)
+                row[:, loads_of_order(0, moving, first)] -= _with_supports(part, "stiffness", model, body)
             if isinstance(part, Spring) and part.foot is not None:  # a moving foot adds to the force of its spring
                 row[:, feet] += part.stiffness * np.array(part.along or (1.0, 0.0))
                 feet += 1
@@ -205,7 +206,7 @@ def reaction_rows(model: Model) -> tuple[list[tuple[Any, int]], Vector]:
         parts.append((part, body))
         one = np.outer(part.along, rates[0]) if part.along is not None else rates
         row = np.hstack([np.zeros((len(one), columns.shape[1] - one.shape[1])), one])
-        row[:, first + 1 : last : 3] -= _with_supports(part, "damping", model, body)
+        row[:, loads_of_order(1, moving, first)] -= _with_supports(part, "damping", model, body)
         rows.append(_six(row) if named and len(row) == 2 else row)
     return parts, np.array(rows).reshape(len(rows), 6 if named else 2, columns.shape[1])
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.scene import signals_of, split, unit_of
+from fembeam.scene import loads_of_dof, signals_of, split, unit_of
 from fembeam.structures import COMPONENTS, turns
 from fembeam.support import is_finite, require, vector
 
@@ -101,7 +101,7 @@ def _of_support(model: Model, omega: Vector, driven: str, output: Any, body: int
     alone = shapes.named and not isinstance(output, list)
     rows = shapes.rows_with_supports([output] if alone else output)
     rows = rows[0] if alone else rows
-    vectors = [np.asarray(model.system.loads[3 * k + order][0]) for order in range(3)]
+    vectors = [np.asarray(model.system.loads[i][0]) for i in loads_of_dof(k)]
     answers = [_solved(model, omega, vector, slipping) for vector in vectors]
     q = sum((1j * omega[:, None]) ** order * one for order, one in enumerate(answers))
     values = q @ rows[..., :n].T + rows[..., n + k]

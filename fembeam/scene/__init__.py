@@ -25,6 +25,7 @@ from fembeam.scene.contact_rows import (
 from fembeam.scene.element import Element, tangent
 from fembeam.scene.impactor import Impactor
 from fembeam.scene.local_coordinate import LocalCoordinate, unit_of
+from fembeam.scene.moving_loads import PER_DOF, loads_of_dof, loads_of_order
 from fembeam.scene.parameters import called, changes_structure, numbered, path_of, replaced, value_of, with_value
 from fembeam.scene.part import ScenePart
 from fembeam.scene.part_places import at_parts, require_number

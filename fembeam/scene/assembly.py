@@ -37,6 +37,7 @@ from fembeam.beams import (
     spread,
     wavenumber,
 )
+from fembeam.scene.moving_loads import PER_DOF, loads_of_order
 from fembeam.scene.places import place_words, quoted
 from fembeam.scene.signals import support_motion
 from fembeam.structures import COMPONENTS, Six, require_components
@@ -78,7 +79,8 @@ class Matrices:
         `dofs` are those of the scene's own beam.
     impactors : of all bodies, one dof each, the last ones.
     carried : (N_all, k) what the k dofs of supports that move carry along by themselves, on all dofs; None: none moves.
-    coupling : (3 k, N): for each of these dofs the loads of its displacement, speed and acceleration.
+    coupling : (3 k, N): for each of these dofs the loads of its displacement, speed and acceleration, see
+        `fembeam.scene.moving_loads`.
     limit : {direction: kg}, the mass that a motion of the frame moves in the limit of fine meshes; {}: that of M.
     """
 
@@ -105,6 +107,13 @@ class Matrices:
     def spread(self) -> sparse.csr_matrix:
         """S (N_all, N): the free dofs of the scene's own beam among all, zero at supports."""
         return sparse.eye(self.dofs.size, format="csr")[:, np.flatnonzero(self.dofs.ravel() >= 0)]
+
+    @property
+    def following_loads(self) -> list[sparse.csr_matrix]:
+        """The loads (k, N) of displacements of supports that move, if any does: their static shapes follow it."""
+        if self.coupling is None or self.carried is None:
+            return []
+        return [self.coupling[loads_of_order(0, self.carried.shape[1])]]
 
     @property
     def base_loads(self) -> dict[str, Vector]:
@@ -415,7 +424,7 @@ def moving(M: Any, K: Any, C: Any, spread: Any, carried: Any, gyroscopic: Any = 
     """
     rates = C if gyroscopic is None else C - gyroscopic
     each = [-(carried.T @ A @ spread).tocsr() for A in (K, rates, M)]
-    order = np.arange(3 * carried.shape[1]).reshape(3, -1).T.ravel()
+    order = np.arange(PER_DOF * carried.shape[1]).reshape(PER_DOF, -1).T.ravel()
     return {"carried": carried, "coupling": sparse.vstack(each, format="csr")[order]}
 
 

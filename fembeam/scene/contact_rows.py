@@ -24,6 +24,7 @@ from fembeam.scene.annular_stop import AnnularStop
 from fembeam.scene.body_checks import components_at
 from fembeam.scene.element import force_both_ways
 from fembeam.scene.local_coordinate import LocalCoordinate
+from fembeam.scene.moving_loads import loads_of_dof
 from fembeam.scene.places import opposite
 from fembeam.scene.rubbing import Friction, spin_of, turning_row
 from fembeam.scene.signals import support_motion
@@ -201,7 +202,7 @@ def load_signals(scene: Scene) -> list[Any]:
     """The signals of `loads`, in their order."""
     parts = scene, *scene.bodies
     motions = [motion for part in parts for support in part.supports for motion in support_motion(support).values()]
-    found = [signal for motion in motions for signal in (motion, motion.derivative(1), motion.derivative(2))]
+    found = [signal for motion in motions for signal in _with_derivatives(motion)]
     for part in parts:
         found += [force.signal for force in part.forces]
         found += [spring.foot for spring in part.springs if spring.foot is not None]
@@ -215,10 +216,14 @@ def support_loads(scene: Scene, matrices: Matrices) -> list[tuple[sparse.csr_mat
         motions = [motion for support in part.supports for motion in support_motion(support).values()]
         coupling: Any = matrices.beams[body].coupling
         for number, motion in enumerate(motions):
-            signals = motion, motion.derivative(1), motion.derivative(2)
-            each = (coupling[3 * number + order] for order in range(3))
-            rows += [(matrices.among_all(row, body), signal) for row, signal in zip(each, signals, strict=True)]
+            pairs = zip(loads_of_dof(number), _with_derivatives(motion), strict=True)
+            rows += [(matrices.among_all(coupling[i], body), signal) for i, signal in pairs]
     return rows
+
+
+def _with_derivatives(motion: Any) -> tuple[Any, Any, Any]:
+    """The signals of a dof's three loads: its displacement, speed and acceleration."""
+    return motion, motion.derivative(1), motion.derivative(2)
 
 
 def carried_on(scene: Scene, beam: Matrices, body: int) -> Vector:
