@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -177,38 +177,63 @@ def reaction_rows(model: Model) -> tuple[list[tuple[Any, int]], Vector]:
 
     Of scenes with a body that is no `Beam` all six components (r, 6, c).
     """
-    full = unsupported(model.scene, model.matrices)
-    columns, first = _acting(model, full), len(model.directions)  # where the loads begin
-    parts, rows, done = [], [], 0
-    named = any(beam.named for beam in full.beams)
-    moving = model.shapes.moving
-    feet = first + PER_DOF * moving  # where those of feet begin
+    full, columns = unsupported(model.scene, model.matrices), _support_columns(model)
+    acting = _acting(model, full)
+    found = [*_of_supports(model, full, acting, columns), *_of_dashpots(model, acting.shape[1], columns)]
+    components = 6 if any(beam.named for beam in full.beams) else 2
+    rows = [row if len(row) == components else _six(row) for _, row in found]
+    return [part for part, _ in found], np.array(rows).reshape(len(rows), components, acting.shape[1])
+
+
+class _SupportColumns(NamedTuple):
+    """Columns of [F; s; q''; q'] with the loads that act through supports, springs and dashpots."""
+
+    displacements: slice  # of the dofs of supports that move
+    speeds: slice  # of the same dofs
+    feet: list[range]  # of each body, one for each spring whose foot moves
+
+
+def _support_columns(model: Model) -> _SupportColumns:
+    """The columns in a model: first F on the rows of contacts, then s in the order of `loads`."""
+    first, moving = len(model.directions), model.shapes.moving
+    feet, done = [], first + PER_DOF * moving
+    for scene in (model.scene, *model.scene.bodies):
+        begin = done + len(scene.forces)
+        done = begin + sum(spring.foot is not None for spring in scene.springs)
+        feet.append(range(begin, done))
+    return _SupportColumns(loads_of_order(0, moving, first), loads_of_order(1, moving, first), feet)
+
+
+def _of_supports(
+    model: Model, full: Matrices, acting: Vector, columns: _SupportColumns
+) -> Iterator[tuple[tuple[Any, int], Vector]]:
+    """(part, body) of each support and spring, and its rows (2, c) or (6, c)."""
+    each = np.split(acting, np.cumsum([beam.M.shape[0] for beam in full.beams]))
     for body, scene in enumerate((model.scene, *model.scene.bodies)):
-        size = full.beams[body].M.shape[0]
-        mine, known, loose = columns[done : done + size], model.matrices.beams[body], full.beams[body]
-        held: Any = (
-            BodyHeld(scene, known, loose, mine)
-            if isinstance(known, BodyMatrices) and isinstance(loose, BodyMatrices)
-            else _Held(scene, known, mine)
-        )
-        feet += len(scene.forces)
+        held, feet = _held(scene, model.matrices.beams[body], full.beams[body], each[body]), iter(columns.feet[body])
         for part in (*scene.supports, *scene.springs):
             row = np.array(held.by(part))
             if isinstance(part, Spring):
-                row[:, loads_of_order(0, moving, first)] -= _with_supports(part, "stiffness", model, body)
+                row[:, columns.displacements] -= _with_supports(part, "stiffness", model, body)
             if isinstance(part, Spring) and part.foot is not None:  # a moving foot adds to the force of its spring
-                row[:, feet] += part.stiffness * np.array(part.along or (1.0, 0.0))
-                feet += 1
-            parts.append((part, body))
-            rows.append(_six(row) if named and len(row) == 2 else row)
-        done += size
+                row[:, next(feet)] += part.stiffness * np.array(part.along or (1.0, 0.0))
+            yield (part, body), row
+
+
+def _held(scene: Scene, known: Matrices, loose: Matrices, acting: Vector) -> _Held | BodyHeld:
+    """The static answer of one body to all that acts on it, with its supports and without them."""
+    if isinstance(known, BodyMatrices) and isinstance(loose, BodyMatrices):
+        return BodyHeld(scene, known, loose, acting)
+    return _Held(scene, known, acting)
+
+
+def _of_dashpots(model: Model, width: int, columns: _SupportColumns) -> Iterator[tuple[tuple[Any, int], Vector]]:
+    """(part, body) of each dashpot, and its rows (2, c) or (6, c): they feel q', the last columns, and supports."""
     for part, body, rates in _dashpots(model):
-        parts.append((part, body))
-        one = np.outer(part.along, rates[0]) if part.along is not None else rates
-        row = np.hstack([np.zeros((len(one), columns.shape[1] - one.shape[1])), one])
-        row[:, loads_of_order(1, moving, first)] -= _with_supports(part, "damping", model, body)
-        rows.append(_six(row) if named and len(row) == 2 else row)
-    return parts, np.array(rows).reshape(len(rows), 6 if named else 2, columns.shape[1])
+        by_rate = np.outer(part.along, rates[0]) if part.along is not None else rates
+        row = np.hstack([np.zeros((len(by_rate), width - by_rate.shape[1])), by_rate])
+        row[:, columns.speeds] -= _with_supports(part, "damping", model, body)
+        yield (part, body), row
 
 
 def _with_supports(part: Any, name: str, model: Model, body: int) -> Vector:
