@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,27 +49,50 @@ def reduced(
     if omega_max is not None or mass_share is not None:
         modes = _enough(scene, elements, omega_max, mass_share)
     matrices, chosen = _chosen(scene, DEFAULT_MODES if modes is None else modes, elements, interface)
-    bases = []
-    for body, (beam, listed) in enumerate(zip(matrices.beams, chosen, strict=True)):
-        one = _of_beam(beam, loaded(scene, body), listed, residual, interface)
-        bases.append(_oriented(one, beam, watched(scene, body)))
+    bodies = []
+    for number, (body, listed) in enumerate(zip(matrices.beams, chosen, strict=True)):
+        basis = _of_beam(body, loaded(scene, number), listed, residual, interface)
+        bodies.append(_Reduced(body, _oriented(basis, body, watched(scene, number)), None if interface else listed))
     if elements is not None and not isinstance(modes, str):
-        _warn_of_the_mesh(matrices, max(basis.omega[min(len(chosen[0]), basis.count) - 1] for basis in bases))
+        _warn_of_the_mesh(matrices, max(one.basis.omega[min(len(chosen[0]), one.basis.count) - 1] for one in bodies))
+    _warn_of_drift(scene, bodies)
+    basis = _joined([one.basis for one in bodies], matrices)
+    shapes, *others = _shapes_of_each(scene, matrices, basis)
+    numbers = (*(number for one in bodies for number in one.numbers), *(0 for _ in matrices.impactors))
     again = "all" if isinstance(modes, str) else len(chosen[0]) if interface else chosen[0]
     options = {"modes": again, "elements": elements, **({"interface": True} if interface else {"residual": residual})}
-    kept = [basis.count if interface else len(own) for basis, own in zip(bases, chosen, strict=True)]
-    counts = tuple((count, basis.count - count) for count, basis in zip(kept, bases, strict=True))
-    numbers = [
-        tuple(range(basis.count)) if interface else _continued(own, basis.count)
-        for basis, own in zip(bases, chosen, strict=True)
-    ]
-    basis = _joined(bases, matrices)
-    _warn_of_drift(scene, matrices, bases)
-    shapes, *others = _shapes_of_each(scene, matrices, basis)
-    modes_of_all = sum(numbers, ()) + (0,) * len(matrices.impactors)
-    model = Model(scene, matrices, basis, modes_of_all, shapes, counts, tuple(others), options)
+    counts = tuple((one.modes, one.static) for one in bodies)
+    model = Model(scene, matrices, basis, numbers, shapes, counts, tuple(others), options)
     _warn_of_still_places(model)
     return model
+
+
+@dataclass(frozen=True, eq=False)
+class _Reduced:
+    """One body of a scene with the basis that it has by itself."""
+
+    matrices: Matrices
+    basis: reduction.Basis
+    asked: (
+        tuple[int, ...] | None
+    )  # numbers of the modes; None of one with interface=True, all of whose shapes are modes
+
+    @property
+    def modes(self) -> int:
+        """How many of its coordinates are modes."""
+        return self.basis.count if self.asked is None else len(self.asked)
+
+    @property
+    def static(self) -> int:
+        """How many are static shapes."""
+        return self.basis.count - self.modes
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Mode numbers, static shapes numbered on."""
+        if self.asked is None:
+            return tuple(range(self.basis.count))
+        return (*self.asked, *range(self.asked[-1] + 1, self.asked[-1] + 1 + self.static))
 
 
 def check_reduction(
@@ -127,11 +151,6 @@ def _rows(beam: Matrices, places: list[LocalCoordinate]) -> sparse.csr_matrix:
     return sparse.vstack([place.row(beam) for place in places], format="csr")
 
 
-def _continued(chosen: tuple[int, ...], count: int) -> tuple[int, ...]:
-    """Mode numbers, static shapes numbered on."""
-    return (*chosen, *range(chosen[-1] + 1, chosen[-1] + 1 + count - len(chosen)))
-
-
 def _oriented(basis: reduction.Basis, beam: Matrices, place: LocalCoordinate | None) -> reduction.Basis:
     """Positive at a place, or where each mode moves most; of equal frequencies the first along x, the next along y."""
     if isinstance(beam, BodyMatrices):
@@ -188,13 +207,19 @@ def _shapes_of_each(scene: Scene, matrices: Matrices, basis: reduction.Basis) ->
     return shapes
 
 
-def _warn_of_drift(scene: Scene, matrices: Matrices, bases: list[reduction.Basis]) -> None:
+def _warn_of_drift(scene: Scene, bodies: list[_Reduced]) -> None:
     """Warn when loads may carry a structure away that neither supports nor stops from several sides hold."""
-    for number, (part, beam, basis) in enumerate(zip((scene, *scene.bodies), matrices.beams, bases, strict=True)):
-        count = int(np.sum(basis.omega == 0.0))
+    for number, (part, body) in enumerate(zip((scene, *scene.bodies), bodies, strict=True)):
+        count = int(np.sum(body.basis.omega == 0.0))
         loads = bool(part.forces) or bool(scene.motions) or bool(scene.pulls)
         acting = [*part.stops, *(one for one in scene.acting if number and (one.coordinate.to or (0,))[0] == number)]
-        if beam.named and count and loads and not part.elements and sum(len(one.coordinates) for one in acting) < 2:
+        if (
+            body.matrices.named
+            and count
+            and loads
+            and not part.elements
+            and sum(len(one.coordinates) for one in acting) < 2
+        ):
             warnings.warn(carried_away(count, number, "structure"), UserWarning, stacklevel=4)
 
 
