@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.problem.friction import FREE, STICK
+
 if TYPE_CHECKING:
     from fembeam.response.histories import Histories
 
 Vector = NDArray[np.float64]
-STICK, FREE = 0.0, 2.0  # codes of what a slider does; -1 and 1 where it slips
 TINY = 1e-9  # share of a contact's loss that is spread evenly over it
 
 
@@ -55,20 +56,22 @@ def states(run: Histories, stop: int) -> tuple[Vector, Vector, Vector]:
 
 
 def _begun(run: Histories, stop: int, mine: Any, events: tuple[Vector, ...]) -> tuple[Vector, Vector]:
-    """Code and s as each contact begins: told by the event that ended this, by the end, or by what the run began with.
+    """Code and s of each contact as it begins, which the log does not hold.
 
-    One without an event slips all the way, if its slider has moved at all.
+    Its first transition tells: before "stick" or "free" it slipped, before "slip" it stuck. Without one it slipped
+    throughout, or stuck if its slider never moved; one that lasts has the state at the end of the run. A run that began
+    in contact began with the memory that it was given.
     """
-    log, (time, stuck, slips, slider) = run.friction_log, events
+    log, (time, caught, slips, slider) = run.friction_log, events
     t_in, t_out = log.t_in[mine], log.t_out[mine]
     first, ends = np.searchsorted(time, t_in), np.where(np.isnan(t_out), np.inf, t_out)
     known = first < np.searchsorted(time, ends, side="right")
     at = np.where(known, first, len(time))
-    was_stuck = ~np.append(stuck, True)[at]  # it slips from then on
-    moved = np.where(known | (log.slip[mine] > 0.0), np.sign(log.speed_in[mine]), STICK)
-    was_slip = np.where(np.append(slips, 0.0)[at] != 0.0, np.append(slips, 0.0)[at], moved)
-    codes = np.where(known & was_stuck, STICK, np.where(known, was_slip, moved))
-    places = np.where(known & was_stuck, np.append(slider, np.nan)[at], np.nan)
+    stuck = known & ~np.append(caught, True)[at]
+    way, came = np.append(slips, 0.0)[at], np.sign(log.speed_in[mine])  # signs of slip: at the transition, at the entry
+    slipped = np.where(way != 0.0, way, np.where(known | (log.slip[mine] > 0.0), came, STICK))
+    codes = np.where(stuck, STICK, slipped)
+    places = np.where(stuck, np.append(slider, np.nan)[at], np.nan)
     if len(mine) and np.isnan(t_out[-1]) and not known[-1]:
         codes[-1], places[-1] = _at_end(run, stop)
     if len(mine) and t_in[0] == 0.0 and len(run.began) > stop and run.began[stop][-2] != FREE:
