@@ -355,6 +355,15 @@ def test_a_structure_that_may_drift_is_told():
         fb.Scene(space_truss(), forces=[fb.PointForce("top", drive(), "x")]).reduce(modes=7)
 
 
+def test_influence_is_that_of_beams_alone():
+    """1 on translations, of impactors too; refused where a body has directions, instead of zeros."""
+    strike = fb.Impactor(0.5, mass=0.1, law=LAW, gap=1e-3, velocity=0.0)
+    beams = fb.Scene(BEAM, [fb.Clamped(0.0)], impactors=[strike]).matrices(elements=2)
+    assert beams.influence.tolist() == [1, 0, 1, 0, 1]
+    with pytest.raises(ValueError, match="influence is known of a Beam only"):
+        _ = fb.Scene(space_truss()).matrices().influence
+
+
 def test_stops_of_a_beam_have_names_too():
     scene = fb.Scene(BEAM, [fb.Clamped(0.0)], stops=[fb.Stop(0.5, LAW, 1e-3, name="snubber"), fb.Stop(0.4, LAW, 1e-3)],
                      forces=[fb.PointForce(0.5, drive())])  # fmt: skip

@@ -51,22 +51,22 @@ class Item:
     Attributes
     ----------
     z : m. side : +1 above, -1 below. width : inches along the beam that it needs. text : its label, or none.
-    draw : draws it with a pen at the beam's surface. kind : parts of one kind may share a label. gap : for that, m.
-    tall : inches outwards. fixed : whether it must stand at its place. mute : whether it only keeps a way free.
+    draw : draws it with a pen at the beam's surface; None of one that only keeps a way free.
+    kind : parts of one kind may share a label. gap : for that, m.
+    tall : inches outwards. fixed : whether it must stand at its place.
     link : (body, z), where a line from it leads.
     """
 
     z: float
     side: int
     width: float
-    draw: Callable[[Pen], None]
+    draw: Callable[[Pen], None] | None
     text: str
     name: str
     kind: tuple[Any, ...] = ()
     gap: float = 0.0
     tall: float = 0.5
     fixed: bool = False
-    mute: bool = False
     link: tuple[int, float] | None = None
 
 
@@ -212,7 +212,8 @@ class _View:
             found = spread(true, widths, 0.05, self.width - 0.05, weights)
             lane.places[side] = x = true if found is None else found
             moved = [
-                abs(a - b) > 0.02 and not (item.fixed or item.mute) for item, a, b in zip(items, x, true, strict=True)
+                abs(a - b) > 0.02 and not (item.fixed or item.draw is None)
+                for item, a, b in zip(items, x, true, strict=True)
             ]
             lane.lifted[side] = any(moved)
             lane.reach[side] = max((item.tall for item in items), default=0.1) + LIFT * any(moved) + 0.1
@@ -284,7 +285,7 @@ class _View:
 
     def _symbol(self, axis: Axes, lane: Lane, item: Item, x: float) -> None:
         """One symbol; beside its place it stands on a foot that reaches there."""
-        if item.mute:
+        if item.draw is None:
             return
         own = self.x(item.z)
         pen = self.pen(axis, lane, own if item.fixed else x, item.side, item.name)
@@ -333,10 +334,10 @@ class _View:
         return [(x, own + side * STEM), *self._mate(lane, item, item.z)[::-1][1:], *end]
 
     def _mate(self, lane: Lane, item: Item, z: float) -> list[tuple[float, float]]:
-        """The way that the mute partner of an item keeps free, from outside to the beam."""
+        """The way that the partner of an item, which is not drawn, keeps free, from outside to the beam."""
         for side in (1, -1):
             for i, other in enumerate(lane.of_side(side)):
-                if other.mute and (other.name, other.z) == (item.name, z):
+                if other.draw is None and (other.name, other.z) == (item.name, z):
                     start = lane.foot(side)
                     path = [(float(x), start + side * float(eta)) for x, eta in lane.labels[side][i].path]
                     x = float(lane.places[side][i])
@@ -411,11 +412,11 @@ def _ends(scene: Scene, body: int) -> Iterator[Item]:
         if to is None or body not in (0, to[0]):
             continue
         up = 1 if _over(scene, to[0]) else -1
-        mute = partial(Item, width=0.1, draw=_nothing, text="", name=part.label, mute=True, tall=0.2)
+        free = partial(Item, width=0.1, draw=None, text="", name=part.label, tall=0.2)
         if to[0] == 0:
-            yield mute(to[1], _side(part))
+            yield free(to[1], _side(part))
         else:
-            yield mute(to[1], -up) if body else mute(part.z, up)
+            yield free(to[1], -up) if body else free(part.z, up)
 
 
 def _side(part: Any) -> int:
@@ -423,10 +424,6 @@ def _side(part: Any) -> int:
     if part.always:
         return 1 if part.coordinate.to and part.coordinate.to[0] == 0 else -1
     return 1 if part.coordinate.rotation else -int(part.push)
-
-
-def _nothing(pen: Pen) -> None:
-    """Draws nothing."""
 
 
 def _items(view: _View, scene: Scene, body: int) -> Iterator[Item]:
@@ -465,7 +462,7 @@ def _masses(view: _View, scene: Scene, body: int) -> Iterator[Item]:
         met = any(low - 0.2 * view.per_inch < one.z < high + 0.2 * view.per_inch for one in others if one is not mass)
         foot, over = (0.56 + 0.22 * over, over + 1) if met else (0.12, over)
         yield _item(mass, body, 1, 0.24, partial(symbols.mass, arm=arm, foot=foot), fixed=True, tall=foot + 0.18)
-        yield Item(mass.z + mass.offset, 1, 0.24, _nothing, "", mass.label_on(body), mute=True, tall=foot + 0.18)
+        yield Item(mass.z + mass.offset, 1, 0.24, None, "", mass.label_on(body), tall=foot + 0.18)
 
 
 def _impactors(view: _View, impactor: Any, body: int) -> Iterator[Item]:
@@ -477,7 +474,7 @@ def _impactors(view: _View, impactor: Any, body: int) -> Iterator[Item]:
     side = 1 if both else -int(impactor.pushes[0])
     yield _item(impactor, body, side, 0.34, draw, kind=kind, fixed=both, tall=tall)
     if both:
-        yield Item(impactor.z, -1, 0.34, _nothing, "", impactor.label_on(body), fixed=True, mute=True, tall=tall)
+        yield Item(impactor.z, -1, 0.34, None, "", impactor.label_on(body), fixed=True, tall=tall)
 
 
 def _item(part: Any, body: int, side: int, width: float, draw: Callable[[Pen], None], **more: Any) -> Item:
@@ -496,7 +493,7 @@ def _support(support: Any, beam: float, body: int) -> Iterator[Item]:
     width, tall = (0.4, 0.2) if guided else (0.1, 0.14) if near or far else (0.24, 0.08)
     yield _item(support, body, -1, width, draw, fixed=True, tall=tall)
     if guided or not (near or far):
-        yield Item(support.z, 1, width, _nothing, "", support.label_on(body), fixed=True, mute=True, tall=tall)
+        yield Item(support.z, 1, width, None, "", support.label_on(body), fixed=True, tall=tall)
 
 
 def _guided(pen: Pen) -> None:

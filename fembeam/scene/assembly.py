@@ -69,7 +69,6 @@ class Matrices:
     root : (k, N) sparse R with RᵀR = K; `reduction.modal_basis(M, K, root=root)` is accurate on fine meshes. None
         under compression.
     dashpots : (N, N) sparse, the dashpots' part of C alone.
-    influence : r (N,), 1 on translations, 0 on slopes.
     base_load : (M_all r) (N,) in kg, columns of the supported dofs included; the load is -base_load ÿ.
     nodes : (m,) coordinates in m.
     dofs : (m, 2) free dof of (u, u_z) at each node, -1 where supported.
@@ -90,7 +89,6 @@ class Matrices:
     root: sparse.csr_matrix | None
     dashpots: sparse.csr_matrix
     damping: Any
-    influence: Vector
     base_load: Vector
     nodes: Vector
     dofs: NDArray[np.int64]
@@ -107,6 +105,13 @@ class Matrices:
     def spread(self) -> sparse.csr_matrix:
         """S (N_all, N): the free dofs of the scene's own beam among all, zero at supports."""
         return sparse.eye(self.dofs.size, format="csr")[:, np.flatnonzero(self.dofs.ravel() >= 0)]
+
+    @cached_property
+    def influence(self) -> Vector:
+        """R (N,): 1 on translations, 0 on slopes; ValueError where a body is no `Beam`."""
+        if self.bodies:
+            return np.concatenate([*(body.influence for body in self.bodies), np.ones(len(self.impactors))])
+        return np.tile([1.0, 0.0], len(self.nodes))[self.dofs.ravel() >= 0]
 
     @property
     def following_loads(self) -> list[sparse.csr_matrix]:
@@ -304,7 +309,6 @@ def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Mat
         root=stacked(roots, np.sqrt(stiffness)) if len(roots) == len(beams) else None,
         dashpots=stacked([beam.dashpots for beam in beams], damping),
         gyroscopic=stacked(turning, 0.0 * mass) if spins else None,
-        influence=np.concatenate([*(beam.influence for beam in beams), np.ones(len(mass))]),
         base_load=along.get("y", next(iter(along.values()), np.zeros(0))),
         bodies=beams,
         impactors=impactors,
@@ -400,7 +404,7 @@ def _on_nodes(scene: Scene, nodes: Vector, modes: int | None) -> Matrices:
     r = np.tile([1.0, 0.0], len(nodes))
     limit = {} if modes is None else {"y": float(r @ (M @ r)) + moved_by_rows(arms, free, r)}
     M, K, C = (A.tocsr()[free][:, free] for A in (M_all, K_all, C_all))
-    found = Matrices(scene.beam, M, K, root, C, scene.damping, r[free], (M_all @ r)[free], nodes, dofs, modes,
+    found = Matrices(scene.beam, M, K, root, C, scene.damping, (M_all @ r)[free], nodes, dofs, modes,
                      limit=limit)  # fmt: skip
     carried = _carried(scene, nodes)
     if carried is None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -85,6 +86,11 @@ class BodyMatrices(Matrices):
     def rounding(self) -> float:
         """0: it is not told."""
         return 0.0
+
+    @cached_property
+    def influence(self) -> Vector:
+        """ValueError: its dofs move along several directions."""
+        raise ValueError("influence is known of a Beam only, got a body with directions in Matrices; use base_loads")
 
     @property
     def accuracy(self) -> str:
@@ -233,7 +239,6 @@ def _of(scene: Scene, assembled: Assembled, modes: int | None, held: Any, conden
         None if root is None else (root @ S).tocsr(),
         C,
         scene.damping,
-        influence=np.zeros(S.shape[1]),
         base_load=np.zeros(S.shape[1]),
         nodes=np.zeros(0),
         dofs=np.zeros((0, 2), dtype=int),

@@ -18,7 +18,6 @@ from fembeam.support import is_finite, require
 
 Direction: TypeAlias = str | Sequence[float]
 Six: TypeAlias = tuple[float, ...]  # one number for each of COMPONENTS
-TRANSLATIONS, ROTATIONS = COMPONENTS[:3], COMPONENTS[3:]
 UP: Six = (0.0, 1.0, 0.0, 0.0, 0.0, 0.0)  # u of a beam
 TURN: Six = (0.0, 0.0, 0.0, -1.0, 0.0, 0.0)  # its u_z
 ADVICE = "write 'x', '-y', 'rz', or three numbers"
