@@ -19,6 +19,8 @@ from fembeam.beams.damping import ModalDamping, Rayleigh
 from fembeam.beams.mesh import (
     ERROR_CONSTANT,
     FREQUENCY_TOLERANCE,
+    MESHED_MODES,
+    MOST_ELEMENTS,
     SAME_PLACE,
     SHORTEST,
     SHORTEST_PRESSED,

@@ -22,6 +22,8 @@ Vector = NDArray[np.float64]
 FREQUENCY_TOLERANCE = 1e-6  # relative, promised for each mode asked for
 ERROR_CONSTANT = 1 / 1440  # relative error of omega of a cubic Hermite mesh: (beta h)^4/1440
 WAVE_STEP = (0.65 * FREQUENCY_TOLERANCE / ERROR_CONSTANT) ** 0.25  # beta h = 0.175, a third below the promise
+MESHED_MODES = 10  # modes for whose frequencies a mesh is made where none are asked for
+MOST_ELEMENTS = 10_000  # of one mesh: above it rounding of K hides the lowest frequencies
 SAME_PLACE = 1e-9  # of the length: features closer than this share a node
 SHORTEST = 1e-4  # of the length: rounding of K grows like (length/h)³, 2e-4 of the first omega² here
 SHORTEST_PRESSED = 4e-3  # the same under compression, where K has no root that keeps rounding away from frequencies

@@ -18,11 +18,12 @@ from solvers.problem.whole_runs import whole_runs
 if TYPE_CHECKING:
     from fembeam.model import Model
 
-PERIODS = 20.0  # of the lowest mode that the trial lasts
-FEW_STOPS, LEAST_PERIODS = 100, 4.0  # with more stops it is shorter in proportion, down to these periods
-MOST_PERIODS = 3000.0  # of the highest mode that it may take
-MOST_RECORDED = 30_000.0  # likewise where records or sweeps drive, whose strongest part may come late
-NOMINAL_SPEED = 0.1  # m/s, where the trial tells none
+PERIODS = 20.0  # periods of the lowest mode that swings: how long a trial usually lasts
+FEW_STOPS = 100  # stops up to which a trial lasts PERIODS; with more it is shorter in proportion
+LEAST_PERIODS = 4.0  # periods of the lowest mode that it lasts nevertheless
+MOST_PERIODS = 3000.0  # periods of the highest mode that a trial may last, which costs the time
+MOST_RECORDED = 30_000.0  # periods of the highest mode under records or sweeps: the strongest part may come late
+NOMINAL_SPEED = 0.1  # m/s, speed of impact at a stop that no trial struck
 MOST_STRUCK = 40  # stops; each takes a fiftieth of a second
 NAMED = 6  # stops in a warning
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 
-DEFAULT_MODES = 2
+DEFAULT_MODES = 2  # modes of each body that a model keeps where none are asked for
 COARSE = 0.01  # estimated relative error of the highest kept frequency, above which elements as asked get a warning
 FINE = 1e-6  # estimated rounding of the lowest frequency, likewise
 FIRST_TRY = 8  # modes, doubled until a frequency or share of mass is reached

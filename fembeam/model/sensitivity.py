@@ -37,13 +37,18 @@ if TYPE_CHECKING:
     from fembeam.model.run import Run
 
 Vector = NDArray[np.float64]
-STRUCTURE, SIGNAL, OTHER = 1e-3, 1e-6, 1e-5  # steps of the data, in units of the value: modes are known less exactly
-KNOT = 1e-7  # of knots of laws: times between the present knot and one nearby have the slope of the other side
-SMALL = 1e-6  # of that step, of a value that is zero, where it is refused
-UNIT = 1.0  # what stands for a value that is zero, of a load, a gap or a law
-FELT = 1e-4  # relative change of frequencies or shapes by which a step of a number that is zero is felt
-FIRST, LEAST = 1e-6, 1e-30  # of these steps, the first that is tried and the smallest
-ROUGH = 1e-2  # by which differences of one and of two steps may differ, relatively
+# Steps by which a number is varied, as shares of its value:
+STRUCTURE = 1e-3  # of a number that changes modes, which are known less exactly than other data
+SIGNAL = 1e-6  # of a number of a signal
+OTHER = 1e-5  # of a gap, of a number of a law
+KNOT = 1e-7  # of an indentation where a law has a kink: small, since between both places the law has the other slope
+
+UNIT = 1.0  # SI unit: stands for the value where it is zero, unless it changes modes
+SMALL = 1e-6  # part of its usual step by which a zero is varied whose usual step the scene refuses
+FELT = 1e-4  # relative change of frequencies or shapes that the step of a zero which changes modes shall exceed
+FIRST = 1e-6  # SI unit: the step of such a zero that is tried first; 1/FIRST is the largest
+LEAST = 1e-30  # SI unit: the smallest step of such a zero
+ROUGH = 1e-2  # relative difference of the derivatives by one and by two steps, above which modes do not change smoothly
 CHAOS = 1e6  # growth of small changes above which a derivative says little
 LONGEST = 60  # contacts that are printed
 

@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 REACH = 0.12  # of the body's size, length of springs and arrows
-BESIDE = 0.5  # of it, where what strikes stands
-RING = 0.4  # of that, radius of a circular clearance
-FREE = 0.03  # the same, between a place and the arrow of a stop
+BESIDE = 0.5  # of REACH, the distance at which what strikes stands
+RING = 0.4  # of REACH, radius of a circular clearance
+FREE = 0.03  # of the body's size, between a place and the arrow of a stop
 LISTED = 32  # characters of a line in the list of what stands on a body in space
 SLIMMEST = 0.7  # of its longest side, what a box in space is wide at least, so that its axes can be read
 ZIGZAG = np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]) * 0.12  # of the length of a spring

@@ -23,6 +23,8 @@ import reduction
 from fembeam.beams import (
     ERROR_CONSTANT,
     FREQUENCY_TOLERANCE,
+    MESHED_MODES,
+    MOST_ELEMENTS,
     SAME_PLACE,
     SHORTEST,
     SHORTEST_PRESSED,
@@ -50,10 +52,8 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 
-DEFAULT_MODES = 10
-MOST_MODES = 300  # 5400 elements, about a minute; a slender beam has lost its meaning long before
+MOST_MODES = 300  # of one mesh: 5400 elements, about a minute; a slender beam has lost its meaning long before
 MOST_DENSE = 2000  # free dofs of which all modes may be asked for, about ten seconds
-MOST_ELEMENTS = 10_000  # above it rounding of K hides the lowest frequencies
 DENSE = 200  # free dofs, below which the dense solver is quicker
 UNIT = 1e-12  # of 1: entries of a row that stands for one dof
 
@@ -261,7 +261,7 @@ def _one_beam(scene: Scene, elements: int | None, modes: int | None, probes: Seq
     _check_buckling(scene)
     borders = borders_of(scene, probes)
     if elements is None:
-        modes = DEFAULT_MODES if modes is None else int(modes)
+        modes = MESHED_MODES if modes is None else int(modes)
         _check_modes(modes)
         return _on_nodes(scene, _resolving(scene, borders, modes), modes)
     matrices = _on_nodes(scene, spread(scene.beam, borders, elements), None)
@@ -357,7 +357,7 @@ def _resolving(scene: Scene, borders: Vector, modes: int) -> Vector:
 def _check_buckling(scene: Scene) -> None:
     """Raise ValueError when the beam has buckled under its axial force."""
     if scene.beam.axial_force < 0:
-        spare = buckling_load(scene, 2 * DEFAULT_MODES)
+        spare = buckling_load(scene, 2 * MESHED_MODES)
         most = f"{spare - scene.beam.axial_force:.6g}"
         require(spare > 0, f"axial_force must stay above -{most} N, where the beam buckles", scene.beam.axial_force,
                 "Beam", "press less, or support it more")  # fmt: skip

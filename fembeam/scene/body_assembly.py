@@ -17,7 +17,8 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 import reduction
-from fembeam.scene.assembly import DEFAULT_MODES, UNIT, Matrices, Vector, moved_by_rows, moving
+from fembeam.beams import MESHED_MODES
+from fembeam.scene.assembly import UNIT, Matrices, Vector, moved_by_rows, moving
 from fembeam.scene.places import place_words, quoted
 from fembeam.scene.rotors import Disk, gyroscopic, shaft_axes
 from fembeam.scene.signals import support_motion
@@ -186,7 +187,7 @@ def _made(scene: Scene, elements: int | None, modes: int | None, places: tuple[A
     meshed = getattr(scene.beam, "meshed", True)
     if not meshed or not hasattr(scene.beam, "coarse"):
         return scene.beam.assembled(elements if meshed else None, modes, places)
-    count = DEFAULT_MODES if modes is None else int(modes)
+    count = MESHED_MODES if modes is None else int(modes)
     coarse = scene.beam.coarse(count, places)
     check_buckling(scene.beam, lambda body: _free_stiffness(scene, body.coarse(count, places)))
     own = _of(scene, coarse, count, _held(scene, coarse), condense=True)

@@ -18,6 +18,8 @@ from scipy import sparse
 import reduction
 from fembeam.beams import (
     FREQUENCY_TOLERANCE,
+    MESHED_MODES,
+    MOST_ELEMENTS,
     SAME_PLACE,
     SHORTEST,
     SHORTEST_PRESSED,
@@ -48,8 +50,6 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 
-DEFAULT_MODES = 10
-MOST_ELEMENTS = 10_000
 MECHANISM = 1e-4  # of a motion without resistance: what is left of it without the rigid part, where there is any
 
 
@@ -227,7 +227,7 @@ def assemble(
     stops = _stops(frame, places)
     if elements is not None:
         return _on(frame, _spread(frame, stops, elements), "elements as asked")
-    count = DEFAULT_MODES if modes is None else int(modes)
+    count = MESHED_MODES if modes is None else int(modes)
     highest = _highest(frame, places, count) if omega is None else float(omega)
     kept = (
         f"frequencies to {highest:.6g} rad/s"

@@ -22,16 +22,18 @@ from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
 
-LEAD_IN = 10.0  # correlation times: what came before has fallen to e^-10
-SEGMENT = 400.0  # correlation times of a segment under tones
-BATCHES = 8  # of such a segment, so that one is 50 correlation times; noise has one realisation to a batch
-REALISATIONS = 16  # of noise in a run, at least, unless they would be shorter than
-SHORTEST = 8.0  # correlation times
-LONGEST = 100.0  # correlation times, and eight segments of the spectrum: the lead-in costs at most 5 %
-RENEWAL = 5.0  # correlation times left out after noise was renewed: e^-5 of the old noise is left
-MOST_SAMPLES = 2_000_000  # of a segment
-FEWEST_SAMPLES = 64
-REACHED = "index", "dropped", "taken", "kept", "discarded", "time", "seconds"  # fields that change
+# In correlation times of the structure, after n of which e^-n of what came before is left:
+LEAD_IN = 10.0  # left out at the start of a run, where the transient dies out
+RENEWAL = 5.0  # left out at the start of a segment whose noise was renewed
+SEGMENT = 400.0  # length of a segment at most
+SHORTEST = 8.0  # length of a realisation of noise at least
+LONGEST = 100.0  # length of a realisation of noise at most, but for long segments of its spectrum: RENEWAL costs 5 %
+
+BATCHES = 8  # parts of a segment, for standard errors: 50 correlation times each; a realisation of noise is one part
+REALISATIONS = 16  # of noise that a run holds at least, fewer where they would be shorter than SHORTEST
+MOST_SAMPLES = 2_000_000  # samples of a segment with its lead-in at most
+FEWEST_SAMPLES = 64  # samples that a run keeps at least
+REACHED = "index", "dropped", "taken", "kept", "discarded", "time", "seconds"  # fields that a checkpoint keeps
 
 
 @dataclass(frozen=True, eq=False)
