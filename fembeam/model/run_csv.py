@@ -77,60 +77,62 @@ def histories(
 ) -> dict[str, Vector]:
     """Columns of every `stride`-th sample, by name and unit: quantities at places, of stops, of supports."""
     require(stride >= 1, "stride must be at least 1", stride, "Run", "1 keeps every sample")
-    require(not isinstance(quantities, str), "quantities must be a list", quantities, "Run", "put it in brackets")
-    named = run.shapes.named
-    listed = isinstance(places, (list, tuple)) if named else np.ndim(places) == 1  # type: ignore[arg-type]
-    require(places is None or listed, "places must be a list", places, "Run", "put it in brackets")
+    _check_lists(run, places, quantities)
     asked = USUAL if quantities is None else quantities
     unknown = [name for name in asked if name not in UNITS]
     require(not unknown, f"quantities must be among {', '.join(UNITS)}", unknown, "Run", "choose from these")
-    where: dict[str, Any] = usual_places(run.shapes)
-    if places is not None and not named:
-        astray = [z for z in places if not is_finite(run.shapes.place(z))]
-        require(not astray, "places of a beam must be numbers", astray, "Run", "give z in m")
-        where = {f"at {z}" if isinstance(z, str) else f"at {z:.12g} m": z for z in places}
-    require(named or "section forces" not in asked, "section forces are of a frame", list(asked), "Run",
-            "ask for moment and shear")  # fmt: skip
-    columns, there = {"t [s]": run.t}, [what for what in asked if what not in ELSEWHERE]
-    if named:
-        columns |= _at_places(run, there, None if places is None else [tuples(at) for at in places])
-    else:
-        for name, z in where.items():
-            columns |= {f"{what} {name} [{_unit(what, z)}]": _at(run, what, z) for what in there}
+    columns = {"t [s]": run.t, **(_at_named_places if run.shapes.named else _along_a_beam)(run, asked, places)}
     for stop in range(len(run.stops)):
-        of_stops = (what for what in asked if what in ("indentation", "force"))
-        key = run.key(stop, alone=True)
-        for what in of_stops:
-            columns |= _of_stop(run, what, stop, key)
-        columns |= {f"work {key} [J]": run.losses.history[:, stop]} if "work" in asked else {}
-        columns |= _of_friction(run, stop, key, asked) if run.rubs[stop, 1] else {}
-    for i, one in enumerate(run.reactions() if "reactions" in asked else ()):
-        about = one.name if one.part.name is not None else f"{i} ({one.name})"
-        if isinstance(one, BodyReaction):
-            have = run.shapes.components if one.body == 0 else run.others[one.body - 1].components
-            columns |= {f"reaction {c} {about} [{'N m' if c[0] == 'r' else 'N'}]": one[c] for c in have}
-            continue
-        columns |= {f"reaction force {about} [N]": one.force, f"reaction moment {about} [N m]": one.moment}
+        columns |= _of_stop(run, stop, asked)
+    if "reactions" in asked:
+        columns |= _of_reactions(run)
     return {name: column[::stride] for name, column in columns.items()}
 
 
-def _at_places(run: Run, asked: Sequence[str], places: Sequence[Any] | None) -> dict[str, Vector]:
-    """Quantities of a body whose places have names; a place without a direction moves along all components."""
-    found: dict[str, Vector] = {}
+def _check_lists(run: Run, places: Any, quantities: Any) -> None:
+    """Raise ValueError for one place, or one quantity, where a list of them belongs."""
+    require(not isinstance(quantities, str), "quantities must be a list", quantities, "Run", "put it in brackets")
+    listed = isinstance(places, (list, tuple)) if run.shapes.named else np.ndim(places) == 1
+    require(places is None or listed, "places must be a list", places, "Run", "put it in brackets")
+
+
+def _along_a_beam(run: Run, asked: Sequence[str], places: Sequence[Any] | None) -> dict[str, Vector]:
+    """Quantities at z of a beam."""
+    where: dict[str, Any] = usual_places(run.shapes)
+    if places is not None:
+        astray = [z for z in places if not is_finite(run.shapes.place(z))]
+        require(not astray, "places of a beam must be numbers", astray, "Run", "give z in m")
+        where = {f"at {z}" if isinstance(z, str) else f"at {z:.12g} m": z for z in places}
+    require("section forces" not in asked, "section forces are of a frame", list(asked), "Run",
+            "ask for moment and shear")  # fmt: skip
+    there = [what for what in asked if what not in ELSEWHERE]
+    return {f"{what} {name} [{_unit(what, z)}]": _at(run, what, z) for name, z in where.items() for what in there}
+
+
+def _at_named_places(run: Run, asked: Sequence[str], places: Sequence[Any] | None) -> dict[str, Vector]:
+    """Section forces, then motion, at places that have names; one without a direction moves along all components."""
     sections = [what for what in asked if what in SECTIONS]
     require(places is not None or not sections, "places must be given for section forces", sections, "Run",
             "write places=[('A-B', 0.4)], a member and a distance in m")  # fmt: skip
+    found: dict[str, Vector] = {}
     ways = usual_places(run.shapes) if places is None else {}
-    for at in places or ():
-        own = at[0] if is_directed(at) else at
-        for what in sections:
-            forces = run.section_forces(own) if what == "section forces" else {what: _at(run, what, own)}
-            units = {what: UNITS[what]} if what in forces else {name: _unit_of_force(name) for name in forces}
-            found |= {f"{name} at {place_words(own)} [{units[name]}]": x for name, x in forces.items()}
+    for at in map(tuples, places or ()):
+        found |= _sections_at(run, sections, at[0] if is_directed(at) else at)
         along = [at] if is_directed(at) else [(at, way) for way in run.shapes.components]
         ways |= {f"at {directed_words(one)}": one for one in along}
+    motions = [what for what in asked if what not in SECTIONS and what not in ELSEWHERE]
     for name, one in ways.items():
-        found |= {f"{what} {name} [{_unit(what, one)}]": _at(run, what, one) for what in asked if what not in SECTIONS}
+        found |= {f"{what} {name} [{_unit(what, one)}]": _at(run, what, one) for what in motions}
+    return found
+
+
+def _sections_at(run: Run, sections: Sequence[str], place: Any) -> dict[str, Vector]:
+    """Moment, shear force or stress at a place on a member, or all section forces."""
+    found: dict[str, Vector] = {}
+    for what in sections:
+        forces = run.section_forces(place) if what == "section forces" else {what: _at(run, what, place)}
+        units = {what: UNITS[what]} if what in forces else {name: _unit_of_force(name) for name in forces}
+        found |= {f"{name} at {place_words(place)} [{units[name]}]": x for name, x in forces.items()}
     return found
 
 
@@ -139,7 +141,23 @@ def _unit_of_force(name: str) -> str:
     return "N" if name[0] in "NQ" else "N m"
 
 
-def _of_stop(run: Run, what: str, stop: int, key: str) -> dict[str, Vector]:
+def _of_stop(run: Run, stop: int, asked: Sequence[str]) -> dict[str, Vector]:
+    """Indentation and force of a stop, work, friction, as far as asked for."""
+    found: dict[str, Vector] = {}
+    key = run.key(stop, alone=True)
+    for what in asked:
+        if what in ("indentation", "force"):
+            found |= _by_components(run, what, stop, key)
+    if "work" in asked:
+        found[f"work {key} [J]"] = run.losses.history[:, stop]
+    if "friction" in asked and run.rubs[stop, 1]:
+        found[f"friction {key} [N]"] = run.friction(stop)
+    if "friction loss" in asked and run.rubs[stop, 1]:
+        found[f"friction loss {key} [J]"] = run.friction_loss[:, stop]
+    return found
+
+
+def _by_components(run: Run, what: str, stop: int, key: str) -> dict[str, Vector]:
     """The indentation or force of a stop; of an annular one both components of the force."""
     values, unit = getattr(run, what)(stop), run.unit(what, stop)
     if values.ndim == 1:
@@ -149,10 +167,17 @@ def _of_stop(run: Run, what: str, stop: int, key: str) -> dict[str, Vector]:
     return {f"{what} {key} {way}".rstrip() + f" [{unit}]": values[:, i] for i, way in enumerate(ways)}
 
 
-def _of_friction(run: Run, stop: int, key: str, asked: Sequence[str]) -> dict[str, Vector]:
-    """F_t and the loss by friction of a stop."""
-    found = {f"friction {key} [N]": run.friction(stop)} if "friction" in asked else {}
-    return found | ({f"friction loss {key} [J]": run.friction_loss[:, stop]} if "friction loss" in asked else {})
+def _of_reactions(run: Run) -> dict[str, Vector]:
+    """Force and moment of every support, spring and dashpot; of a body with directions by components."""
+    found: dict[str, Vector] = {}
+    for i, one in enumerate(run.reactions()):
+        about = one.name if one.part.name is not None else f"{i} ({one.name})"
+        if isinstance(one, BodyReaction):
+            have = (run.shapes, *run.others)[one.body].components
+            found |= {f"reaction {c} {about} [{'N m' if c[0] == 'r' else 'N'}]": one[c] for c in have}
+        else:
+            found |= {f"reaction force {about} [N]": one.force, f"reaction moment {about} [N m]": one.moment}
+    return found
 
 
 def _vector(direction: Any) -> str:
