@@ -65,7 +65,7 @@ def test_a_contact_between_two_samples_shows_in_the_nearest_picture(run):
     entry = float(run.contacts.t_in[number])
     columns = {name: column[[number]] for name, column in run.contacts.arrays().items()}
     log = replace(run.contacts, **columns | {"t_out": np.array([entry + 1e-6])})
-    short = replace(run, contacts=log, kept={"forces": np.zeros((len(run.stops), len(run.t)))})
+    short = replace(run, contacts=log, kept_readout={"forces": np.zeros((len(run.stops), len(run.t)))})
     stage = animation._stage(short, animation._samples(short, None, 30), 25.0)
     (picture,) = np.flatnonzero(stage.forces[log.stop[0]])
     assert picture == np.argmin(np.abs(run.t[stage.samples] - entry))

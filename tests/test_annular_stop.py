@@ -180,7 +180,7 @@ def test_saved_runs_keep_the_circle(run, tmp_path):
         np.testing.assert_array_equal(getattr(again, name)(0), getattr(run, name)(0))
     np.testing.assert_array_equal(again.acceleration(0.4, "x"), run.acceleration(0.4, "x"))
     np.testing.assert_array_equal(again.reactions().force, run.reactions().force)
-    assert again.acting == run.acting
+    assert again.places == run.places
     with np.load(tmp_path / "run.npz") as file:
         contents = dict(file)
     assert contents["directions"].shape == (2, 4)

@@ -162,7 +162,7 @@ def test_the_set_of_a_yielding_stop_outlasts_segments_of_noise():
     assert largest[0] > 0.0
     assert np.all(np.diff(largest) >= 0.0)
     for before, run in pairwise(runs):
-        assert np.array_equal(run.began[0], before.end[2:])
+        assert np.array_equal(run.memory_at_start[0], before.end[2:])
 
 
 def test_realisations_are_independent_resumable_and_the_same_with_two_workers(tmp_path):

@@ -244,7 +244,7 @@ class ModalEquations:
         stops = [(z, one.push, one.gap) for z, one in zip(along, rows, strict=True)]
         found: dict[str, Any] = {
             "stops": np.array(stops, dtype=float).reshape(-1, 3),
-            "on": np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
+            "between": np.array([(one.body, ON.index(one.on[0]), one.on[1]) for one in rows], dtype=int).reshape(-1, 3),
             "kinds": np.array([(one.rotation, one.always) for one in rows], dtype=bool).reshape(-1, 2),
             "circles": np.array([one.circle for one in rows], dtype=float).reshape(-1, 3),
             "rubs": np.array([one.rub for one in rows], dtype=float).reshape(-1, 4),
@@ -252,8 +252,13 @@ class ModalEquations:
         }
         for array in found.values():
             array.flags.writeable = False
-        words = {name: tuple(getattr(one, name) for one in rows) for name in ("given", "acting")}
-        return {**found, **words, "names": tuple(one.name for one in rows), "scene": repr(self.scene)}
+        return {
+            **found,
+            "names": tuple(one.name for one in rows),
+            "name_given": tuple(one.given for one in rows),
+            "places": tuple(one.acting for one in rows),
+            "scene": repr(self.scene),
+        }
 
     @cached_property
     def system(self) -> solvers.System:

@@ -162,7 +162,7 @@ def _by_components(run: Run, what: str, stop: int, key: str) -> dict[str, Vector
     values, unit = getattr(run, what)(stop), run.unit(what, stop)
     if values.ndim == 1:
         return {f"{what} {key} [{unit}]": values}
-    given = run.acting[stop][1] if run.circles[stop, 0] else ("", "along")  # N, and the force along the tangent
+    given = run.places[stop][1] if run.circles[stop, 0] else ("", "along")  # N, and the force along the tangent
     ways = [direction if isinstance(direction, str) else _vector(direction) for direction in given]
     return {f"{what} {key} {way}".rstrip() + f" [{unit}]": values[:, i] for i, way in enumerate(ways)}
 
@@ -291,9 +291,9 @@ def parts(run: Run) -> list[Part]:
         mine = log.stop == stop
         peak, entry = log.peak_force[mine], log.speed_in[mine]
         numbers = (float(peak.max()), float(peak.mean()), float(entry.mean())) if mine.any() else (None,) * 3
-        if not run.kinds[stop, 1]:
+        if not run.always_acting[stop]:
             rows.append((run.name(stop), int(mine.sum()), *numbers))
-    length = unit_of("indentation", [*map(_turns, places.values()), *run.kinds[:, 0]])
+    length = unit_of("indentation", [*map(_turns, places.values()), *run.rotational])
     force, speed = run.unit("force"), run.unit("speed")
     found: list[Part] = [repr(run), (("", *(f"{name} / {length}" for name in ("mean", "std", "min", "max"))), moved)]
     head = "", "contacts", f"largest force / {force}", f"mean peak force / {force}", f"mean entry speed / {speed}"
@@ -314,7 +314,7 @@ def _rubbing(run: Run) -> list[Part]:
 
 def _elements(run: Run) -> list[Part]:
     """Work on every element, what it took for good, and the path of its sliders."""
-    acting = np.flatnonzero(run.kinds[:, 1]).tolist()
+    acting = np.flatnonzero(run.always_acting).tolist()
     rows = [(run.name(i), *(float(x[i]) for x in (run.losses.work, run.losses.loss, run.losses.slip))) for i in acting]
-    length = unit_of("indentation", run.kinds[acting, 0])
+    length = unit_of("indentation", run.rotational[acting])
     return [(("", "work / J", "loss / J", f"slip / {length}"), rows)] if rows else []

@@ -69,7 +69,7 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         "status": run.status,
         "sampled": run.sampled,
         "names": run.names,
-        "given": run.given,
+        "given": run.name_given,
         "scene": run.scene,
         "cost": {f.name: getattr(run.cost, f.name) for f in fields(run.cost)},
         "units": UNITS
@@ -77,7 +77,7 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         | ({"rubs": RUBS, "friction_log": FRICTION_LOG} if run.rubs.any() else {}),
         "reached": run.reached,
         "versions": versions(),
-        "acting": run.acting,
+        "acting": run.places,
         "bodies": [shapes.words for shapes in (run.shapes, *run.others)],
     }
     if run.source is not None:
@@ -87,7 +87,7 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
     arrays = {
         **{"t": run.t, "q": run.q, "q_dot": run.q_dot, "force": run._forces, "mean_force": _means(run)},
         **{"losses": np.stack((lost.work, lost.stored, lost.slip), axis=1), "work": lost.history, "end": run.end},
-        **{"stops": run.stops, "on": run.on, "kinds": run.kinds},
+        **{"stops": run.stops, "on": run.between, "kinds": run.kinds},
         **{"directions": run.directions, "impactor_masses": run.impactor_masses},
         **dict(zip(("nodes", "shapes"), _arrays_of(run.shapes), strict=True)),
         **{f"nodes_{i}": _arrays_of(shapes)[0] for i, shapes in enumerate(run.others, 1)},
@@ -245,23 +245,23 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         directions=arrays["directions"],
         impactor_masses=arrays["impactor_masses"],
         scene=about["scene"],
-        borders=partial(Transitions, *_unpacked(about["events"], arrays["transitions"]), names=names),
-        lost=partial(Losses, work, stored, slip, arrays["work"], names=names, **_rubbed(rubbed)),
+        make_transitions=partial(Transitions, *_unpacked(about["events"], arrays["transitions"]), names=names),
+        make_losses=partial(Losses, work, stored, slip, arrays["work"], names=names, **_rubbed(rubbed)),
         end=arrays["end"],
-        kept=unpacked(about["readout"], arrays, [getattr(one, "nodes", None) for one in shapes]),
+        kept_readout=unpacked(about["readout"], arrays, [getattr(one, "nodes", None) for one in shapes]),
         others=tuple(shapes[1:]),
         source=source,
         versions=about["versions"],
-        on=arrays["on"],
+        between=arrays["on"],
         kinds=arrays["kinds"],
         circles=arrays.get("circles", np.zeros((len(arrays["stops"]), 3))),
         rubs=arrays.get("rubs", np.zeros((len(arrays["stops"]), 4))),
-        rubbing=partial(_friction_log, arrays["friction_log"], names) if "friction_log" in arrays else None,
+        make_friction_log=partial(_friction_log, arrays["friction_log"], names) if "friction_log" in arrays else None,
         reached=float(about.get("reached", 0.0)),
-        acting=tuples(about["acting"]),
+        places=tuples(about["acting"]),
         sampled=about["sampled"],
         names=names,
-        given=tuple(map(bool, about["given"])),
+        name_given=tuple(map(bool, about["given"])),
     )
 
 

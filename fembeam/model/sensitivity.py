@@ -361,7 +361,8 @@ def _made(run: Run) -> tuple[Model, tuple[Vector, Vector, float], dict[str, Any]
         )
     q, q_dot = np.split(made.start[: 2 * len(model.omega)], 2)
     times = run.t if run.sampled else np.array([made.duration])
-    return model, (q, q_dot, made.duration), {"times": times, "method": made.solver, "memory": run.began or None}
+    options = {"times": times, "method": made.solver, "memory": run.memory_at_start or None}
+    return model, (q, q_dot, made.duration), options
 
 
 def _direction(model: Model, start: Any) -> Vector:

@@ -168,7 +168,7 @@ class _Contact(NamedTuple):
 
 def _contacts(run: Run) -> list[_Contact]:
     """All contacts in the order of the log."""
-    rows: Any = zip(run.stops.tolist(), run.on.tolist(), run.kinds.tolist(), strict=True)
+    rows: Any = zip(run.stops.tolist(), run.between.tolist(), run.kinds.tolist(), strict=True)
     return [
         _Contact(z, push, gap, body, ON[kind], number, rotation, always)
         for (z, push, gap), (body, kind, number), (rotation, always) in rows

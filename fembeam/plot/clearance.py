@@ -167,7 +167,7 @@ class Whirl:
 
 def _ways(run: Run, stop: int) -> list[str]:
     """The two directions of a stop, in words."""
-    ways = run.acting[stop][1]
+    ways = run.places[stop][1]
     return [way if isinstance(way, str) else named(direction_of(way, "orbit_in_clearance")) for way in ways]
 
 

@@ -39,7 +39,7 @@ def contacts(run: Run, discard: float = 0.0, axes: Sequence[Axes] | None = None)
     if not np.any(kept):
         raise ValueError("the run has no finished contact to draw")
     figure, drawn = sheet(2, 2, (7.0, 4.8), axes)
-    turning = run.kinds[np.unique(log.stop[kept]), 0]
+    turning = run.rotational[np.unique(log.stop[kept])]
     force, speed = unit_of("force", turning), unit_of("speed", turning).replace("/s", " s⁻¹")
     for axis, values, name, unit in (
         (drawn[0], 1e3 * (log.t_out - log.t_in)[kept], "duration", "ms"),

@@ -186,25 +186,25 @@ def _watched(run: Run, lo: float, hi: float) -> tuple[int, Any]:
     log, first = run.contacts, first_stop(run)
     if first is None:
         return 0, _resting_place(run)
-    inside = np.flatnonzero(_within(run, lo, hi) & ~run.kinds[log.stop, 0])
+    inside = np.flatnonzero(_within(run, lo, hi) & ~run.rotational[log.stop])
     stop = int(log.stop[inside[np.argmax(log.peak_force[inside])]]) if len(inside) else first
-    return int(run.on[stop, 0]), place_of(run, stop)
+    return int(run.between[stop, 0]), place_of(run, stop)
 
 
 def _stops_at(run: Run, body: int, z: Any) -> NDArray[np.int64]:
     """Numbers of the stops at a place, or of all where there is none; elements have no contacts."""
-    stops, z = ~run.kinds[:, 1], run._beam(body).place(z)
+    stops, z = ~run.always_acting, run._beam(body).place(z)
     if isinstance(z, tuple):
         here = np.array([place_of(run, stop) == z for stop in range(len(run.stops))], dtype=bool)
     else:
         here = np.isclose(run.stops[:, 0], z)
-    near = stops & here & (run.on[:, 0] == body)
+    near = stops & here & (run.between[:, 0] == body)
     return np.flatnonzero(near if near.any() else stops)
 
 
 def _listed(stops: NDArray[np.int64], run: Run) -> str:
     """Stops as words."""
-    if len(stops) == np.count_nonzero(~run.kinds[:, 1]) > 1:
+    if len(stops) == np.count_nonzero(~run.always_acting) > 1:
         return "all stops"
     return " and ".join(run.key(stop) for stop in stops.tolist())
 
@@ -242,7 +242,7 @@ def _draw_forces(axis: Axes, run: Run, lo: float, hi: float, least: float) -> No
     log, inside = run.contacts, _within(run, lo, hi)
     short = inside & (log.t_out - log.t_in < least)
     kept = (run.t >= lo) & (run.t <= hi)
-    always = np.flatnonzero(run.kinds[:, 1])
+    always = np.flatnonzero(run.always_acting)
     drawn = np.union1d(always, log.stop[inside])
     for stop in drawn:
         mine = log.stop == stop
@@ -252,7 +252,7 @@ def _draw_forces(axis: Axes, run: Run, lo: float, hi: float, least: float) -> No
             look.pop("label")
         axis.vlines(log.t_in[mine & short], 0.0, log.peak_force[mine & short], linewidth=1.2, **look)
     kind = "peak contact force" if len(drawn) > len(always) and np.all(short[inside]) else "contact force"
-    unit = unit_of("force", run.kinds[drawn, 0]) if len(drawn) else run.unit("force")
+    unit = unit_of("force", run.rotational[drawn]) if len(drawn) else run.unit("force")
     axis.set_ylabel(f"{'force' if len(always) else kind} / {unit}")
     if len(run.stops) > 1 and len(drawn):
         axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.0, fontsize=8)

@@ -40,7 +40,7 @@ def responses(run: Run, discard: float = 0.0) -> dict[str, Vector]:
 
 def first_stop(run: Run) -> int | None:
     """Number of the first stop or element that acts on displacement, not on the slope."""
-    found = np.flatnonzero(~run.kinds[:, 0])
+    found = np.flatnonzero(~run.rotational)
     return int(found[0]) if len(found) else None
 
 
@@ -55,7 +55,7 @@ def place_of(run: Run, stop: int) -> Any:
     z = float(run.stops[stop, 0])
     if not np.isnan(z):
         return z
-    place, direction = run.acting[stop]
+    place, direction = run.places[stop]
     direction = direction[0] if run.circles[stop, 0] else direction
     return place, unsigned(direction)
 

@@ -89,6 +89,6 @@ def latched_before(run: Histories, time: float) -> tuple[Vector, ...]:
 def _parameters_at_start(run: Histories, stop: int, law: Any) -> Vector:
     """The law's parameters with what it had latched when the run began."""
     parameters = np.array(law.parameters)
-    if run.began:
-        parameters[list(getattr(law, "memory", ()))] = run.began[stop]
+    if run.memory_at_start:
+        parameters[list(getattr(law, "memory", ()))] = run.memory_at_start[stop]
     return parameters

@@ -74,8 +74,8 @@ def _begun(run: Histories, stop: int, mine: Any, events: tuple[Vector, ...]) -> 
     places = np.where(stuck, np.append(slider, np.nan)[at], np.nan)
     if len(mine) and np.isnan(t_out[-1]) and not known[-1]:
         codes[-1], places[-1] = _at_end(run, stop)
-    if len(mine) and t_in[0] == 0.0 and len(run.began) > stop and run.began[stop][-2] != FREE:
-        codes[0], places[0] = run.began[stop][-2:]
+    if len(mine) and t_in[0] == 0.0 and len(run.memory_at_start) > stop and run.memory_at_start[stop][-2] != FREE:
+        codes[0], places[0] = run.memory_at_start[stop][-2:]
     return codes, places
 
 

@@ -49,34 +49,44 @@ class Histories:
     stops: Vector  # (m, 3): z (NaN of a place by name), push, gap of every contact
     directions: Vector  # (r, n), rows of contacts: δ = -directions·q - gap; two of a circular clearance: d + centre
     impactor_masses: Vector  # (i,) of the impactors, whose coordinates √m x are the last ones
-    borders: Callable[[], Any] = field(repr=False)  # what `transitions` are made by
-    lost: Callable[[], Losses] = field(repr=False)  # and `losses`
+    make_transitions: Callable[[], Any] = field(repr=False)  # called once, as `transitions` is first read
+    make_losses: Callable[[], Losses] = field(repr=False)
+    make_friction_log: Callable[[], FrictionLog] | None = field(default=None, repr=False)  # None without friction
     model: Model | None = None
-    kept: Mapping[str, Any] = field(default_factory=dict, repr=False)  # of a run read from a file, see `Readout`
+    kept_readout: Mapping[str, Any] = field(default_factory=dict, repr=False)  # of a run read from a file
     others: tuple[Any, ...] = ()  # of the further beams
-    began: tuple[Vector, ...] = ()  # what the laws had latched at the start, a row per contact, where it was given
+    memory_at_start: tuple[Vector, ...] = ()  # (m,) what the laws had latched then; () where it was not given
     end: Vector | None = None  # (2n + l,) [q, q̇] and what the laws have latched, at the time reached
-    on: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, of ON, number
+    between: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), dtype=int))  # (m, 3): body, ON, number
     kinds: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 2), dtype=bool))  # of rotation, always acting
     names: tuple[str, ...] = ()  # (m,) what every contact is called
-    given: tuple[bool, ...] = ()  # (m,) whether it was given that name, or it was made
-    acting: tuple[Any, ...] = ()  # (m,) of each contact z, or (place, direction); both directions of an annular stop
+    name_given: tuple[bool, ...] = ()  # (m,) whether the scene gives that name, or it was made
+    places: tuple[Any, ...] = ()  # (m,) of each contact z, or (place, direction); both directions of an annular stop
     circles: Vector = field(default_factory=lambda: np.zeros((0, 3)))  # (m, 3): radius, < 0 outer; centre; else zeros
     rubs: Vector = field(default_factory=lambda: np.zeros((0, 4)))  # (m, 4): μ, k_t, R (< 0 outer), Ω; else zeros
-    rubbing: Callable[[], FrictionLog] | None = field(default=None, repr=False)  # makes `friction_log`
     reached: float = 0.0  # s, the time of `end`
-    taken: Callable[[Vector], Any] | None = field(default=None, repr=False)  # sampled loads as the run took them
+    loads_taken: Callable[[Vector], Any] | None = field(default=None, repr=False)  # sampled loads as the run took them
     sampled: bool = True  # else t, q, q_dot are the final state alone, and no history
+
+    @property
+    def rotational(self) -> NDArray[np.bool_]:
+        """(m,) which contacts are of rotations: rad for m, N m for N."""
+        return self.kinds[:, 0]
+
+    @property
+    def always_acting(self) -> NDArray[np.bool_]:
+        """(m,) which act always, as elements do."""
+        return self.kinds[:, 1]
 
     @cached_property
     def transitions(self) -> Any:
         """Borders that laws with memory passed, see `solvers.problem.Transitions`."""
-        return self.borders()
+        return self.make_transitions()
 
     @cached_property
     def losses(self) -> Losses:
         """Energy that each stop and element dissipated, see `solvers.problem.Losses`."""
-        return self.lost()
+        return self.make_losses()
 
     @cached_property
     def friction_log(self) -> FrictionLog:
@@ -85,7 +95,7 @@ class Histories:
         Speeds and angles of entry and exit, largest |F_t|, impulse, way of slip, loss; stick and slip between are in
         `transitions`.
         """
-        return FrictionLog.of_events(NO_EVENTS) if self.rubbing is None else self.rubbing()
+        return self.make_friction_log() if self.make_friction_log else FrictionLog.of_events(NO_EVENTS)
 
     @cached_property
     def friction_loss(self) -> Vector:
@@ -100,7 +110,7 @@ class Histories:
     @cached_property
     def readout(self) -> Readout:
         """Loads, damping, section forces and reactions, from the model or from the file."""
-        return Readout(self.model, self.t, self.kept, self.taken)
+        return Readout(self.model, self.t, self.kept_readout, self.loads_taken)
 
     def _at_samples(self, values: Vector) -> Vector:
         """Values (k, …) at the samples; ValueError for a run without any, whose q and q̇ are the final state."""
@@ -274,7 +284,7 @@ class Histories:
 
     def unit(self, quantity: str, stop: int | str | None = None) -> str:
         """Unit of "indentation", "speed", "force" or "impulse" of a stop; None: of a column that all of them share."""
-        return unit_of(quantity, self.kinds[:, 0] if stop is None else self.kinds[[self._stop(stop)], 0])
+        return unit_of(quantity, self.rotational if stop is None else self.rotational[[self._stop(stop)]])
 
     def name(self, stop: int) -> str:
         """What tables call a stop or element: its given name, else a made one such as "stop at 3 m, below"."""
@@ -286,10 +296,10 @@ class Histories:
         ``alone``: the number alone where none was given, as in columns that say what they hold.
         """
         stop = self._stop(stop) % len(self.stops)
-        rotation, always = self.kinds[stop]
-        if self.given[stop]:
+        if self.name_given[stop]:
             return self.names[stop]
-        return str(stop) if alone else f"{'element' if always else 'stop'} {stop}" + " (rotation)" * bool(rotation)
+        kind = "element" if self.always_acting[stop] else "stop"
+        return str(stop) if alone else f"{kind} {stop}" + " (rotation)" * bool(self.rotational[stop])
 
     def number(self, stop: int | str) -> int:
         """The number of a stop or element, from 0, that is given by its name or number; ValueError if there is none."""

@@ -142,7 +142,7 @@ def summary(
         "dt": float(run.t[1] - run.t[0]) if len(run.t) > 1 else None,
         "scene": run.scene,
         "units": "SI: m, s, N, J, rad/s",
-        **({"rotations": run.kinds[:, 0].tolist()} if run.kinds[:, 0].any() else {}),
+        **({"rotations": run.rotational.tolist()} if run.rotational.any() else {}),
         "versions": versions(),
     }
 
@@ -195,7 +195,7 @@ def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:
     log = run.contacts
     span = max(run.reached - discard, 0.0)
     rows, parts = [], plot.batches(run, discard)
-    for stop in np.flatnonzero(run.kinds[:, 1] == 0).tolist():
+    for stop in np.flatnonzero(~run.always_acting).tolist():
         kept = (log.stop == stop) & (log.t_in >= discard) & np.isfinite(log.t_out)
         row: dict[str, Any] = {"stop": stop, "name": run.name(stop)}
         row |= {head: getattr(log.sites[stop], head) for head in log.heads}

@@ -255,11 +255,11 @@ def cut(run: Run, start: float, end: float) -> Run:
     part = replace(
         run, t=t, q=run.q[kept], q_dot=run.q_dot[kept],
         contacts=of_log("contacts", "t_in", "t_out"), ledger=partial(_ledger_of, run, kept),
-        lost=partial(_lost_of, run, kept), rubbing=partial(of_log, "friction_log", "t_in", "t_out"),
-        borders=partial(of_log, "transitions", "t"), reached=end - start,
-        began=latched_before(run, start), end=_end_of(run, kept),
+        make_losses=partial(_lost_of, run, kept), make_friction_log=partial(of_log, "friction_log", "t_in", "t_out"),
+        make_transitions=partial(of_log, "transitions", "t"), reached=end - start,
+        memory_at_start=latched_before(run, start), end=_end_of(run, kept),
         made=run.made if start == 0.0 and end >= run.reached else None,
-        kept={"forces": run._forces[:, kept], "means": _MeansOf(run, kept), "t": run.t[kept]},  # times of the run
+        kept_readout={"forces": run._forces[:, kept], "means": _MeansOf(run, kept), "t": run.t[kept]},  # the run's t
     )  # fmt: skip
     if run.rubs.any() and run.sampled:
         part.__dict__["friction_loss"] = run.friction_loss[kept] - run.friction_loss[kept][:1]
@@ -277,7 +277,8 @@ class _MeansOf:
         run, kept = self.run, self.kept
         impulses = run.losses.impulses
         lost = replace(run.losses, impulses=impulses if impulses is None else impulses[kept])
-        return mean_force(replace(run, t=run.t[kept], q=run.q[kept], q_dot=run.q_dot[kept], lost=lambda: lost), stop)
+        part = replace(run, t=run.t[kept], q=run.q[kept], q_dot=run.q_dot[kept], make_losses=lambda: lost)
+        return mean_force(part, stop)
 
 
 def _end_of(run: Run, kept: slice) -> Any:

@@ -145,7 +145,7 @@ def end_displacement(run: Run) -> Vector:
 
     δ of a first stop of rotation, of an annular one, or at a place by name.
     """
-    if len(run.stops) and (run.circles[0, 0] or run.kinds[0, 0] or np.isnan(run.stops[0, 0])):
+    if len(run.stops) and (run.circles[0, 0] or run.rotational[0] or np.isnan(run.stops[0, 0])):
         return np.asarray(run._deformation(0)[-1])
     if run.shapes.named:
         return np.asarray(run.shapes(next(iter(places(run.shapes).values()))) @ run.q[-1])
