@@ -222,6 +222,8 @@ def test_parts_of_a_run_keep_forces_and_losses(tube):
     inside = (tube.friction_log.t_in >= 0.02) & (tube.friction_log.t_in < 0.05)
     assert len(part.friction_log) == inside.sum()
     assert np.isnan(part.losses.friction).all()
+    assert "nan" in str(part)  # in its table of friction
+    assert set(part.losses.arrays()) == set(tube.losses.arrays())
 
 
 def test_saved_runs_keep_friction(corner, tube, rolled, tmp_path):

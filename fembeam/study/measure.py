@@ -292,7 +292,8 @@ def _end_of(run: Run, kept: slice) -> Any:
 def _lost_of(run: Run, kept: slice) -> Any:
     """What contacts took in a part of a run; of friction `friction_loss` tells."""
     part = run.losses.part(kept)
-    return replace(part, friction=np.nan, spin=np.nan) if run.rubs.any() else part
+    unknown = np.full(len(part), np.nan)
+    return replace(part, friction=unknown, spin=unknown) if run.rubs.any() else part
 
 
 def _part_of_log(run: Run, start: float, end: float, name: str, *times: str) -> Any:
