@@ -1,4 +1,8 @@
-"""Studies as tables of a scene file: what to ask, checked when read; `run` answers it, with files in a folder."""
+"""Studies as tables of a scene file: what to ask, checked when read; `run` answers it.
+
+All are run in one way, ``run(file, folder, progress)``: a long study keeps its checkpoint in the folder and shows
+progress, a short one needs neither. ``check(scene)``, where there is one, refuses what the scene cannot answer.
+"""
 
 from __future__ import annotations
 
