@@ -73,9 +73,7 @@ class _Reduced:
 
     matrices: Matrices
     basis: reduction.Basis
-    asked: (
-        tuple[int, ...] | None
-    )  # numbers of the modes; None of one with interface=True, all of whose shapes are modes
+    asked: tuple[int, ...] | None  # numbers of the modes; None with interface=True, where all shapes are modes
 
     @property
     def modes(self) -> int:
@@ -213,13 +211,8 @@ def _warn_of_drift(scene: Scene, bodies: list[_Reduced]) -> None:
         count = int(np.sum(body.basis.omega == 0.0))
         loads = bool(part.forces) or bool(scene.motions) or bool(scene.pulls)
         acting = [*part.stops, *(one for one in scene.acting if number and (one.coordinate.to or (0,))[0] == number)]
-        if (
-            body.matrices.named
-            and count
-            and loads
-            and not part.elements
-            and sum(len(one.coordinates) for one in acting) < 2
-        ):
+        free = body.matrices.named and not part.elements and sum(len(one.coordinates) for one in acting) < 2
+        if free and count and loads:
             warnings.warn(carried_away(count, number, "structure"), UserWarning, stacklevel=4)
 
 
