@@ -84,6 +84,9 @@ class Engine(Protocol):
     def has_gained(self, exchanged: Callable[[], Array]) -> bool:
         """Whether the finished run holds more energy than it can have been given."""
 
+    def shorten(self) -> bool:
+        """Let the next run of the system take shorter steps; whether the method can."""
+
     def explain(self, status: Status) -> str:
         """What the method can say about a failure."""
 
@@ -142,9 +145,14 @@ def integrate(
         from solvers.exponential.method import Exponential
 
         method = Exponential()
-    run = prepared_run(system, q0, q_dot0, duration, dt, method, tangent, memory)
+    arguments = system, q0, q_dot0, duration, dt, method, tangent, memory
+    run = prepared_run(*arguments)
     started = time.perf_counter()
     status = run.to_the_end(progress)
+    while status is Status.STEP_TOO_SMALL and run.engine.shorten():
+        run.engine.release()
+        run = prepared_run(*arguments)
+        status = run.to_the_end(progress)
     solution = run.solution(status, time.perf_counter() - started)
     status = solution.status
     if isinstance(tangent, Parameter) and status is Status.DONE and not run.tangent.exact:
@@ -188,7 +196,7 @@ def prepared_run(
 
 def prepared_once(system: System, method: Any, duration: float) -> tuple[Forcing, Any]:
     """What a method prepares for all starts, the system checked; kept as long as no signal can have changed."""
-    key = "prepared", method, duration
+    key = "prepared", method, duration, len(system.kept.find("shortened") or ())
     known: tuple[Forcing, Any] | None = system.kept.find(key)
     if known is None:
         check_maps(system, method)

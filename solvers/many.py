@@ -121,15 +121,18 @@ def integrate_many(
     output_times(duration, None)
     _check_threads(threads)
     own_gaps, scaled = _gaps(system, gaps, len(starts)), _factors(system, factors, len(starts))
-    started = time.perf_counter()
-    prepared = prepared_once(system, method, duration)
-    engines = [method.engine(system, starts[0], prepared, duration) for _ in range(min(threads, len(starts)))]
-    outcomes = Outcomes.of(len(starts), engines[0].back.shape[1], len(system.contacts))
-    starts = whole_starts(engines[0], starts, _of_tones(scaled, engines[0]))
-    _to_the_end([Worker(engine, starts, own_gaps, outcomes, BLOCK_STEPS) for engine in engines], len(starts), progress)
-    status = final_statuses(engines[0], outcomes)
-    for engine in engines:
-        engine.release()
+    started, again = time.perf_counter(), True
+    while again:
+        prepared = prepared_once(system, method, duration)
+        engines = [method.engine(system, starts[0], prepared, duration) for _ in range(min(threads, len(starts)))]
+        outcomes = Outcomes.of(len(starts), engines[0].back.shape[1], len(system.contacts))
+        of_blocks = whole_starts(engines[0], starts, _of_tones(scaled, engines[0]))
+        workers = [Worker(engine, of_blocks, own_gaps, outcomes, BLOCK_STEPS) for engine in engines]
+        _to_the_end(workers, len(starts), progress)
+        status = final_statuses(engines[0], outcomes)
+        again = bool(np.any(status == Status.STEP_TOO_SMALL)) and engines[0].shorten()
+        for engine in engines:
+            engine.release()
     motion, n = _products(engines[0].back, outcomes.x), system.size
     t, contacts = outcomes.number[:, REACHED], outcomes.count[:, CONTACTS]
     peaks = outcomes.peak[..., 0], outcomes.peak[..., 1]

@@ -12,7 +12,7 @@ from regularised import regularised
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic, WaltonBraun, law
-from solvers import Contact, DormandPrince, Exponential, Status, System, integrate
+from solvers import Contact, DormandPrince, Exponential, SolverError, Status, System, integrate, integrate_many
 from solvers.integration import prepared_once
 
 RK = DormandPrince(rtol=1e-13, atol=1e-16)
@@ -221,6 +221,42 @@ def test_indentation_under_noise_is_within_rtol(seed):
 def test_peak_of_a_contact_under_way_is_that_reached_so_far():
     run = integrate(free_mass(Hertz(1e6)), [0.0], [-0.3], 1e-4, method=Exponential(1e-10))
     assert run.contacts.peak_indentation[0] == pytest.approx(-run.q[0, 0], rel=1e-9)
+
+
+# --- times that are short for the structure -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dt", [None, 1e-4])
+@pytest.mark.parametrize("duration", [1e-7, 1e-8, 3e-9, 1e-9, 1e-10, 1e-12])
+def test_an_impact_of_any_duration_is_elastic(duration, dt):
+    """Of 1e-9 s it gave 1.0005 of its speed back, of 1e-10 s 1.095, without a word; with samples it was refused."""
+    depth = duration / 2.9432  # at 1 m/s
+    stiffness = 1.25 / depth**2.5
+    system = System([[1.0]], [[0.0]], [[1e6]], [Contact([-1.0], Hertz(stiffness), 1e-4)])
+    run = integrate(system, [0.0], [1.0], 3e-4, dt, Exponential(1e-8))
+    assert len(run.contacts) == 1
+    speed = run.contacts.speed_in[0]
+    assert run.contacts.speed_out[0] == pytest.approx(speed, rel=1e-7)
+    assert run.contacts.peak_indentation[0] == pytest.approx(depth * speed**0.8, rel=1e-7)
+    many = integrate_many(system, [[0.0]], [[1.0]], 3e-4, Exponential(1e-8))
+    assert many.q_dot[0] == pytest.approx(run.q_dot[-1], rel=0.0 if dt is None else 1e-9)
+
+
+@pytest.mark.parametrize("time", [1e-7, 1e-9, 1e-11, 1e-13])
+@pytest.mark.parametrize("clamp", [True, False])
+def test_a_rate_comes_to_rest_within_any_time(clamp, time):
+    """F = K δ² (1 + a δ̇/v) ends at δ̇ = -v/a, which the rate reaches within some ``time``: short ones were passed over."""
+    speed, depth, a = 1e-3, 1e-6, 0.8
+    made = Hysteretic(speed / (a * time) / depth**2, a, 2.0, clamp=clamp, entry_rate_floor=1e-9)
+    system = System([[1.0]], [[0.0]], [[1e4]], [Contact([-1.0], made, -depth)])
+    end = integrate(system, [0.0], [speed], 300.0 * time, method=Exponential(1e-8))
+    assert end.q_dot[0, 0] == pytest.approx(-speed / a, rel=1e-6)
+
+
+def test_impacts_shorter_than_rounding_of_time_are_refused():
+    system = System([[1.0]], [[0.0]], [[1e6]], [Contact([-1.0], Hertz(1e60), 1e-4)])
+    with pytest.raises(SolverError, match="step fell below"):
+        integrate(system, [0.0], [1.0], 1.0)
 
 
 # --- several stops ------------------------------------------------------------------------------------------------

@@ -57,7 +57,7 @@ from solvers.exponential.contact.step import advance_contact
 from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy
 from solvers.exponential.energy.flight_balance import account_state, start_account
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, NO_ENERGY_TABLES
-from solvers.exponential.preparation import SCRATCH, TABLES, Prepared, prepare_run
+from solvers.exponential.preparation import SCRATCH, TABLES, Prepared, prepare_run, shorten
 from solvers.exponential.safe_steps import fly
 from solvers.problem import Array, Forcing, Status, System
 
@@ -224,6 +224,10 @@ class Engine:
 
     def start(self) -> None:
         """Nothing to do: the compiled loop starts by itself."""
+
+    def shorten(self) -> bool:
+        """Let the next run of the system take shorter contact steps, unless these would be rounding of time."""
+        return shorten(self.system, float(self.prepared.tables.value.contact_step[-1]), self.duration)
 
     def explain(self, status: Status) -> str:
         """Nothing beyond the status."""

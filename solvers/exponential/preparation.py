@@ -33,7 +33,7 @@ from solvers.exponential.contact.node_response import START, Scratch
 from solvers.exponential.contact.nodes import S, series_of
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, energy_tables_for
 from solvers.exponential.steady_response import steady_response, without_resonance
-from solvers.exponential.tables import TONE_TABLES, Tables, build, doublings, fill_tones, law_tables_of
+from solvers.exponential.tables import SHORTER, TONE_TABLES, Tables, build, doublings, fill_tones, law_tables_of
 from solvers.problem import Array, Contact, Forcing, Memo, System, dense, on_one_grid
 from solvers.problem.friction import ACCOUNTS
 from solvers.problem.run_arguments import output_arrays
@@ -41,6 +41,10 @@ from solvers.problem.run_arguments import output_arrays
 TABLES, SCRATCH = packed_type(Tables), packed_type(Scratch)
 _KNOWN = "energy", "accuracy"  # arrays of the scratch that Python reads or writes
 _KINDS = {"tables": TABLES, "state": STATE, "scratch": SCRATCH, "energy_tables": ENERGY_TABLES}
+
+
+_MOST_SHORTENED = 2  # times that contact steps are shortened: to 1e-10 of the usual shortest one
+_ROUNDING_OF_TIME = 1e-16  # of the duration: shorter steps are none
 
 
 def load_parts(problem: types.NamedTuple, places: Iterable[int]) -> None:
@@ -158,7 +162,7 @@ def prepare_system(system: System, forcing: Forcing) -> Prepared:
     def make() -> Prepared:
         return _shared_tables_for(system, forcing, dt_cell).with_tones(forcing, system.contacts)
 
-    key = "tables", dt_cell, forcing.table_load.tobytes(), *(part.tobytes() for part in tones)
+    key = "tables", dt_cell, shortened(system), forcing.table_load.tobytes(), *(part.tobytes() for part in tones)
     prepared: Prepared = system.kept.get(key, make)
     return prepared
 
@@ -168,9 +172,22 @@ def _shared_tables_for(system: System, forcing: Forcing, dt_cell: float) -> _Sha
     about, laws = system.about_structure, system.about_laws
     about.get("passive", lambda: _check_passive(system))
     places = (part.tobytes() for part in (forcing.tone_load, forcing.table_dt, forcing.table_load))
-    key = "tables", laws, *places, doublings(_speeds(system), forcing.tone_omega)
+    key = "tables", laws, shortened(system), *places, doublings(_speeds(system), forcing.tone_omega)
     shared: _SharedTables = about.get(key, lambda: _SharedTables(system, forcing, dt_cell))
     return shared
+
+
+def shortened(system: System) -> int:
+    """How often the contact steps of a system have been shortened."""
+    return len(system.kept.find("shortened") or ())
+
+
+def shorten(system: System, shortest: float, duration: float) -> bool:
+    """Shorten the contact steps of a system, the shortest one in s; False if that would be below rounding of time."""
+    if shortened(system) == _MOST_SHORTENED or shortest * SHORTER < _ROUNDING_OF_TIME * duration:
+        return False
+    system.kept.get("shortened", list).append(True)
+    return True
 
 
 def _speeds(system: System) -> Array:
@@ -197,7 +214,8 @@ class _SharedTables:
         self.places = [slice(end - len(rows), end) for rows, end in zip(read_by, ends, strict=True)]
         self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
         energy_rows = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
-        tables = build(problem, self.tones, self.series, law_tables_of(contacts), dt_cell, energy_rows)
+        laws = law_tables_of(contacts)
+        tables = build(problem, self.tones, self.series, laws, dt_cell, energy_rows, shortened(system))
         sizes = {
             **{"E": len(contacts), "R": len(problem.gap), "L": len(problem.load), "N": len(problem.k)},
             **{"tables": len(forcing.table_dt), "B": most_borders(problem), "A": int(np.count_nonzero(problem.radius))},

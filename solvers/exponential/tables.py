@@ -33,6 +33,7 @@ _MOST_RADIANS = 2000.0  # |λ| h of the largest contact step
 _CONTACT_REACH = 1e-6  # |λ| h of the smallest one, at most
 _SLOWEST = 1e-9  # rate in units of the fastest, below which blocks do not lengthen the steps in the tables
 _SHORT = 1e-9  # s, of the smallest contact step, at most: a stop may be far stiffer than the structure
+SHORTER = 1e-5  # factor of the smallest contact step where a run has failed for want of a shorter one
 
 
 class Tables(NamedTuple):
@@ -150,12 +151,16 @@ def build(
     laws: dict[str, Any],
     dt_cell: float,
     energy_rows: tuple[Any, Any, Any],
+    shortened: int = 0,
 ) -> Tables:
-    """Tables of a problem whose last blocks are ``tones``; the columns of these are filled by `fill_tones`."""
+    """Tables of a problem whose last blocks are ``tones``; the columns of these are filled by `fill_tones`.
+
+    Contact steps go down to 1e-5 of the usual shortest one for each time they have been ``shortened``.
+    """
     size = len(problem.k)
     omega, damping = np.sqrt(problem.k), problem.c
     fastest = float(max((omega + damping).max(), 1e-3))
-    h, contact_h = _steps(omega, damping, tones)
+    h, contact_h = _steps(omega, damping, tones, shortened)
     node_sets = node_sets_of(series)
     blocks = blocks_of(problem, tones, h, contact_h, node_sets)
     cell_error, cell_error_signal = cell_errors(problem, dt_cell)
@@ -220,15 +225,15 @@ def doublings(speeds: Any, tones: Any) -> int:
     return math.ceil(math.log2(max(ratio, 1.0)))
 
 
-def _steps(omega: Any, damping: Any, tones: int) -> tuple[Any, Any]:
-    """Flight and contact steps, s; functions of the structure alone unless a tone is faster than it."""
+def _steps(omega: Any, damping: Any, tones: int, shortened: int) -> tuple[Any, Any]:
+    """Flight and contact steps, s; functions of the structure alone unless a tone is faster than it, or shortened."""
     own = omega.size - tones
     times = doublings((omega + damping)[:own], omega[own:])
-    return _steps_of(omega[:own].tobytes(), damping[:own].tobytes(), times)
+    return _steps_of(omega[:own].tobytes(), damping[:own].tobytes(), times, shortened)
 
 
 @lru_cache(maxsize=64)
-def _steps_of(omegas: bytes, dampings: bytes, doublings: int) -> tuple[Any, Any]:
+def _steps_of(omegas: bytes, dampings: bytes, doublings: int, shortened: int) -> tuple[Any, Any]:
     """The same for the frequencies and dampings of a structure, and tones faster by some octaves."""
     omega, damping = np.frombuffer(omegas), np.frombuffer(dampings)
     fastest = max(float((omega + damping).max()), 1e-3)
@@ -239,7 +244,7 @@ def _steps_of(omegas: bytes, dampings: bytes, doublings: int) -> tuple[Any, Any]
     levels = 2 + math.ceil(4.0 * math.log2(longest * fastest / TAYLOR_REACH))
     h = longest * 2.0 ** (-0.25 * np.arange(levels))
     first = int(np.searchsorted(-h, -_MOST_RADIANS / fastest))
-    bottom = math.ceil(4.0 * math.log2(longest / min(_CONTACT_REACH / fastest, _SHORT)))
+    bottom = math.ceil(4.0 * math.log2(longest / (min(_CONTACT_REACH / fastest, _SHORT) * SHORTER**shortened)))
     return h, longest * 2.0 ** (-0.25 * np.arange(first, bottom + 2, 2))
 
 

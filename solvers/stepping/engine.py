@@ -99,6 +99,10 @@ class Engine:
         """No: ``march`` would have told."""
         return False
 
+    def shorten(self) -> bool:
+        """No: the steps are the user's, or as short as time can tell."""
+        return False
+
     def release(self) -> None:
         """Nothing: no other run uses these arrays."""
 

@@ -72,7 +72,7 @@ from solvers.exponential.contact.first_step import (
 )
 from solvers.exponential.contact.kinks import land_on_kink_or_limit
 from solvers.exponential.contact.landing import LAST_RESORT, may_land
-from solvers.exponential.contact.node_response import SLOPE, force_of, free_response
+from solvers.exponential.contact.node_response import SLOPE, force_of, free_response, own_accelerance
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_run, finish_step, record_forces, sample_step
 from solvers.exponential.contact.segment_ends import first_end, go_beyond, land_first, land_in_time
@@ -82,6 +82,8 @@ _ERROR_GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
 _SHORTLY_BEFORE = 0.9  # part of the time to a border after which a step ends, for a landing to follow
 _CROSSING_KNOWN = 8  # levels, √2 each, shorter at once: a step not resolved yet may see a crossing near its start
+_FEWEST_STEPS = 100.0  # in the time of an impact, of the shortest ones
+_COUNTS = 0.3  # speed of an impact, in units of the reference speed, whose force must be resolved
 NEITHER, MOVES_OUT, RESTS = range(3)  # what `_leave_or_rest` finds
 _ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # ratio of the errors of two steps whose lengths differ by √2, one level
 
@@ -180,7 +182,7 @@ def _attempt(problem, tables, state, scratch, node_set, level):
 
     If the step crosses a bend or border, these are the time of this after the start and its stop, ``scratch.border``
     holds the number of the border, -1 of a bend, and the error is inf. Otherwise they are (inf, -1). A step on the
-    shortest level counts as within the tolerance if its forces are found.
+    shortest level that crosses something counts as within the tolerance if its forces are found.
     """
     shortest, first, crossing = level == tables.contact_step.size - 1, np.inf, -1
     scratch.border[0] = -1
@@ -203,7 +205,7 @@ def _attempt(problem, tables, state, scratch, node_set, level):
     error = step_error(problem, tables, state, scratch, node_set, level)
     if crossing >= 0:  # a step that does not resolve the motion cannot tell what happens at its start
         return (np.inf, first, crossing) if error <= 1.0 else (error, np.inf, -1)
-    return min(error, 1.0) if shortest else error, first, crossing
+    return error, first, crossing
 
 
 @merged
@@ -346,6 +348,8 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
             return RUNNING
         if found == RESTS:
             time_to_knot, stop, direction = np.inf, -1, 0
+    if control[NEW] == ENTRY and _is_too_brief(problem, tables, state, scratch):
+        return STEP_TOO_SMALL
     if control[NEW] == ENTRY and problem.parts[PRESSED] and _switch_pressed(problem, state):
         begin_steps(problem, tables, state, scratch, latest_entered(state))
         return RUNNING
@@ -382,8 +386,32 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
             continue
         level = min(shortest, level + (1 + int(2.0 / _ORDER * math.log2(error / _ERROR_GOAL)) if error < np.inf else 2))
         wanted = level
+    if level == shortest and _relaxes_within(problem, tables, state, scratch):
+        return STEP_TOO_SMALL
     _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, crossing)
     return RUNNING
+
+
+@inlined
+def _is_too_brief(problem, tables, state, scratch):
+    """Whether an impact of a speed that counts lasts less than a hundred of the shortest steps.
+
+    Those of a stop that comes to rest may become shorter and shorter.
+    """
+    s = scratch.control[STOP]
+    brief = scratch.duration[s] < _FEWEST_STEPS * tables.contact_step[tables.contact_step.size - 1]
+    return brief and indentation_rate(problem, s, state.x) > _COUNTS * scratch.reference_speed[s]
+
+
+@merged
+def _relaxes_within(problem, tables, state, scratch):
+    """Whether a dashpot takes a rate to its equilibrium within the shortest step, which then does not resolve it."""
+    found = False
+    for s in range(problem.law.size):
+        if state.segment[s] > 0 and scratch.viscous[s] > 0.0:
+            rate = scratch.viscous[s] * own_accelerance(problem, tables, s)
+            found |= rate * tables.contact_step[tables.contact_step.size - 1] > 1.0
+    return found
 
 
 @merged
