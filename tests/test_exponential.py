@@ -245,7 +245,7 @@ def test_an_impact_of_any_duration_is_elastic(duration, dt):
 @pytest.mark.parametrize("time", [1e-7, 1e-9, 1e-11, 1e-13])
 @pytest.mark.parametrize("clamp", [True, False])
 def test_a_rate_comes_to_rest_within_any_time(clamp, time):
-    """F = K δ² (1 + a δ̇/v) ends at δ̇ = -v/a, which the rate reaches within some ``time``: short ones were passed over."""
+    """F = K δ² (1 + a δ̇/v) ends at δ̇ = -v/a, where the rate comes within some ``time``: it was passed over."""
     speed, depth, a = 1e-3, 1e-6, 0.8
     made = Hysteretic(speed / (a * time) / depth**2, a, 2.0, clamp=clamp, entry_rate_floor=1e-9)
     system = System([[1.0]], [[0.0]], [[1e4]], [Contact([-1.0], made, -depth)])

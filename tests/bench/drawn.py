@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from drawn_slow import draw_slow
 from drawn_starts import on_a_border
 from scipy.optimize import brentq
 
@@ -15,7 +16,8 @@ import fembeam as fb
 from contacts import PUBLISHED, Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Tabulated, Viscoelastic, law
 from solvers import Contact, System
 
-SAMPLED_FROM, RESTING_FROM = 100_000, 200_000_000  # first seeds of both kinds; what one below stands for has stayed
+# First seeds of the kinds; what one below stands for has stayed.
+SAMPLED_FROM, RESTING_FROM, SLOW_FROM = 100_000, 200_000_000, 300_000_000
 
 
 @law(exponent=1.5)
@@ -292,9 +294,10 @@ def draw(seed: int) -> tuple[Scene, float]:
     rng = np.random.default_rng(seed)
     kind = (draw_structure, draw_structure, draw_parts, draw_pair)[rng.integers(4)]
     kind = draw_resting if seed >= RESTING_FROM else draw_sampled if seed >= SAMPLED_FROM else kind
+    kind = draw_slow if seed >= SLOW_FROM else kind
     rtol = float(rng.choice([1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-8, 1e-9, 1e-10, 1e-11]))
     scene = kind(rng)
-    if kind is not draw_resting:  # which lies on its surface by itself
+    if kind not in (draw_resting, draw_slow):  # which lie on their surfaces by themselves
         scene = on_a_border(seed, scene)
     laws = ", ".join(_told(c) for c in scene.system.contacts)
     scene.words = f"rtol {rtol:g} {scene.words}; stops {laws}"

@@ -6,9 +6,10 @@ A scene is a structure with one to four stops, oscillators that influence each o
 symmetric pair of stops; with laws and loads of every kind, starts in contact, ends in contact, and a tolerance from
 1e-3 to 1e-11. Seeds from 100000 on draw beams on pins under one to three sampled loads, dashpots on nodes of modes, and
 stops pressed at rest; those from 200000000 on masses that fall on stops by their weight, lie there, and are pushed by
-loads, some of which cancel but for rounding. Compared are the motion at samples and, of every contact, times, rates,
-peaks, impulse and loss; runs with and without samples, which fly in other steps, and the energy balance. What a
-difference is worth: see `comparison`.
+loads, some of which cancel but for rounding; those from 300000000 on structures that are slow or fast beside the cells
+of their loads. Compared are the motion at samples and, of every contact, times, rates, peaks, impulse and loss; runs
+with and without samples, which fly in other steps, and the energy balance. What a difference is worth: see
+`comparison`.
 """
 
 from __future__ import annotations
