@@ -143,6 +143,7 @@ class Prepared(NamedTuple):
 
 def prepare_run(system: System, forcing: Forcing, duration: float, rtol: float) -> tuple[Forcing, Prepared]:
     """The forcing without resonant tones and on one grid, and the tables with its sampled values."""
+    system.about_structure.get("passive", lambda: _check_passive(system))
     taken = on_one_grid(without_resonance(system, forcing, duration, rtol), duration, float(_speeds(system).max()))
     prepared = prepare_system(system, taken)
     kind = type_of(prepared.problem.value)
@@ -170,7 +171,6 @@ def prepare_system(system: System, forcing: Forcing) -> Prepared:
 def _shared_tables_for(system: System, forcing: Forcing, dt_cell: float) -> _SharedTables:
     """The tables shared by systems that differ only in tones, sampled values and gaps."""
     about, laws = system.about_structure, system.about_laws
-    about.get("passive", lambda: _check_passive(system))
     places = (part.tobytes() for part in (forcing.tone_load, forcing.table_dt, forcing.table_load))
     key = "tables", laws, shortened(system), *places, doublings(_speeds(system), forcing.tone_omega)
     shared: _SharedTables = about.get(key, lambda: _SharedTables(system, forcing, dt_cell))

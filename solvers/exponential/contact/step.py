@@ -182,7 +182,7 @@ def _attempt(problem, tables, state, scratch, node_set, level):
 
     If the step crosses a bend or border, these are the time of this after the start and its stop, ``scratch.border``
     holds the number of the border, -1 of a bend, and the error is inf. Otherwise they are (inf, -1). A step on the
-    shortest level that crosses something counts as within the tolerance if its forces are found.
+    shortest level counts as within the tolerance if its forces are found: what is at rest has none.
     """
     shortest, first, crossing = level == tables.contact_step.size - 1, np.inf, -1
     scratch.border[0] = -1
@@ -205,7 +205,7 @@ def _attempt(problem, tables, state, scratch, node_set, level):
     error = step_error(problem, tables, state, scratch, node_set, level)
     if crossing >= 0:  # a step that does not resolve the motion cannot tell what happens at its start
         return (np.inf, first, crossing) if error <= 1.0 else (error, np.inf, -1)
-    return error, first, crossing
+    return min(error, 1.0) if shortest else error, first, crossing
 
 
 @merged
