@@ -25,7 +25,7 @@ from solvers import DormandPrince, Exponential, SolverError, integrate
 
 REFERENCE = DormandPrince(rtol=1e-13, atol=1e-15)
 COARSER = DormandPrince(rtol=1e-12, atol=1e-14)  # differs from it by more than the reference is off
-PATIENCE = 12  # stretches of 20 000 steps that a run of the reference may take
+PATIENCE, OWN_PATIENCE = 12, 400  # stretches of 20 000 steps that a run of the reference, or of `Exponential`, may take
 MOST_CONTACTS = 6
 SAMPLES = 16
 ALLOWED = 300.0  # error of a number, in units of rtol × its amplification
@@ -51,7 +51,7 @@ def run(scene: Scene, method: Any, move: Any = 0.0, sampled: bool = True) -> Any
     """One run, with the start moved by ``move``; its end only unless ``sampled``."""
     n = scene.system.size
     move = np.broadcast_to(move, 2 * n)
-    left = iter(range(PATIENCE))
+    left = iter(range(OWN_PATIENCE if isinstance(method, Exponential) else PATIENCE))
 
     def progress(_t: float) -> None:
         if next(left, None) is None:
