@@ -7,7 +7,7 @@ Imports: numpy, scipy. Begin with `modal.modal_basis`.
 """
 
 from reduction.basis import AccuracyError, Basis, oriented
-from reduction.interface import craig_bampton, guyan, static_shapes, static_share, with_residual
+from reduction.interface import craig_bampton, dofs_inside, guyan, static_shapes, static_share, with_residual
 from reduction.modal import modal_basis
 from reduction.truncation import below, carrying, fewest_modes, moved_mass
 from reduction.whirl import Whirl, critical_speeds, whirl
@@ -20,6 +20,7 @@ __all__ = [
     "carrying",
     "craig_bampton",
     "critical_speeds",
+    "dofs_inside",
     "fewest_modes",
     "guyan",
     "modal_basis",

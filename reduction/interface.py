@@ -150,6 +150,21 @@ def craig_bampton(M: Matrix, K: Matrix, directions: Matrix, count: int, root: Ma
     return basis
 
 
+def dofs_inside(M: Matrix, K: Matrix, directions: Matrix, root: Matrix | None = None) -> int:
+    """How many modes `craig_bampton` can find with the interface held: all dofs but one for each independent direction.
+
+    Arguments and errors as for `craig_bampton`.
+
+    Examples
+    --------
+    >>> dofs_inside(np.eye(3), np.diag([1.0, 4.0, 9.0]), [[1.0, 2.0], [0.0, 0.0], [0.0, 0.0]])
+    2
+    """
+    M, K = checked_pair(M, K, "dofs_inside")
+    B = _directions(directions, K.shape[0], "dofs_inside")
+    return int(K.shape[0]) - _interface_coordinates(_apart(M, K, B, root))[1]
+
+
 def guyan(M: Matrix, K: Matrix, directions: Matrix, root: Matrix | None = None) -> Basis:
     """Static shapes of the given directions only: `craig_bampton` without modes.
 

@@ -1,15 +1,16 @@
 """Several bodies in one scene: impactors, sprung masses, beams that collide; free flight and momentum."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from refusals import refused_by
+from refusals import refused, refused_by
 from scipy.integrate import solve_ivp
 
 import fembeam as fb
 import solvers
-from contacts import Hertz, Hysteretic, PiecewiseLinear
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear
 from fembeam.study import quantities
 from fembeam.study.stationary import indentation
 
@@ -247,6 +248,56 @@ def test_all_modes_of_several_bodies_are_the_finite_elements_themselves():
 
 
 # --- free flight --------------------------------------------------------------------------------------------------
+
+
+FRAME = fb.Frame({"A": (0, 0), "B": (0, 1)}, [fb.Member("A", "B", fb.Section.rectangle(2e11, 7800.0, 0.05, 0.05))])
+BLOCK = fb.Scene(fb.Structure([[1e4]], [[2.0]], labels=[("b", "x")]))
+SHORT = fb.Structure([[1e6]], [[2.0]], labels=[("b", "x")])
+PLAIN = KelvinVoigt(1e5, 10.0)
+
+
+def beside_a_block(**parts):
+    """A clamped frame, driven into a block on a spring that is a body of one dof, or what else stands there."""
+    drive, damping = fb.PointForce("B", fb.Harmonic(500.0, 30.0), direction="x"), fb.ModalDamping(0.02)
+    parts = parts or {"bodies": [BLOCK], "stops": [fb.Stop("B", PLAIN, gap=1e-3, direction="x", on=(1, "b"))]}
+    return fb.Scene(FRAME, [fb.Clamped("A")], forces=[drive], damping=damping, **parts)
+
+
+@pytest.mark.parametrize(
+    ("options", "counts"),
+    [
+        ({"modes": 4}, ((4, 0), (1, 0))),
+        ({"modes": [0, 2]}, ((2, 0), (1, 0))),
+        ({"modes": 4, "residual": True}, ((4, 1), (1, 0))),
+        ({"modes": 4, "interface": True}, ((5, 0), (1, 0))),
+        ({"omega_max": 5e3}, ((3, 0), (1, 0))),
+        ({"mass_share": 0.6}, ((4, 0), (1, 0))),
+    ],
+)
+def test_a_body_of_fewer_dofs_keeps_all_of_them(options, counts):
+    # independent: the same block as an impactor on a spring, which no choice of modes concerns
+    model = beside_a_block().reduce(**options)
+    ball = fb.Impactor("B", 2.0, 0.0, PLAIN, stiffness=1e4, gap=1e-3, direction="x", side="above")
+    run, other = (one.simulate(0.3, 1e-3) for one in (model, beside_a_block(impactors=[ball]).reduce(**options)))
+    assert (model.counts, model.again(model.scene).counts) == (counts, counts)
+    assert len(run.contacts) == len(other.contacts) > 0
+    np.testing.assert_allclose(run.q, other.q, atol=1e-7 * np.abs(run.q).max())
+
+
+test_of_modes_that_no_body_has_the_body_is_named = refused(
+    (
+        lambda: beside_a_block().reduce([1, 2]),
+        r"one that every body has \(bodies\[0\] has 1 mode only\), got \[1, 2\]",
+    ),
+    (
+        lambda: fb.Scene(BLOCK.beam, bodies=[BLOCK]).reduce(modes=2),
+        r"modes must be at most 1 \(free dofs of the scene's own body\), got 2",
+    ),
+    (
+        lambda: fb.Scene(FRAME, [fb.Clamped("A")], bodies=[replace(BLOCK, beam=SHORT)]).reduce(omega_max=300.0),
+        r"first frequency, 707.107 rad/s, of bodies\[0\], got 300",
+    ),
+)
 
 
 def test_free_flight_is_exact_for_hours():

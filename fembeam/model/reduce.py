@@ -14,7 +14,17 @@ from scipy import sparse
 import reduction
 from fembeam.model.model import Model
 from fembeam.response import PlacedShapes, Shapes, placed_shapes
-from fembeam.scene import MOST_DENSE, BodyMatrices, LocalCoordinate, Matrices, carried_on, check_counts, loaded, watched
+from fembeam.scene import (
+    MOST_DENSE,
+    BodyMatrices,
+    LocalCoordinate,
+    Matrices,
+    body_words,
+    carried_on,
+    check_counts,
+    loaded,
+    watched,
+)
 from fembeam.scene.rigid_motions import carried_away
 from fembeam.structures import COMPONENTS
 from fembeam.support import is_finite, is_whole, require
@@ -48,18 +58,21 @@ def reduced(
     check_reduction(scene, modes, elements, omega_max, mass_share, residual, interface)
     if omega_max is not None or mass_share is not None:
         modes = _enough(scene, elements, omega_max, mass_share)
-    matrices, chosen = _chosen(scene, DEFAULT_MODES if modes is None else modes, elements, interface)
+    matrices, asked, chosen = _chosen(scene, DEFAULT_MODES if modes is None else modes, elements, interface)
     bodies = []
     for number, (body, listed) in enumerate(zip(matrices.beams, chosen, strict=True)):
         basis = _of_beam(body, loaded(scene, number), listed, residual, interface)
         bodies.append(_Reduced(body, _oriented(basis, body, watched(scene, number)), None if interface else listed))
     if elements is not None and not isinstance(modes, str):
-        _warn_of_the_mesh(matrices, max(one.basis.omega[min(len(chosen[0]), one.basis.count) - 1] for one in bodies))
+        highest = max(
+            one.basis.omega[min(len(own), one.basis.count) - 1] for one, own in zip(bodies, chosen, strict=True)
+        )
+        _warn_of_the_mesh(matrices, highest)
     _warn_of_drift(scene, bodies)
     basis = _joined([one.basis for one in bodies], matrices)
     shapes, *others = _shapes_of_each(scene, matrices, basis)
     numbers = (*(number for one in bodies for number in one.numbers), *(0 for _ in matrices.impactors))
-    again = "all" if isinstance(modes, str) else len(chosen[0]) if interface else chosen[0]
+    again = "all" if isinstance(modes, str) else len(asked) if interface else asked
     options = {"modes": again, "elements": elements, **({"interface": True} if interface else {"residual": residual})}
     counts = tuple((one.modes, one.static) for one in bodies)
     model = Model(scene, matrices, basis, numbers, shapes, counts, tuple(others), options)
@@ -125,8 +138,7 @@ def _of_beam(
 ) -> reduction.Basis:
     """The basis of one beam by itself, static shapes where it is loaded included."""
     if interface:
-        rows = [_rows(beam, places), *beam.following_loads]
-        return reduction.craig_bampton(beam.M, beam.K, sparse.vstack(rows).T, len(chosen), beam.root)
+        return reduction.craig_bampton(beam.M, beam.K, _directions(beam, places), len(chosen), beam.root)
     basis = _modes(beam, chosen)
     rows = [*([_rows(beam, places)] if residual and places else []), *beam.following_loads]
     if rows:
@@ -147,6 +159,11 @@ def _modes(beam: Matrices, chosen: tuple[int, ...]) -> reduction.Basis:
 def _rows(beam: Matrices, places: list[LocalCoordinate]) -> sparse.csr_matrix:
     """Rows of u or u_z, or of their difference between two places: their static shape is that of opposite loads."""
     return sparse.vstack([place.row(beam) for place in places], format="csr")
+
+
+def _directions(beam: Matrices, places: list[LocalCoordinate]) -> sparse.csc_matrix:
+    """Columns (N, m): the places, and what moving supports load."""
+    return sparse.vstack([_rows(beam, places), *beam.following_loads]).T
 
 
 def _oriented(basis: reduction.Basis, beam: Matrices, place: LocalCoordinate | None) -> reduction.Basis:
@@ -253,16 +270,25 @@ def _warn_of_the_mesh(matrices: Matrices, omega: float) -> None:
             warnings.warn(f"elements are {trouble}; {advice}", UserWarning, stacklevel=4)
 
 
-def _chosen(scene: Scene, modes: Any, elements: int | None, interface: bool) -> tuple[Matrices, list[tuple[int, ...]]]:
-    """The mesh, and the mode numbers of each beam: the same, or all that it has."""
+def _chosen(
+    scene: Scene, modes: Any, elements: int | None, interface: bool
+) -> tuple[Matrices, tuple[int, ...], list[tuple[int, ...]]]:
+    """The mesh, the mode numbers asked for, and those of each body: the same, but for those that it has not; or all."""
     if not isinstance(modes, str):
-        listed = _numbers(modes, interface)
-        matrices = scene.matrices(elements, max(listed, default=0) + 1)
-        for beam in matrices.beams:
-            most = beam.M.shape[0]
-            require(not beam.named or max(listed, default=0) < most, f"modes must be at most {most} (free dofs)", modes,
-                    "Scene.reduce", "ask for fewer modes, or 'all'")  # fmt: skip
-        return matrices, [listed] * len(matrices.beams)
+        asked = _numbers(modes, interface)
+        count = max(asked, default=-1) + 1
+        matrices = scene.matrices(elements, max(count, 1))
+        most = [_most(body, loaded(scene, number), count, interface) for number, body in enumerate(matrices.beams)]
+        largest = int(np.argmax(most))
+        dofs = ("dofs inside" if interface else "free dofs") + f" of {body_words(largest)}" * bool(scene.bodies)
+        require(count <= most[largest], f"modes must be at most {most[largest]} ({dofs})", modes, "Scene.reduce",
+                "ask for fewer modes, or 'all'")  # fmt: skip
+        chosen = [tuple(i for i in asked if i < size) for size in most]
+        for number, own in enumerate(chosen):
+            has = f"{body_words(number)} has {counted(most[number], 'mode')} only"
+            require(bool(own) or interface, f"modes must name one that every body has ({has})", modes, "Scene.reduce",
+                    "add 0")  # fmt: skip
+        return matrices, asked, chosen
     meshed = any(getattr(part.beam, "meshed", True) for part in (scene, *scene.bodies))
     given = elements is not None or not meshed
     require(modes == "all" and given, "modes must be a count, a list, or 'all' with elements given",
@@ -272,7 +298,18 @@ def _chosen(scene: Scene, modes: Any, elements: int | None, interface: bool) -> 
     sizes = [beam.M.shape[0] for beam in matrices.beams]
     require(max(sizes) <= MOST_DENSE, f"modes='all' is for beams of at most {MOST_DENSE} free dofs", sizes,
             "Scene.reduce", "ask for fewer elements, or a count of modes")  # fmt: skip
-    return matrices, [tuple(range(size)) for size in sizes]
+    return matrices, (), [tuple(range(size)) for size in sizes]
+
+
+def _most(body: Matrices, places: list[LocalCoordinate], count: int, interface: bool) -> int:
+    """How many modes a body has, with its interface held fewer; at least `count` where they are enough."""
+    size: int = body.M.shape[0]
+    if not interface:
+        return size
+    directions = _directions(body, places)
+    if count + directions.shape[1] <= size:
+        return size
+    return reduction.dofs_inside(body.M, body.K, directions, body.root)
 
 
 def _numbers(modes: Any, interface: bool) -> tuple[int, ...]:
@@ -313,7 +350,9 @@ def _enough(scene: Scene, elements: int | None, omega_max: float | None, mass_sh
     while tried < MOST_TRIED:
         tried = min(2 * tried, MOST_TRIED)
         matrices = scene.matrices(elements, None if elements else tried)
-        counts = [_enough_of(beam, tried, omega_max, mass_share) for beam in matrices.beams]
+        named = [f", of {body_words(number)}" * bool(scene.bodies) for number in range(len(matrices.beams))]
+        pairs = zip(matrices.beams, named, strict=True)
+        counts = [_enough_of(beam, tried, omega_max, mass_share, of) for beam, of in pairs]
         if None not in counts:
             return max(count for count in counts if count is not None)
     goal = f"omega_max = {omega_max:g}" if omega_max is not None else f"mass_share = {mass_share}"
@@ -326,7 +365,9 @@ def _carrying(basis: reduction.Basis, beam: Matrices, way: str, share: float) ->
     return reduction.carrying(share, load, mass)(basis) if mass > 0.0 or not beam.named else 1
 
 
-def _enough_of(beam: Matrices, tried: int, omega_max: float | None, mass_share: float | None) -> int | None:
+def _enough_of(
+    beam: Matrices, tried: int, omega_max: float | None, mass_share: float | None, of: str = ""
+) -> int | None:
     """How many of a beam's modes are enough; None if those tried are not."""
     tried = min(tried, beam.M.shape[0])
     basis = reduction.modal_basis(beam.M, beam.K, tried, root=beam.root)
@@ -338,6 +379,6 @@ def _enough_of(beam: Matrices, tried: int, omega_max: float | None, mass_share: 
     count = enough(basis)
     if count is None and tried == beam.M.shape[0]:
         return tried
-    require(count is None or count > 0, f"omega_max must reach the first frequency, {basis.omega[0]:.6g} rad/s",
+    require(count is None or count > 0, f"omega_max must reach the first frequency, {basis.omega[0]:.6g} rad/s{of}",
             omega_max, "Scene.reduce", "raise it")  # fmt: skip
     return count

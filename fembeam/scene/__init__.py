@@ -41,7 +41,17 @@ from fembeam.scene.parts import (
     Spring,
     Stop,
 )
-from fembeam.scene.places import At, Place, directed_words, is_directed, is_place, place_words, quoted, split
+from fembeam.scene.places import (
+    At,
+    Place,
+    body_words,
+    directed_words,
+    is_directed,
+    is_place,
+    place_words,
+    quoted,
+    split,
+)
 from fembeam.scene.rotors import Disk, Unbalance
 from fembeam.scene.rubbing import Friction, spin_of
 from fembeam.scene.scene import FEATURES, Scene

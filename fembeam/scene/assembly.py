@@ -40,7 +40,7 @@ from fembeam.beams import (
     wavenumber,
 )
 from fembeam.scene.moving_loads import PER_DOF, loads_of_order
-from fembeam.scene.places import place_words, quoted
+from fembeam.scene.places import body_words, place_words, quoted
 from fembeam.scene.signals import support_motion
 from fembeam.structures import COMPONENTS, Six, require_components
 from fembeam.support import is_whole, require, require_finite
@@ -243,11 +243,13 @@ def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequ
             "Scene.matrices", "ask for modes, or modes='all'")  # fmt: skip
     own = _one_beam(scene, elements, modes, scene.at(list(probes), "probes of Scene.matrices"))
     if not scene.bodies and not scene.impactors:
+        _check_sizes(elements, modes, (own,))
         _check_beside(scene, (own,))
         return own
     second: list[tuple[int, Any]] = [part.coordinates[0].to or (0, 0.0) for part in scene.acting]
     met = [[z for number, z in second if number == b + 1] for b in range(len(scene.bodies))]
     others = [_one_beam(body, elements, modes, at) for body, at in zip(scene.bodies, met, strict=True)]
+    _check_sizes(elements, modes, (own, *others))
     _check_beside(scene, (own, *others))
     return _joined((own, *others), tuple(i for body in (scene, *scene.bodies) for i in body.impactors))
 
@@ -264,14 +266,19 @@ def _one_beam(scene: Scene, elements: int | None, modes: int | None, probes: Seq
         modes = MESHED_MODES if modes is None else int(modes)
         _check_modes(modes)
         return _on_nodes(scene, _resolving(scene, borders, modes), modes)
-    matrices = _on_nodes(scene, spread(scene.beam, borders, elements), None)
-    if modes is not None:
-        size = matrices.M.shape[0]
-        require(modes <= size, f"modes must be at most {size} (free dofs)", modes, "Scene.matrices",
-                "ask for fewer modes or more elements")  # fmt: skip
-        require(modes <= MOST_MODES or size <= MOST_DENSE, f"modes must be at most {MOST_MODES} of {size} free dofs",
-                modes, "Scene.matrices", f"or use a mesh of at most {MOST_DENSE} dofs")  # fmt: skip
-    return matrices
+    return _on_nodes(scene, spread(scene.beam, borders, elements), None)
+
+
+def _check_sizes(elements: int | None, modes: int | None, beams: tuple[Matrices, ...]) -> None:
+    """Raise ValueError for more modes than the largest of given meshes has; bodies with fewer dofs keep all."""
+    sizes = [beam.M.shape[0] for beam in beams]
+    if elements is None or modes is None or beams[int(np.argmax(sizes))].named:
+        return
+    size, of = max(sizes), f" of {body_words(int(np.argmax(sizes)))}" * (len(beams) > 1)
+    require(modes <= size, f"modes must be at most {size} (free dofs{of})", modes, "Scene.matrices",
+            "ask for fewer modes or more elements")  # fmt: skip
+    require(modes <= MOST_MODES or size <= MOST_DENSE, f"modes must be at most {MOST_MODES} of {size} free dofs",
+            modes, "Scene.matrices", f"or use a mesh of at most {MOST_DENSE} dofs")  # fmt: skip
 
 
 def _check_beside(scene: Scene, beams: tuple[Matrices, ...]) -> None:

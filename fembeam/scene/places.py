@@ -84,6 +84,11 @@ def scene_words(body: int) -> str:
     return f"bodies[{body - 1}] of Scene" if body else "Scene"
 
 
+def body_words(body: int) -> str:
+    """The same as a part of a sentence that ends with where it was said."""
+    return f"bodies[{body - 1}]" if body else "the scene's own body"
+
+
 def place_words(place: Any) -> str:
     """A place as names have it: a number is z in m.
 

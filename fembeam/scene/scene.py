@@ -194,10 +194,12 @@ class Scene:
         Parameters
         ----------
         modes : a count, mode numbers from 0 such as [0, 2, 5], or "all" of a mesh of given `elements`; None: 2. The
-            same of every beam; impactors are kept as they are.
+            same of every body, but a body with fewer dofs keeps all its modes, of a list those that it has; impactors
+            are kept as they are.
         elements : of the mesh; None: as few as make every kept frequency right to 1e-6.
         omega_max : instead of `modes`: all of them up to this frequency, rad/s.
         mass_share : instead of `modes`: as many as carry this share of the mass that a base motion moves, in (0, 1).
+            Of several bodies the one that needs most says how many, of omega_max too.
         residual : add the residual static shape of every stop, element, force, moment, moving foot and dashpot (its
             rotation, too), of friction at a radius the twist, between two places that of opposite loads; the model is
             then exact for slow loads there.
@@ -210,7 +212,7 @@ class Scene:
 
         Raises
         ------
-        ValueError : no modes, repeated or negative numbers, more than the mesh has; more than 300 of a mesh above 2000
+        ValueError : no modes, repeated or negative numbers, more than any body has; more than 300 of a mesh above 2000
             dofs, or more than 128 for omega_max or mass_share; two ways of choosing at once; static shapes
             without a stop, force or dashpot.
         reduction.AccuracyError : stiffnesses too far apart, or a mesh too fine, for double precision.
