@@ -7,7 +7,7 @@ import pytest
 
 import fembeam as fb
 import reduction
-from contacts import Hertz, PiecewiseLinear
+from contacts import Hertz, KelvinVoigt, PiecewiseLinear
 
 STEEL = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.01)
 EI, L = STEEL.bending_stiffness, 0.4
@@ -110,6 +110,28 @@ def test_a_flying_mass_waits_while_the_beam_settles():
 def test_a_falling_beam_has_no_equilibrium():
     with pytest.raises(reduction.AccuracyError, match=r"no static equilibrium found.*does anything carry the loads"):
         fb.Scene(fb.Beam(L, STEEL), gravity=9.81).reduce(3).equilibrium()
+
+
+@pytest.mark.filterwarnings("ignore:.*rigid-body:UserWarning")
+@pytest.mark.parametrize("stiffness", [1e3, 1e9, 1e13])
+@pytest.mark.parametrize("places", [(L,), (L, 0.3), (0.2002,)])
+@pytest.mark.parametrize("size", [1e-4, 1.0])
+def test_a_beam_on_stops_beside_its_middle_has_no_equilibrium(places, stiffness, size):
+    """It turns off them: no forces balance the moment about them, however far it has gone, in whatever size."""
+    section = fb.Section.rectangle(2.1e11, 7850.0, 0.01 * size, 0.01 * size)
+    stops = [fb.Stop(z * size, KelvinVoigt(stiffness * size, 1.0), gap=1e-4 * size) for z in places]
+    with pytest.raises(reduction.AccuracyError, match=r"no static equilibrium found"):
+        fb.Scene(fb.Beam(L * size, section), stops=stops, gravity=9.81).reduce(6).equilibrium()
+
+
+@pytest.mark.parametrize("gravity", [1e-3, 100.0])
+@pytest.mark.parametrize("law", [KelvinVoigt(1e5, 1.0), Hertz(1e12)])
+def test_a_free_beam_rests_on_two_stops_as_the_lever_has_it(law, gravity):
+    weight = STEEL.line_mass * L * gravity
+    scene = fb.Scene(fb.Beam(L, STEEL), stops=[fb.Stop(z, law, gap=0.03) for z in (0.1, 0.35)], gravity=gravity)
+    model = scene.reduce(6)
+    run = model.simulate(1e-9, 1e-9, start=model.equilibrium())
+    assert [run.force(i)[0] for i in (0, 1)] == pytest.approx([0.6 * weight, 0.4 * weight], rel=1e-4)
 
 
 @pytest.mark.parametrize("gap", [1e-4, 0.1, 10.0])

@@ -167,7 +167,8 @@ class Model(Printed, ModalEquations):
 
         Raises
         ------
-        reduction.AccuracyError : nothing carries the loads, so that no equilibrium is found.
+        reduction.AccuracyError : nothing carries the loads, so that no equilibrium is found; or contacts are so stiff
+            and their gaps so wide that rounding of places hides their forces.
         """
         return initial_states.equilibrium(self, loads or {})
 
