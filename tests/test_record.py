@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from problems import ROD_FILE
-from refusals import refused_by
+from refusals import refused, refused_by
 from scipy.interpolate import BPoly
 
 import fembeam as fb
@@ -168,12 +168,43 @@ def test_what_has_no_second_derivative_is_no_base_motion():
         fb.Record(jittered, QUAKE, quantity="acceleration", interpolation="linear")
     for options, message in (
         ({"interpolation": "linear"}, "y'' of a displacement joined by straight lines does not exist"),
-        ({"quantity": "force"}, "a force has no derivatives"),
+        ({"quantity": "force"}, "base must hold samples of a motion, not of a force, got Record"),
     ):
         record = fb.Record(TIMES, QUAKE, **options)
         with pytest.raises(ValueError, match=message):
             fb.Scene(fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], base=record)
         fb.Scene(fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], forces=[fb.PointForce(0.5, record)])
+
+
+def scene_with(**parts):
+    return fb.Scene(fb.Beam(0.5, STEEL), **{"supports": [fb.Clamped(0.0)], **parts})
+
+
+PUSHED = fb.Record(TIMES, QUAKE, quantity="force")
+SHAKEN = fb.Record(TIMES, QUAKE, quantity="acceleration")
+
+test_samples_of_a_load_and_of_a_motion_stand_at_their_own_places = refused(
+    (
+        lambda: fb.PointForce(0.5, SHAKEN),
+        "samples of a load in N, not of an acceleration.*in PointForce at z = 0.5; give",
+    ),
+    (
+        lambda: fb.PointMoment(0.5, SHAKEN),
+        "samples of a load in N m, not of an acceleration.*in PointMoment at z = 0.5",
+    ),
+    (lambda: fb.PointForce(0.5, SHAKEN.derivative(1)), "not of an acceleration, whose double integral would act"),
+    (
+        lambda: fb.Spring(0.5, 1.0, foot=PUSHED),
+        "foot must hold samples of a motion, not of a force.*in Spring at z = 0.5",
+    ),
+    (lambda: fb.Clamped(0.0, motion={"y": PUSHED}), "motion along y must hold samples of a motion, not of a force"),
+    (lambda: scene_with(bodies=[scene_with(forces=[fb.PointForce(0.5, SHAKEN)])]), "not of an acceleration"),
+)
+
+
+def test_an_acceleration_asked_for_its_own_samples_is_a_load():
+    force = fb.PointForce(0.5, SHAKEN.derivative(2)).signal
+    np.testing.assert_allclose(force(TIMES), PUSHED(TIMES), atol=1e-9 * np.abs(QUAKE).max())
 
 
 def test_a_displacement_that_begins_with_an_acceleration_is_told():

@@ -58,7 +58,8 @@ class Record:
     quantity : "displacement", "acceleration" or "force"
         What `y` is. For an acceleration `derivative(2)` is the record itself, and the value is its double
         integral, with constants such that it is zero at both ends; slow drift stays unless lo > 0. A force
-        (or moment) is no motion: it has no derivatives. A scene file must say it.
+        (or moment) is no motion: it has no derivatives. A scene refuses an acceleration as a load, a force as a
+        motion. A scene file must say it.
     detrend : bool
         Remove the least-squares straight line first: offset and drift of the sensor. An acceleration needs it
         unless lo > 0: its offset is a load like gravity.

@@ -17,6 +17,7 @@ from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
 from fembeam.scene.part import ScenePart
 from fembeam.scene.places import Place, Second, sign_of
 from fembeam.scene.rubbing import Friction, check_oblique
+from fembeam.scene.signal_checks import require_load, require_motion
 from fembeam.structures import COMPONENTS, Direction, direction_of, turns
 from fembeam.support import is_finite, require, require_finite, require_non_negative
 
@@ -46,8 +47,9 @@ def _checked_motion(motion: Any, dofs: tuple[str, ...], where: str) -> dict[str,
         known = callable(signal) and callable(getattr(signal, "derivative", None)) and not isinstance(signal, type)
         require(known, "motion must be signals that know their derivatives", signal, where,
                 "use Harmonic, Multisine, BandNoise, Record, Pulse, Step or SineSweep")  # fmt: skip
+        require_motion(signal, f"motion along {dof}", where)
         for order in (1, 2):
-            signal.derivative(order)
+            require_motion(signal.derivative(order), f"derivative {order} of the motion along {dof}", where)
     return {dof: motion[dof] for dof in COMPONENTS if dof in motion}
 
 
@@ -228,6 +230,8 @@ class Spring(ScenePart):
         require_non_negative("rotational", self.rotational, where, "give N m/rad")
         require(self.foot is None or callable(self.foot), "foot must be a signal or None", self.foot, where,
                 "give a motion such as Harmonic(amplitude, omega)")  # fmt: skip
+        if self.foot is not None:
+            require_motion(self.foot, "foot", where)
         _check_direction(self, where)
 
 
@@ -355,6 +359,7 @@ class _Load(ScenePart):
         super().__post_init__()
         require(callable(self.signal), "signal must be a function of t", self.signal, self.where,
                 "give a signal such as Harmonic(amplitude, omega); Harmonic(size, 0.0) is a constant")  # fmt: skip
+        require_load(self.signal, "N m" if self.derivative else "N", self.where)
         _check_direction(self, self.where)
 
     @property

@@ -32,6 +32,7 @@ from fembeam.scene.parts import (
 )
 from fembeam.scene.rigid_motions import drifting, rigid_body_modes
 from fembeam.scene.rotors import Disk, Unbalance, driven
+from fembeam.scene.signal_checks import require_motion
 from fembeam.scene.signals import support_motion
 from fembeam.structures import COMPONENTS, Joint
 from fembeam.support import in_mm, is_finite, require, require_finite, require_non_negative, require_positive
@@ -379,14 +380,16 @@ class Scene:
             object.__setattr__(self, "base", dict(self.base))
         require(self.named or not isinstance(self.base, dict), "base of a Beam must be one signal, its motion along y",
                 self.base, "Scene", "drop the directions")  # fmt: skip
-        for motion in self.motions.values():
+        for direction, motion in self.motions.items():
             missing = [name for name in ("__call__", "derivative") if not callable(getattr(motion, name, None))]
             if missing or isinstance(motion, type):
                 raise TypeError(f"base must be a motion y(t) that knows its derivatives, got {motion!r} without "
                                 f"{' and '.join(missing) or 'values'} in Scene; use Harmonic, Multisine, BandNoise, "
                                 "Record, Pulse, Step, SineSweep, or an object with __call__(t) and "
                                 "derivative(order)")  # fmt: skip
-            motion.derivative(2)
+            along = f" along {direction}" * self.named
+            require_motion(motion, f"base{along}", "Scene")
+            require_motion(motion.derivative(2), f"derivative 2 of base{along}", "Scene")
 
     def _check_gravity(self) -> None:
         """Raise ValueError for gravity along what the bodies have not."""
