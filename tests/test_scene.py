@@ -234,6 +234,16 @@ def test_features_must_sit_on_the_beam(name, feature):
             Scene(BEAM, **{name: [*good, feature(z)]}, **supports)
 
 
+class OneByOne:
+    """A motion that its writer made for one time at once."""
+
+    def __call__(self, t):
+        return math.sin(t)
+
+    def derivative(self, order):
+        return self
+
+
 STEEL = fb.Section.circle(2.1e11, 7800.0, 0.01)
 PARTS_REFUSED = [
     (lambda: LumpedMass(0.5, -1.0), "mass must be finite and not negative, got -1.0 in LumpedMass at z = 0.5"),
@@ -249,6 +259,8 @@ PARTS_REFUSED = [
     (lambda: Stop(0.5, Linear), "law must offer force"),
     (lambda: PointForce(0.5, None), "signal must be a function of t, got None"),
     (lambda: PointForce(0.5, 3.0), "signal must be a function of t, got 3.0 .* a constant"),
+    (lambda: PointForce(0.5, math.sin), r"must take an array of times, got TypeError .* in PointForce at z = 0.5"),
+    (lambda: PointForce(0.5, lambda t: 0.0 if t > 1.0 else 9.0), "must take an array of times, .* np.where for if"),
     (lambda: Rayleigh(-1, 0), "alpha must be finite and not negative, got -1 in Rayleigh"),
     (lambda: Rayleigh(0, math.nan), "beta must be finite and not negative, got nan"),
     *((lambda bad=bad: ModalDamping(bad), r"zeta.* must .* in ModalDamping")
@@ -273,6 +285,7 @@ SCENES_REFUSED = [
      "base must be a motion .* got <function .* without derivative in Scene; use Har"),
     (lambda: Scene(BEAM, [Clamped(0.0)], base=1e-3), "got 0.001 without __call__ and derivative"),
     (lambda: Scene(BEAM, [Clamped(0.0)], base=Harmonic), "got <class .*Harmonic'> without values"),
+    (lambda: Scene(BEAM, [Clamped(0.0)], base=OneByOne()), "base must take an array of times, got TypeError"),
     *((lambda bad=bad: paper().matrices(elements=bad), "elements must be a whole number above 0")
       for bad in (0, -1, 2.5, True, "10")),
     *((lambda bad=bad: paper().matrices(modes=bad), "modes must be a whole number above 0")

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from refusals import refused
 
 import fembeam as fb
 import reduction
@@ -145,3 +146,16 @@ def test_a_body_comes_to_rest_on_the_beam_however_far_it_falls(gap, stiffness):
     delta = float(-model.directions[0] @ q) - gap
     expected = (mass * 9.81 / stiffness) ** (2.0 / 3.0)
     assert delta == pytest.approx(expected, rel=1e-9, abs=50.0 * np.spacing(gap))
+
+
+HELD = fb.Scene(fb.Beam(L, STEEL), CLAMPED)
+
+test_what_is_no_field_of_the_beam_is_refused = refused(
+    (
+        lambda: HELD.reduce(2).state(1e-3),
+        "a field must be a function of z, .* got 0.001 in Model.state; write lambda z",
+    ),
+    (lambda: HELD.reduce(2).state(velocity=np.ones(3)), "a field must be a function of z, .* got array"),
+    (lambda: HELD.reduce(2).state(lambda z: math.sin(z)), "a field must take an array of coordinates z, got TypeError"),
+    (lambda: HELD.reduce(2).missed(lambda z: np.ones(3)), r"must give one value for each of \d+ z, got \(3,\)"),
+)

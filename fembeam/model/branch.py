@@ -17,7 +17,7 @@ import solvers
 from fembeam.model.equations import load_period
 from fembeam.model.orbit import Orbit, checked_period, orbit
 from fembeam.scene import changes_structure, path_of, replaced, value_of
-from fembeam.support import Part, Printed, counting, note, require, write_rows, written_whole
+from fembeam.support import Part, Printed, counting, note, numbers, require, write_rows, written_whole
 from solvers.branches import recorded, restarted
 from solvers.problem import counted, dataframe
 
@@ -190,14 +190,22 @@ def follow(
 ) -> Branch:
     """See `Model.branch`."""
     family = Family(model, path_of(model.scene, parameter), checked_period(period))
-    low, high = (float(value) for value in span)
-    require(low < high, "span must be two values, ascending", span, "Model.branch", "give (lowest, highest)")
+    low, high = _checked_span(span)
     if at is None:
         present = start.parameter if isinstance(start, Orbit) else np.nan
         at = value_of(model.scene, family.name) if np.isnan(present) else present
         at = at if low <= at <= high else low
     first = start if isinstance(start, Orbit) else orbit(family.at(at), family.period, start, None)
     return Branch(family, solvers.branch(family, (low, high), first.found, at=at, **options))
+
+
+def _checked_span(span: Any) -> tuple[float, float]:
+    """The two ends; ValueError for what is no span."""
+    where, advice = "Model.branch", "give (lowest, highest)"
+    ends = numbers("span", span, where, advice)
+    right = ends.shape == (2,) and bool(ends[0] < ends[1]) and bool(np.isfinite(ends).all())
+    require(right, "span must be two values, ascending", span, where, advice)
+    return float(ends[0]), float(ends[1])
 
 
 def resumed(model: Model, path: str | Path) -> Branch:

@@ -17,6 +17,7 @@ from scipy.sparse import linalg as sparse_linalg
 import reduction
 from contacts.path import borders
 from fembeam.scene import BodyMatrices, loads_of_dof, quoted, support_loads, tangent
+from fembeam.scene.signal_checks import require_array_function
 from fembeam.support import numbers, require, require_finite
 
 if TYPE_CHECKING:
@@ -134,7 +135,13 @@ def _on_nodes(beam: Matrices, field: Field) -> Vector:
         return _on_labels(beam, field)
     from scipy.interpolate import CubicSpline
 
-    values = np.broadcast_to(np.asarray(field(beam.nodes), dtype=float), beam.nodes.shape)
+    require(callable(field), "a field must be a function of z, an array in m", field, "Model.state",
+            "write lambda z: 1e-3 * z, or a list of functions, one for each beam")  # fmt: skip
+    require_array_function(field, "a field", "Model.state", "coordinates z")
+    values = np.asarray(field(beam.nodes), dtype=float)
+    require(values.shape in ((), beam.nodes.shape), f"a field must give one value for each of {beam.nodes.size} z",
+            values.shape, "Model.state", "check its shape")  # fmt: skip
+    values = np.broadcast_to(values, beam.nodes.shape)
     bad = values[~np.isfinite(values)]
     require(not bad.size, "the field must be finite on the beam", bad[:1], "Model.state", "check the function")
     both = np.stack([values, CubicSpline(beam.nodes, values)(beam.nodes, 1)], axis=1)
