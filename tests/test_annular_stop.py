@@ -323,7 +323,7 @@ def test_bad_scenes_are_refused():
         (bent, [replace(hole, z=("B-C", 0.1))], r"directions must be given .* \(0.1 m along 'B-C'\)"),
         (tube(), [replace(hole, z=1.4)], "z must lie on the frame"),
         (tube(), [replace(hole, directions=("x", "z"))], "must move along z; it has x, y, rx, ry"),
-        (tube(), [hole, replace(hole)], r"stops must not share one place and direction \(z = 0.4, x and y\)"),
+        (tube(), [hole, replace(hole)], r"stops must not share one place, direction and gap \(z = 0.4, x and y\)"),
         (tube(), [replace(hole, on=(1, 0.4))], "on must name a body, and there is none"),
         (tube(), [replace(hole, on=0.4)], "on must be another place"),
         (tube(), [replace(hole, name="a"), replace(hole, z=0.6, name="a")], "names must be unique"),

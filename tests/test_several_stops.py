@@ -341,3 +341,33 @@ def test_a_graze_just_before_another_stop_is_hit(law, late):
         alone = integrate(System(*matrices, [stop]), *start, 0.03, None, Exponential(1e-9))
         assert len(alone.contacts) == 1
         same_log(log_of(both, number), log_of(alone, 0), 1e-6, 0.03)
+
+
+def bumper(*stops, **parts):
+    """A clamped beam, shaken, with stops at its tip."""
+    beam, drive = fb.Beam(0.25, STEEL), fb.Harmonic(1.0, 200.0)
+    given = {"damping": fb.ModalDamping(0.02), "forces": [fb.PointForce(0.25, drive)], **parts}
+    return fb.Scene(beam, [fb.Clamped(0.0)], stops=stops, **given)
+
+
+TWO = [fb.Stop(0.25, PiecewiseLinear(k), gap=gap) for k, gap in ((1e3, 1e-3), (3e3, 2e-3))]
+ONE = [fb.Stop(0.25, PiecewiseLinear([1e3, 4e3], knots=[1e-3]), gap=1e-3)]
+
+
+@pytest.mark.parametrize("options", [{"modes": 3}, {"modes": 3, "residual": True}, {"modes": 2, "interface": True}])
+def test_two_stops_behind_each_other_are_one_whose_law_bends(options):
+    two, one = (bumper(*stops).reduce(**options).simulate(0.1, 1e-4) for stops in (TWO, ONE))
+    assert two.names == ("stop at 0.25 m, below", "stop at 0.25 m, below (2)")
+    assert np.all(np.bincount(two.contacts.stop) >= 2)
+    np.testing.assert_allclose(two.q, one.q, atol=1e-8 * np.abs(one.q).max())
+    np.testing.assert_allclose(two.force(0) + two.force(1), one.force(0), atol=1e-7 * one.force(0).max())
+    own = two.contacts.t_in[two.contacts.stop == 0]
+    np.testing.assert_allclose(own, one.contacts.t_in, atol=1e-9)
+
+
+def test_two_laws_behind_each_other_against_an_independent_method():
+    scene = bumper(fb.Stop(0.25, Hertz(1e6), gap=1e-3), fb.Stop(0.25, KelvinVoigt(3e3, 1.0), gap=1.5e-3))
+    run, other = (scene.reduce(3).simulate(0.1, 1e-4, solver=method(1e-10)) for method in (Exponential, DormandPrince))
+    assert np.all(np.bincount(run.contacts.stop) >= 1)
+    np.testing.assert_allclose(run.q, other.q, atol=1e-6 * np.abs(run.q).max())
+    np.testing.assert_allclose(run.contacts.peak_force, other.contacts.peak_force, rtol=1e-5)

@@ -117,15 +117,16 @@ def check_conflicts(scene: Scene) -> None:
     _check_moved(scene)
     known: dict[Any, int] = {}
     for index, stop in enumerate(scene.stops):
-        one: Any = (stop.z, stop.push, stop.coordinate.along, stop.coordinate.to)
+        one: Any = (stop.z, stop.push, stop.coordinate.along, stop.coordinate.to, stop.gap)
         if isinstance(stop, AnnularStop):
             one = (*one, stop.coordinates[1].along, stop.centre, stop.outer)
             ways = [named(place.along) for place in stop.coordinates]
         else:
             ways = [named(direction_of(stop.direction, "Stop"))]
         at = f"{quoted(stop.z)}, {' and '.join(ways)}"
-        require(one not in known, f"stops must not share one place and direction ({at})", (known.get(one), index),
-                "stops of Scene", "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
+        require(one not in known, f"stops must not share one place, direction and gap ({at})",
+                (known.get(one), index), "stops of Scene",
+                "make them one stop with one law, such as PiecewiseLinear, or give each its own gap")  # fmt: skip
         known[one] = index
 
 

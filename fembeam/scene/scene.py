@@ -405,22 +405,22 @@ class Scene:
         return [c for c in COMPONENTS[:3] if c in known]
 
     def _check_conflicts(self) -> None:
-        """Raise ValueError if two supports share one place, or two stops one place, side and carrier."""
+        """Raise ValueError if two supports share one place, or two stops one place, side, carrier and gap."""
         near = 1e-9 * self.beam.length
         ordered = sorted(self.supports, key=lambda support: support.z)
         for first, second in pairwise(ordered):
             apart = second.z - first.z > near
             require(apart, "supports must not share one place", (first, second), "Scene", "keep one")
         ways = [tuple(stop.push * part for part in stop.coordinate.along) for stop in self.stops]
-        kinds = [(way, repr(stop.coordinate.to)) for way, stop in zip(ways, self.stops, strict=True)]
+        kinds = [(way, repr(stop.coordinate.to), stop.gap) for way, stop in zip(ways, self.stops, strict=True)]
         for i, j in pairwise(sorted(range(len(kinds)), key=lambda i: (kinds[i], self.stops[i].z, i))):
             stop, other = self.stops[i], self.stops[j]
             assert isinstance(stop, Stop)  # annular ones are not of a Beam
             same = kinds[i] == kinds[j] and other.z - stop.z <= near
             told_side = stop.side or stop.direction
-            require(not same, f"stops must not share one place and side (z = {stop.z} m, {told_side})",
+            require(not same, f"stops must not share one place, side and gap (z = {stop.z} m, {told_side})",
                     tuple(sorted((i, j))), "stops of Scene",
-                    "make them one stop with one law, such as PiecewiseLinear")  # fmt: skip
+                    "make them one stop with one law, such as PiecewiseLinear, or give each its own gap")  # fmt: skip
 
     def _check_bodies(self) -> None:
         """Raise ValueError for what a body cannot carry, and for stops on bodies or places that do not exist."""
