@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fembeam.plot.bodies import BodyStage
 from fembeam.plot.run_signals import samples_in
-from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled
+from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled, verbatim
 from fembeam.scene import ON
 from fembeam.support import require, written_beside
 
@@ -218,7 +218,8 @@ class _Stage:
         self.title = self.beam_axis.set_title(" ")
         self._fixed(self.beam_axis)
         for i, force in enumerate(self.forces):
-            self.force_axis.step(self.run.t[self.samples], force, color=f"C{i}", where="mid", label=self.run.name(i))
+            label = verbatim(self.run.name(i))
+            self.force_axis.step(self.run.t[self.samples], force, color=f"C{i}", where="mid", label=label)
         self.cursor = self.force_axis.axvline(self.run.t[self.samples[0]], color=ORANGE)
         self.force_axis.set(xlabel="time / s", ylabel=f"peak contact\nforce / {self.run.unit('force')}")
         self.force_axis.set_xlim(*self.run.t[self.samples[[0, -1]]])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fembeam.plot.figure import heading, legend, sheet
-from fembeam.plot.style import BLUE, GREEN, GREY, ORANGE, RED, styled
+from fembeam.plot.style import BLUE, GREEN, GREY, ORANGE, RED, styled, verbatim
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,12 +43,12 @@ def basins(found: Basins, axes: Axes | None = None) -> Figure:
         here = found.label == label
         if here.any():
             image[here] = to_rgb(colour)
-            entries.append(Patch(color=colour, label=f"{name}, {here.mean():.1%}"))
+            entries.append(Patch(color=colour, label=f"{verbatim(name)}, {here.mean():.1%}"))
     x, y = found.x.values, found.y.values
     half = (x[1] - x[0]) / 2, (y[1] - y[0]) / 2
     extent = (x[0] - half[0], x[-1] + half[0], y[0] - half[1], y[-1] + half[1])
     axis.imshow(image, origin="lower", extent=extent, aspect="auto", interpolation="nearest")
-    axis.set(xlabel=found.x.name, ylabel=found.y.name)
+    axis.set(xlabel=verbatim(found.x.name), ylabel=verbatim(found.y.name))
     legend(axis, axes is None, "outside lower center", handles=entries, ncols=2 if axes is None else 1)
     heading([axis], f"What {found.label.size} starts come to", axes is None)
     return figure

@@ -8,7 +8,7 @@ import numpy as np
 
 from fembeam.plot.bodies import SHOWN, displacements, mode_figure
 from fembeam.plot.figure import heading, sheet
-from fembeam.plot.style import BLUE, GREY, Vector
+from fembeam.plot.style import BLUE, GREY, Vector, verbatim
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -75,5 +75,5 @@ def _bars(axis: Axes, shapes: Any, mode: int) -> None:
     """The usual places, where there are no lines to draw."""
     values = np.array([shapes(at)[mode] for at in shapes.usual.values()])
     axis.barh(np.arange(len(values)), values / (np.abs(values).max() or 1.0), color=BLUE)
-    axis.set_yticks(np.arange(len(values)), list(shapes.usual))
+    axis.set_yticks(np.arange(len(values)), [verbatim(name) for name in shapes.usual])
     axis.set_xlim(-1.1, 1.1)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.rig_words import length
 from fembeam.plot.run_signals import between_samples, samples_in, sampling_of
-from fembeam.plot.style import BLUE, GREEN, GREY, RED, Vector, styled
+from fembeam.plot.style import BLUE, GREEN, GREY, RED, Vector, styled, verbatim
 from fembeam.response import states
 from fembeam.structures import direction_of, named
 from fembeam.support import require
@@ -72,7 +72,7 @@ def orbit_in_clearance(
     axis.set(xlabel=f"{x}{of_centre} / mm", ylabel=f"{y}{of_centre} / mm")
     axis.set_aspect("equal", adjustable="datalim")
     legend(axis, axes is None, "outside lower center", **({"ncols": len(parts) + 1} if axes is None else {}))
-    heading([axis], f"Path at {run.name(number)}", axes is None, run=run)
+    heading([axis], f"Path at {verbatim(run.name(number))}", axes is None, run=run)
     return figure
 
 
@@ -131,7 +131,7 @@ def forces_in_clearance(
     axis.tick_params(axis="y", labelsize=8, labelcolor=GREY)
     axis.grid(linewidth=0.4)
     legend(axis, axes is None, "outside lower center", **({"ncols": 2} if axes is None else {"loc": "lower right"}))
-    heading([axis], f"Forces at {run.name(number)} / N", axes is None, run=run)
+    heading([axis], f"Forces at {verbatim(run.name(number))} / N", axes is None, run=run)
     return figure
 
 
@@ -150,7 +150,7 @@ class Whirl:
         self.place = axis.plot([], [], "o", color=BLUE, markersize=6)[0]
         x, y = _ways(run, stop)
         axis.set(xlabel=f"{x} / mm", ylabel=f"{y} / mm")
-        axis.set_title(f"{run.name(stop)}, clearance {length(abs(radius))}", fontsize=8)
+        axis.set_title(f"{verbatim(run.name(stop))}, clearance {length(abs(radius))}", fontsize=8)
         axis.set_aspect("equal", adjustable="datalim")
         axis.locator_params(nbins=5)
 

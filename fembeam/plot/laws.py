@@ -9,7 +9,7 @@ import numpy as np
 
 from contacts import PUBLISHED, Bounce, Hysteretic, Identified, KelvinVoigt, Law, Viscoelastic, bounce, restitution
 from fembeam.plot.figure import heading, legend, sheet
-from fembeam.plot.style import BLUE, GREY, RED, Vector, styled
+from fembeam.plot.style import BLUE, GREY, RED, Vector, styled, verbatim
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def equivalent(found: Equivalent, axes: Sequence[Axes] | None = None) -> Figure:
         axis.plot(1e3 * found.amplitude, values)
         axis.set(xlabel="amplitude of δ / mm", ylabel=name)
         axis.set_ylim(bottom=min(0.0, float(np.nanmin(values))))
-    heading(three, f"{found.name} as a spring and a dashpot", axes is None)
+    heading(three, f"{verbatim(found.name)} as a spring and a dashpot", axes is None)
     return figure
 
 
@@ -162,7 +162,7 @@ def _drawn(
     figure, (axis,) = sheet(1, 1, (7.0, 4.2), axes)
     scale, unit = _force_unit(max(float(np.abs(force).max()) for _, force in curves.values()))
     for number, (name, (delta, force)) in enumerate(curves.items()):
-        axis.plot(1e3 * delta, scale * force, _line(number), label=name)
+        axis.plot(1e3 * delta, scale * force, _line(number), label=verbatim(name))
     axis.axhline(0.0, color=GREY, linewidth=0.6)
     axis.set(xlabel=words[0], ylabel=f"{words[1]} / {unit}")
     legend(axis, axes is None, "outside right center")

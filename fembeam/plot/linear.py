@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fembeam.plot.figure import heading, sheet
-from fembeam.plot.style import Vector, place_name, plain_decades, styled
+from fembeam.plot.style import Vector, place_name, plain_decades, styled, verbatim
 from fembeam.scene import split
 from fembeam.structures import UP
 from fembeam.support import require
@@ -54,7 +54,7 @@ def response_spectrum(
         order = np.argsort(one.period)
         period = one.period[order]
         for i, zeta in enumerate(one.zeta):
-            label = f"{name}, ζ = {zeta:g}".removeprefix(", ")
+            label = verbatim(f"{name}, ζ = {zeta:g}".removeprefix(", "))
             (line,) = upper.loglog(period, one.acceleration[i, order], label=label)
             colour = line.get_color()
             upper.loglog(period, one.pseudo_acceleration[i, order], "k--", linewidth=0.7)  # seen where they coincide
@@ -134,13 +134,16 @@ def frequency_response(found: FrequencyResponse, axes: Sequence[Axes] | None = N
     named = isinstance(found.output, (tuple, list))
     places: Any = found.output if isinstance(found.output, list) else [found.output]
     for size, angle, z in zip(amplitude, phase, places if named else np.atleast_1d(found.output), strict=True):
-        upper.semilogy(found.omega, size, label=place_name(z) if isinstance(z, tuple) else f"z = {z:.4g} m")
+        upper.semilogy(found.omega, size, label=verbatim(place_name(z)) if isinstance(z, tuple) else f"z = {z:.4g} m")
         lower.plot(found.omega, np.degrees(angle))
     for natural in found.natural[found.natural < found.omega[-1]]:
         for axis in (upper, lower):
             axis.axvline(natural, color="0.6", linestyle=":", linewidth=0.8, zorder=0)
     kind = "absolute" if found.absolute else "relative"
-    upper.set(ylabel=f"|H| / {found.unit}", title=f"Linear frequency response, {kind} displacement per {found.input}")
+    upper.set(
+        ylabel=f"|H| / {found.unit}",
+        title=f"Linear frequency response, {kind} displacement per {verbatim(found.input)}",
+    )
     lower.set(xlabel="ω / rad s⁻¹", ylabel="phase / °")
     lower.yaxis.set_major_locator(MultipleLocator(90.0))
     lower.set_xlim(float(found.omega[0]), float(found.omega[-1]))

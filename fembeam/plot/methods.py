@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fembeam.plot.figure import legend, sheet
-from fembeam.plot.style import styled
+from fembeam.plot.style import styled, verbatim
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -49,11 +49,11 @@ def speed_accuracy(result: SpeedAccuracy, axes: Axes | Sequence[Axes] | None = N
         ax.set(xscale="log", yscale="log")
         ax.invert_xaxis()
         ax.grid(alpha=0.25, lw=0.5)
-    drawn[0].set(xlabel=f"error of integration: {result.quantity}", ylabel="time of a run / ms")
+    drawn[0].set(xlabel=f"error of integration: {verbatim(result.quantity)}", ylabel="time of a run / ms")
     claim = result.claim()
-    drawn[0].set_title("Integration alone; thick: the front of each model" + (f"\n{claim}" if claim else ""))
+    drawn[0].set_title("Integration alone; thick: the front of each model" + (f"\n{verbatim(claim)}" if claim else ""))
     if panels == 2:
-        drawn[1].set(xlabel=f"error against {sizes[-1]} modes: {result.quantity}")
+        drawn[1].set(xlabel=f"error against {sizes[-1]} modes: {verbatim(result.quantity)}")
         drawn[1].set_title("Integration and reduction; dashed: exact solution with so few modes")
     _legends(drawn[-1], sizes, methods, axes is None)
     return figure
@@ -89,7 +89,8 @@ def _legends(axis: Axes, sizes: Sequence[int], methods: Sequence[str], own: bool
     entries = [Line2D([], [], color=c, lw=3, label=f"{n} mode{'s' if n > 1 else ''}")
                for n, c in zip(sizes, _colours(len(sizes)), strict=True)]  # fmt: skip
     entries += [
-        Line2D([], [], color="black", marker=k, lw=0, ms=5, label=m) for m, k in zip(methods, MARKERS * 3, strict=False)
+        Line2D([], [], color="black", marker=k, lw=0, ms=5, label=verbatim(m))
+        for m, k in zip(methods, MARKERS * 3, strict=False)
     ]
     legend(axis, own, "outside right upper", handles=entries)
 
@@ -118,7 +119,7 @@ def stability_map(*maps: StabilityMap, axes: Axes | Sequence[Axes] | None = None
             kept = np.where(np.isfinite(limit) & (limit > 0.0), limit, np.nan)
             ax.step(np.append(kept, kept[-1]), places, color="black", ls=style, lw=1.6, where="pre")
             ax.vlines(kept, places[:-1], places[1:], color="black", ls=style, lw=1.6)
-        ax.set(xscale="log", xlabel="step / s", yticks=range(len(found.rows)), title=found.method)
+        ax.set(xscale="log", xlabel="step / s", yticks=range(len(found.rows)), title=verbatim(found.method))
         ax.set_xlim(*_edges(found.steps)[[0, -1]])
         ax.set_yticklabels([f"{row:g}" for row in found.rows])
         ax.set_ylabel({"modes": "number of modes", "stiffness": "contact stiffness / SI"}[found.axis])

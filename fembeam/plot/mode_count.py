@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fembeam.plot.figure import heading, sheet
-from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled
+from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled, verbatim
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -50,9 +50,9 @@ def mode_count(study: ModeCount, axes: Sequence[Axes] | None = None) -> Figure:
     right.set_ylim(bottom=0.0)
     right.set(ylabel="integration / s", title="time of all runs of a model")
     against = f"against {reference.measured.coordinates} coordinates; hollow: within noise"
-    left.set_title(against if axes is None else f"{study.quantity} {against}")
+    left.set_title(against if axes is None else f"{verbatim(study.quantity)} {against}")
     if axes is None:
-        heading([left], f"Convergence of {study.quantity} with modes", True)
+        heading([left], f"Convergence of {verbatim(study.quantity)} with modes", True)
     return figure
 
 
@@ -72,7 +72,7 @@ def smallest_model(result: SmallestModel, axes: Axes | Sequence[Axes] | None = N
         axis.axhline(result.tolerance, color=GREY, linestyle="--", label=f"tolerance {result.tolerance:g}")
     drawn[0].legend()
     state = "Smallest model" if result.met else "NOT MET: smallest model"
-    heading(drawn, f"{state} for {result.quantity}", axes is None)
+    heading(drawn, f"{state} for {verbatim(result.quantity)}", axes is None)
     return figure
 
 

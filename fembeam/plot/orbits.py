@@ -11,7 +11,7 @@ from fembeam.model import observed
 from fembeam.plot.axis_names import axis_name
 from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.linear import frequencies
-from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, displacement_name, plain_decades, styled
+from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, displacement_name, plain_decades, styled, verbatim
 from fembeam.scene import signals_of
 from fembeam.scene.parameters import scalars
 from fembeam.support import require
@@ -71,14 +71,14 @@ def branch(
     colours = [f"C{periods[i] - 1 if same else i}" for i in range(len(several))]
     names = _labels(several) if labels is None else labels
     for one, colour, label in zip(several, colours, names, strict=True):
-        _draw_branch(axis, one, place, colour, label)
+        _draw_branch(axis, one, place, colour, verbatim(label))
     _draw_ends(axis, several, place)
     linear = _draw_linear(axis, several, place, colours)
     _draw_backbones(axis, several, place)
     if axes is None and len(linear):
         _widen(axis, linear)
     name = several[0].family.name
-    axis.set(xlabel=axis_name(name, model.scene), ylabel=f"max |{displacement_name(place)}| / mm")
+    axis.set(xlabel=verbatim(axis_name(name, model.scene)), ylabel=f"max |{displacement_name(place)}| / mm")
     handles, words = _entries(axis, several)
     legend(axis, axes is None, "outside right upper", handles=handles, labels=words, fontsize=8)
     return figure
@@ -89,7 +89,7 @@ def bifurcation(found: Bifurcation, axes: Axes | None = None) -> Figure:
     """Largest |u| of every settled period against the parameter; `axes` to draw into, None makes a figure."""
     figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
     _draw_cloud(axis, found.cloud())
-    axis.set(xlabel=found.name, ylabel=f"max |{displacement_name(found.z)}| / mm")
+    axis.set(xlabel=verbatim(found.name), ylabel=f"max |{displacement_name(found.z)}| / mm")
     return figure
 
 
@@ -145,7 +145,7 @@ def _draw_ends(axis: Axes, several: list[Branch], z: Any) -> None:
     labelled = set()
     for orbit, why in ends:
         if why in marks:
-            label = None if why in labelled else f"end: {why}"
+            label = None if why in labelled else verbatim(f"end: {why}")
             mark, colour = marks[why]
             axis.plot(orbit.parameter, 1e3 * peak(orbit, z), mark, color=colour, markersize=8, zorder=3, label=label)
             labelled.add(why)

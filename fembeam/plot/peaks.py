@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.plot.figure import heading, sheet
-from fembeam.plot.style import BLUE, RED, Vector, displacement_name, styled
+from fembeam.plot.style import BLUE, RED, Vector, displacement_name, styled, verbatim
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -54,7 +54,7 @@ def peak_curve(found: Peak, axes: Sequence[Axes] | None = None) -> Figure:
     if p[0] > 0.0 and p[-1] > WIDE * p[0]:
         lower.set_xscale("log")
     upper.set_ylabel(f"amplitude of {displacement_name(found.z)} / mm")
-    lower.set(xlabel=found.titles[0], ylabel=found.titles[1])
+    lower.set(xlabel=verbatim(found.titles[0]), ylabel=verbatim(found.titles[1]))
     if found.least is not None or not stable.all():
         upper.legend()
     heading([upper, lower], "Peak of the response", axes is None)
@@ -116,8 +116,8 @@ def fold_curve(found: Fold, axes: Sequence[Axes] | None = None) -> Figure:
         axis.plot(found.values[found.cusps], y[found.cusps], "*", color=RED, markersize=11, label="cusp")
     if len(found.cusps) == 1:
         upper.fill(found.values, found.at, color=BLUE, alpha=0.15, label="three orbits")
-    upper.set_ylabel(found.titles[1])
-    lower.set(xlabel=found.titles[0], ylabel=f"amplitude of {displacement_name(found.z)} / mm")
+    upper.set_ylabel(verbatim(found.titles[1]))
+    lower.set(xlabel=verbatim(found.titles[0]), ylabel=f"amplitude of {displacement_name(found.z)} / mm")
     if found.cusps:
         upper.legend()
     heading([upper, lower], "Folds of the response", axes is None)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fembeam.plot.figure import sheet
 from fembeam.plot.orbits import branch
-from fembeam.plot.style import BLUE, GREY, RED, curve, fit_levels, one_legend, ribbon, styled
+from fembeam.plot.style import BLUE, GREY, RED, curve, fit_levels, one_legend, ribbon, styled, verbatim
 from fembeam.statistics import Spectrum
 
 if TYPE_CHECKING:
@@ -48,11 +48,11 @@ def random_spectra(
         lines = {label: x if isinstance(x, Spectrum) else x.psd for label, x in shown.items()}
         axis = drawn[row * columns]
         for i, (label, line) in enumerate(lines.items()):
-            curve(axis, line, omega_max, label=label, color=f"C{i}")
+            curve(axis, line, omega_max, label=verbatim(label), color=f"C{i}")
         fit_levels(axis, list(lines.values()), omega_max)
         if bands and title in bands:
             axis.axvspan(*bands[title], ymin=0.96, color=GREY, alpha=0.6, linewidth=0)
-        axis.set(title=title, xlim=(0, omega_max), ylabel="PSD / m² s rad⁻¹")
+        axis.set(title=verbatim(title), xlim=(0, omega_max), ylabel="PSD / m² s rad⁻¹")
         if len(lines) > 1:
             axis.legend(loc="upper right")
         if branches:
@@ -100,8 +100,8 @@ def density_panels(axes: Sequence[Axes], signals: Mapping[str, Signal]) -> None:
         wide = mean + std * np.linspace(-FURTHEST, FURTHEST, 301)
         normal = np.exp(-0.5 * ((wide - mean) / std) ** 2) / (std * np.sqrt(2 * np.pi))
         axis.plot(wide, normal, color=RED, linestyle="--", label="Gaussian")
-        axis.set_title(f"{name}: skewness {_rounded(signal.skewness)},\nkurtosis {_rounded(signal.kurtosis)}")
-        axis.set(xlabel=f"{name} / mm", xlim=(wide[0], wide[-1]), ylim=(0, ROOM * max(p.max(), normal.max())))
+        axis.set_title(f"{verbatim(name)}: skewness {_rounded(signal.skewness)},\nkurtosis {_rounded(signal.kurtosis)}")
+        axis.set(xlabel=f"{verbatim(name)} / mm", xlim=(wide[0], wide[-1]), ylim=(0, ROOM * max(p.max(), normal.max())))
     axes[0].set_ylabel("probability density / mm⁻¹")
     axes[0].legend(loc="upper left", fontsize=8)
 

@@ -35,7 +35,7 @@ from fembeam.plot.figure import heading, sheet
 from fembeam.plot.random import density_panels
 from fembeam.plot.run_signals import between_samples, estimated, first_stop, natural, place_of, sampling_of, stationary
 from fembeam.plot.spectra import segment_for
-from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, place_name, styled
+from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, place_name, styled, verbatim
 from fembeam.scene import persistent_drive, unit_of
 from fembeam.support import require
 
@@ -82,7 +82,7 @@ def time_history(
     t, u = _displacement(run, place, body, lo, hi)
     drawn[0].plot(t, 1e3 * u, color=BLUE)
     drawn[0].set_ylabel("displacement / mm")
-    title = f"Displacement at {_name(run, body, place)} relative to the frame"
+    title = f"Displacement at {verbatim(_name(run, body, place))} relative to the frame"
     if len(run.stops):
         stops = _stops_at(run, body, place)
         _shade_contacts(drawn, run, stops, lo, hi)
@@ -206,7 +206,7 @@ def _listed(stops: NDArray[np.int64], run: Run) -> str:
     """Stops as words."""
     if len(stops) == np.count_nonzero(~run.always_acting) > 1:
         return "all stops"
-    return " and ".join(run.key(stop) for stop in stops.tolist())
+    return " and ".join(verbatim(run.key(stop)) for stop in stops.tolist())
 
 
 def _name(run: Run, body: int, z: Any) -> str:
@@ -246,7 +246,7 @@ def _draw_forces(axis: Axes, run: Run, lo: float, hi: float, least: float) -> No
     drawn = np.union1d(always, log.stop[inside])
     for stop in drawn:
         mine = log.stop == stop
-        look: dict[str, Any] = {"color": f"C{stop}", "label": run.name(int(stop))}
+        look: dict[str, Any] = {"color": f"C{stop}", "label": verbatim(run.name(int(stop)))}
         if stop in always or np.any(mine & inside & ~short):
             axis.plot(run.t[kept], run._normal_force(int(stop))[kept], **look)
             look.pop("label")

@@ -351,7 +351,8 @@ class _View:
             pen = Pen(axis, self.z(x), top - HEAD, (self.unit * self.per_inch, 1.0), name=words.partition(":")[0])
             if words.startswith(("base", "gravity")):
                 pen.arrow((0.0, 0.32), (0.0, 0.06), COLOURS["motion"], "<|-|>" if words.startswith("base") else "-|>")
-            axis.text(self.z(x + 0.12), top - HEAD + 0.19, words, fontsize=SIZE + 0.5, va="center", gid=pen.name)
+            axis.text(self.z(x + 0.12), top - HEAD + 0.19, words, fontsize=SIZE + 0.5, va="center", gid=pen.name,
+                      parse_math=False)  # fmt: skip
             x += 0.45 + extent(words, SIZE + 0.5)[0]
 
 

@@ -247,7 +247,7 @@ class _Panel:
             words.append(f"gravity ({size}) m/s²" if "," in size else f"gravity {size} m/s²")
         words += ["places are not known: nodes in a row"] if self.row else []
         title = "; ".join([*([f"body {self.number}"] if self.number else []), *words])
-        axis.set_title("\n".join(textwrap.wrap(title, 90)), fontsize=8)
+        axis.set_title("\n".join(textwrap.wrap(title, 90)), fontsize=8, parse_math=False)
         axis.margins(0.25)
         if self.row:
             axis.set_aspect("equal", adjustable="datalim")

@@ -11,7 +11,7 @@ from fembeam.model import places
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.linear import frequencies
 from fembeam.plot.run_signals import estimated, first_stop, natural, place_of, responses, sampling_of
-from fembeam.plot.style import BLUE, GREEN, GREY, Vector, curve, drawable, fit_levels, styled
+from fembeam.plot.style import BLUE, GREEN, GREY, Vector, curve, drawable, fit_levels, styled, verbatim
 from fembeam.response import frame_motion
 from fembeam.scene import signals_of
 from fembeam.statistics import Spectrum, psd
@@ -63,7 +63,8 @@ def spectrum(
     for axis, names in ((upper, [n for n in ("base y", main) if n in spectra]), (lower, others or [main])):
         behind = [linear[name] for name in names if name in linear]
         for name in names:
-            curve(axis, spectra[name], top, color={"base y": GREY, main: BLUE}.get(name, GREEN), label=name)
+            colour = {"base y": GREY, main: BLUE}.get(name, GREEN)
+            curve(axis, spectra[name], top, color=colour, label=verbatim(name))
         for line in behind:  # thin, and in front: where both agree both are seen
             curve(axis, line, top, color="black", linestyle="--", linewidth=0.7, label="linear, no contact")
         axis.set_ylabel("PSD / m² s rad⁻¹")

@@ -63,6 +63,20 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return inside
 
 
+def verbatim(name: Any) -> str:
+    r"""Text of a figure that shows a user's name as it is: matplotlib makes formulas of what stands between two $.
+
+    A name that begins with an underscore gets a space before it, as legends leave out labels such as "_a".
+
+    Examples
+    --------
+    >>> print(verbatim("cost $5 to $6"), verbatim("_a"), sep=";")
+    cost \$5 to \$6; _a
+    """
+    text = str(name).replace("$", r"\$")
+    return f" {text}" if text.startswith("_") else text
+
+
 def place_name(z: Any) -> str:
     """A place in mm, beyond 1 m in m; one by name with its direction."""
     if isinstance(z, tuple):
@@ -80,7 +94,7 @@ def displacement_name(z: Any) -> str:
     >>> displacement_name(0.25), displacement_name(("lever", "x"))
     ('u(0.25 m)', 'u(lever, x)')
     """
-    return f"u({directed_words(z) if isinstance(z, tuple) else f'{z:.4g} m'})"
+    return f"u({verbatim(directed_words(z)) if isinstance(z, tuple) else f'{z:.4g} m'})"
 
 
 def round_factor(factor: float) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fembeam.plot.figure import heading, sheet
-from fembeam.plot.style import BLUE, RED, styled
+from fembeam.plot.style import BLUE, RED, styled, verbatim
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,8 +47,8 @@ def variation(found: Variation, axes: Axes | Sequence[Axes] | None = None, best:
         for j, axis in enumerate(row):
             _line(axis, found, i, j)
             _star(axis, found.points, best, j, found.values[:, i])
-            axis.set_ylabel(name)
-    heading(panels, f"{', '.join(found.quantities)} at {len(found)} points", axes is None)
+            axis.set_ylabel(verbatim(name))
+    heading(panels, f"{', '.join(map(verbatim, found.quantities))} at {len(found)} points", axes is None)
     return figure
 
 
@@ -73,7 +73,7 @@ def _line(axis: Axes, found: Variation, i: int, j: int) -> None:
     x, error = found.points[:, j], found.standard_error[:, i]
     bars: dict[str, Any] = {"yerr": TWO_ERRORS * error} if np.isfinite(error).any() else {}
     axis.errorbar(x, found.values[:, i], fmt="o-" if len(found.axes) == 1 else "o", color=BLUE, markersize=3, **bars)
-    axis.set_xlabel(found.titles[j])
+    axis.set_xlabel(verbatim(found.titles[j]))
     axis.locator_params(axis="x", nbins=5 if len(found.titles) < 3 else 3)
 
 
@@ -84,8 +84,8 @@ def _map(axis: Axes, found: Variation, i: int) -> None:
         image: Any = axis.pcolormesh(*found.axes, found[found.quantities[i]].T, shading="nearest")
     else:
         image = axis.scatter(found.points[:, 0], found.points[:, 1], c=found.values[:, i], s=12)
-    figure.colorbar(image, ax=axis, label=found.quantities[i])
-    axis.set(xlabel=found.titles[0], ylabel=found.titles[1])
+    figure.colorbar(image, ax=axis, label=verbatim(found.quantities[i]))
+    axis.set(xlabel=verbatim(found.titles[0]), ylabel=verbatim(found.titles[1]))
     axis.locator_params(axis="x", nbins=5)  # long numbers would meet
 
 

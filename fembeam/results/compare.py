@@ -13,6 +13,7 @@ import numpy as np
 
 from fembeam import plot
 from fembeam.plot.figure import sheet
+from fembeam.plot.style import verbatim
 from fembeam.results.files import prepared, write_figure
 from fembeam.statistics import pdf, psd
 from fembeam.support import aligned
@@ -141,15 +142,15 @@ def overlaid(runs: dict[str, Run]) -> Figure:
         what, signal = next(iter(plot.responses(run).items()))
         dt, style = float(run.t[1] - run.t[0]), "-" if i == 0 else "--"
         last = min(len(run.t), 600)
-        axes[0].plot(run.t[-last:], 1e3 * signal[-last:], style, label=name)
+        axes[0].plot(run.t[-last:], 1e3 * signal[-last:], style, label=verbatim(name))
         omega, level = psd(signal - signal.mean(), dt, plot.segment_for(len(signal), dt))
         axes[1].semilogy(omega[1:], np.maximum(level[1:], 1e-300), style)
         highest = max(highest, float(level.max()))
         x, density = pdf(signal, 50)
         axes[2].plot(1e3 * x, 1e-3 * density, style)
-    axes[0].set(xlabel="time / s", ylabel=f"{what} / mm")
+    axes[0].set(xlabel="time / s", ylabel=f"{verbatim(what)} / mm")
     axes[1].set(xlabel="ω / rad s⁻¹", ylabel="PSD / m² s rad⁻¹")
-    axes[2].set(xlabel=f"{what} / mm", ylabel="density / mm⁻¹")
+    axes[2].set(xlabel=f"{verbatim(what)} / mm", ylabel="density / mm⁻¹")
     if highest > 0:
         axes[1].set_ylim(1e-8 * highest, 5 * highest)  # below it is leakage and rounding
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
