@@ -5,9 +5,9 @@ A panel for each body, in the plane or in space; of a body that does not know wh
 
 from __future__ import annotations
 
+import re
 import textwrap
-from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.plot.figure import heading
+from fembeam.plot.rig_around import TIED, around, inked
+from fembeam.plot.rig_labels import SIZE, extent
 from fembeam.plot.rig_symbols import BLACK, COLOURS, circle
 from fembeam.plot.rig_words import WIDE, friction_words, gap_words, length, motion_words, signal_words
-from fembeam.plot.style import BLUE, GREEN
+from fembeam.plot.style import BLUE, GREEN, GREY
 from fembeam.scene import AnnularStop, Pinned
 from fembeam.support import require
 
@@ -32,6 +34,8 @@ REACH = 0.12  # of the body's size, length of springs and arrows
 BESIDE = 0.5  # of REACH, the distance at which what strikes stands
 RING = 0.4  # of REACH, radius of a circular clearance
 FREE = 0.03  # of the body's size, between a place and the arrow of a stop
+MOST_BESIDE = 40  # places with labels beside them
+BESIDE_LIST = 0.7  # of the width of a figure, left for the axes beside a list
 LISTED = 32  # characters of a line in the list of what stands on a body in space
 SLIMMEST = 0.7  # of its longest side, what a box in space is wide at least, so that its axes can be read
 ZIGZAG = np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]) * 0.12  # of the length of a spring
@@ -56,6 +60,8 @@ def rig_of_bodies(scene: Scene, axes: Axes | None) -> Figure:
     for panel, axis in zip(panels, drawn, strict=True):
         panel.draw(axis)
     heading(drawn, "Rig, bodies to scale", axes is None)
+    for panel, axis in sorted(zip(panels, drawn, strict=True), key=lambda pair: not pair[0].space):
+        panel.name(axis)
     whole: Figure = figure
     return whole
 
@@ -66,6 +72,7 @@ class _Panel:
 
     scene: Scene
     number: int
+    words: dict[str, list[str]] = field(default_factory=dict)  # what stands at each place, by its `repr`
 
     @cached_property
     def lines(self) -> list[Vector]:
@@ -111,37 +118,64 @@ class _Panel:
             self._plot(axis, line, BLUE, 2.0)
         if self.row:
             axis.plot(*self.points.T[:2], "o", color=BLUE, markersize=3)
-        words: dict[str, list[str]] = defaultdict(list)
         for part, word in self._parts(axis):
-            words[repr(part.z)].append(word)
-        self._texts(axis, words)
+            self.words.setdefault(repr(part.z), []).append(word)
         self._finish(axis)
 
-    def _listed(self, axis: Any, words: dict[str, list[str]]) -> None:
-        """A number at each place of a body in space, where texts would lie on each other, and what stands there."""
-        lines = []
-        for number, (key, texts) in enumerate(words.items(), 1):
-            axis.text(*self.places[key], f" {number}", fontsize=8, weight="bold", va="bottom")
-            wrapped = [line for text in texts for line in textwrap.wrap(text, LISTED)]
-            lines += [f"{number if i == 0 else '':<2} {line}" for i, line in enumerate(wrapped)]
-        size = min(7.0, 300.0 / max(len(lines), 1))  # points: what the height of a panel takes
-        axis.text2D(1.1, 0.95, "\n".join(lines), transform=axis.transAxes, fontsize=size, va="top", parse_math=False,
-                    family="monospace")  # fmt: skip
+    def name(self, axis: Any) -> None:
+        """What stands at each place: beside it in the plane, where there is room; else, and in space, in a list."""
+        texts = ["\n".join(line for text in one for line in _wrapped(text, WIDE)) for one in self.words.values()]
+        if self.space or len(texts) > MOST_BESIDE or not self._labelled(axis, texts):
+            self._listed(axis)
 
-    def _texts(self, axis: Any, words: dict[str, list[str]]) -> None:
-        """One text for each place, above it, or below where another one is near."""
-        if self.space:
-            return self._listed(axis, words)
-        above: list[Vector] = []
-        for key, texts in words.items():
-            at = self.places[key]
-            free = all(np.linalg.norm(at - other) > 0.25 * self.size for other in above)
-            above += [at] if free else []
-            shift, va = REACH * self.size * np.array([0.15, 0.3, 0.0]), "bottom" if free else "top"
-            at = at + shift * (1.0, 1.0 if free else -1.0, 1.0)
-            lines = [line for text in texts for line in textwrap.wrap(text, WIDE)]
-            axis.text(*at[:2], "\n".join(lines), fontsize=7, va=va, parse_math=False)
-        return None
+    def _listed(self, axis: Any) -> None:
+        """A number at each place of a body where texts would lie on each other, and what stands there."""
+        lines = []
+        for number, texts in enumerate(self.words.values(), 1):
+            wrapped = [line for text in texts for line in _wrapped(text, LISTED)]
+            lines += [f"{number if i == 0 else '':<2} {line}" for i, line in enumerate(wrapped)]
+        size = min(7.0, 230.0 / max(len(lines), 1))  # points: what the height of a panel takes
+        if not self.space:
+            self._make_room(axis)
+        self._numbered(axis, [str(number) for number in range(1, 1 + len(self.words))])
+        write, x = (axis.text2D, 1.1) if self.space else (axis.text, 1.02)
+        listed = write(x, 0.95, "\n".join(lines), transform=axis.transAxes, fontsize=size, va="top", parse_math=False,
+                       family="monospace")  # fmt: skip
+        listed.set_in_layout(self.space)  # of a plane it would press the axes flat
+
+    def _make_room(self, axis: Any) -> None:
+        """Axes of a figure of our own make room for a list."""
+        engine = axis.figure.get_layout_engine()
+        if engine is not None and "rect" in engine.get():
+            engine.set(rect=(0.0, 0.0, BESIDE_LIST, 1.0))
+
+    def _numbered(self, axis: Any, numbers: list[str]) -> None:
+        """Numbers at the places, in the plane around them while there is room."""
+        if not self.space and len(numbers) <= MOST_BESIDE and self._labelled(axis, numbers, 8.0):
+            return
+        for text, key in zip(numbers, self.words, strict=True):
+            axis.text(*self.places[key][: 3 if self.space else 2], f" {text}", fontsize=8, weight="bold", va="bottom")
+
+    def _labelled(self, axis: Any, texts: list[str], points: float = SIZE) -> bool:
+        """One text for each place, around it where it covers nothing; whether all have room."""
+        axis.figure.draw_without_rendering()  # now the scales are known
+        per_inch = axis.figure.dpi
+        at = np.array([self.places[key][:2] for key in self.words]).reshape(-1, 2)
+        places = axis.transData.transform(at) / per_inch
+        sizes = np.array([extent(text, points) for text in texts]).reshape(-1, 2)
+        box = axis.get_window_extent().get_points() / per_inch
+        centres, free = around(places, sizes, inked(axis.lines, per_inch), box)
+        if not free:
+            return False
+        for text, z, size, away in zip(texts, at, sizes, centres - places, strict=True):
+            tied = np.linalg.norm(np.maximum(np.abs(away) - size / 2, 0.0)) > TIED
+            tie: Any = (
+                {"arrowstyle": "-", "color": GREY, "linewidth": 0.5, "shrinkA": 0, "shrinkB": 3} if tied else None
+            )
+            axis.annotate(text, z, 72 * away, textcoords="offset points", fontsize=points, ha="center", va="center",
+                          multialignment="right" if away[0] < -size[0] / 2 else "left", arrowprops=tie,
+                          parse_math=False)  # fmt: skip
+        return True
 
     def _parts(self, axis: Any) -> Any:
         """Draw every part; yields it with its label."""
@@ -263,3 +297,15 @@ class _Panel:
             axis.set_zlabel("z / m")
         else:
             axis.set_aspect("equal", adjustable="datalim")
+
+
+def _wrapped(text: str, width: int) -> list[str]:
+    """Lines of a text, numbers with their units.
+
+    Examples
+    --------
+    >>> _wrapped("stop at R4, -x, gap 4 mm", 22)
+    ['stop at R4, -x, gap', '4 mm']
+    """
+    joined = re.sub(r"(?<=\d) (?=\w)", "\u00a0", text)
+    return [line.replace("\u00a0", " ") for line in textwrap.wrap(joined, width)]
