@@ -236,7 +236,7 @@ def test_contacts_say_what_is_left_out(run):
     assert len(above.get_xdata()) == 100 - count // 200  # but for the slowest 0.5 %
     assert above.get_label() == "55 above, up to 3"
     assert max(above.get_ydata()) < axis.get_ylim()[1]
-    assert [ax.get_title(loc="left").split()[2] for ax in figure.axes[:3]] == ["ms", "N", "m"]
+    assert [ax.get_title(loc="left").split()[2] for ax in figure.axes[:3]] == ["ms", "kN", "m"]
     some = {name: column[:150] for name, column in run.contacts.arrays().items()}
     few = plot.contacts(dataclasses.replace(run, contacts=dataclasses.replace(run.contacts, **some)))
     assert "without" not in few.axes[0].get_xlabel()
@@ -329,7 +329,7 @@ def test_segments_resolve_two_rad_per_second_on_long_runs():
 
 
 def test_random_figures_have_units_bands_and_confidence():
-    x = np.random.default_rng(1).standard_normal(4000)
+    x = 1e-3 * np.random.default_rng(1).standard_normal(4000)
     signal = statistics.Signal(x, 1e-3, 256)
     for part in np.split(x, 8):
         signal.add(part)
@@ -472,7 +472,7 @@ def test_the_linear_response_of_a_slider_is_that_of_a_stuck_one_for_every_level(
     assert [line.get_color() for line in drawn] == ["C0", "C1", GREY]
     assert drawn[-1].get_label() == "linear, elements stuck"
     for line, one in zip(drawn, found, strict=False):  # neither slips
-        heights = [1e3 * plot.peak(orbit, 0.24445) for orbit in one.orbits]
+        heights = [1e6 * plot.peak(orbit, 0.24445) for orbit in one.orbits]
         np.testing.assert_allclose(np.interp(one.parameter, *line.get_data()), heights, rtol=1e-3)
     free = [line for line in axis.lines if line.get_label() == "linear, elements slipping"]
     assert len(free) == 1
@@ -481,7 +481,7 @@ def test_the_linear_response_of_a_slider_is_that_of_a_stuck_one_for_every_level(
     for line, one in zip(slipping, found, strict=True):  # of a slider nothing is left: the beam alone
         model = dataclasses.replace(one.family.model.scene, elements=[]).reduce(1)
         alone = model.frequency_response(line.get_xdata(), output=0.24445).amplitude * model.scene.base.amplitude
-        np.testing.assert_allclose(line.get_ydata(), 1e3 * alone, rtol=1e-5)  # of another mesh
+        np.testing.assert_allclose(line.get_ydata(), 1e6 * alone, rtol=1e-5)  # of another mesh
     assert "linear, no contact, elements stuck" in {  # a stop beside the slider
         line.get_label() for line in plot.branch(replaced_stops(found[0], run.model.scene.stops)).axes[0].lines
     }
@@ -521,8 +521,8 @@ def replaced_stops(branch, stops):
 
 
 def test_shaded_bands_are_the_intervals_of_the_estimates():
-    signal = statistics.Signal(np.random.default_rng(1).standard_normal(4000), 1e-3, 64)
-    for part in np.split(np.random.default_rng(2).standard_normal(8000), 8):
+    signal = statistics.Signal(1e-3 * np.random.default_rng(1).standard_normal(4000), 1e-3, 64)
+    for part in np.split(1e-3 * np.random.default_rng(2).standard_normal(8000), 8):
         signal.add(part)
     drawn = {
         "psd": (plot.random_spectra({"": {"x": signal}}, 1e4), signal.psd.omega, signal.psd.interval()),

@@ -3,8 +3,8 @@
 `response`, `bodies`, `clearance`, `spectra`, `contact_histograms` and `animation` hold those of one run, `laws` those
 of contact laws, `orbits` those of periodic motion, `campbell` that of rotors, `basins` maps of starts, `random` those
 of random motion, `linear` spectra and frequency response, `rig` that of a scene, `mode_count`, `methods`, `variation`
-and `peaks` those of studies; `run_signals`, `style` and `figure` are what they share. Imports: `statistics`, `model`
-and what they import. Begin with `response`.
+and `peaks` those of studies; `run_signals`, `style`, `units` and `figure` are what they share. Imports: `statistics`,
+`model` and what they import. Begin with `response`.
 """
 
 from fembeam.model import places

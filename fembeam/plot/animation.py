@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from fembeam.plot.bodies import BodyStage
 from fembeam.plot.run_signals import samples_in
 from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled, verbatim
+from fembeam.plot.units import length_for, unit_for
 from fembeam.scene import ON
 from fembeam.support import require, written_beside
 
@@ -217,12 +218,15 @@ class _Stage:
                                             scale_units="xy", scale=1, width=0.007, pivot="tip", zorder=5)  # fmt: skip
         self.title = self.beam_axis.set_title(" ")
         self._fixed(self.beam_axis)
+        scale, unit = unit_for(self.forces, self.run.unit("force"))
+        self.tick, self.second = unit_for(self.run.t[self.samples[[0, -1]]], "s")
+        t = self.tick * self.run.t[self.samples]
         for i, force in enumerate(self.forces):
             label = verbatim(self.run.name(i))
-            self.force_axis.step(self.run.t[self.samples], force, color=f"C{i}", where="mid", label=label)
-        self.cursor = self.force_axis.axvline(self.run.t[self.samples[0]], color=ORANGE)
-        self.force_axis.set(xlabel="time / s", ylabel=f"peak contact\nforce / {self.run.unit('force')}")
-        self.force_axis.set_xlim(*self.run.t[self.samples[[0, -1]]])
+            self.force_axis.step(t, scale * force, color=f"C{i}", where="mid", label=label)
+        self.cursor = self.force_axis.axvline(t[0], color=ORANGE)
+        self.force_axis.set(xlabel=f"time / {self.second}", ylabel=f"peak contact\nforce / {unit}")
+        self.force_axis.set_xlim(*self.tick * self.run.t[self.samples[[0, -1]]])
         if len(self.forces) > 1:
             self.figure.legend(*self.force_axis.get_legend_handles_labels(), loc="outside lower center", ncols=4)
         self.figure.draw_without_rendering()
@@ -230,15 +234,18 @@ class _Stage:
         return self.figure
 
     def _limits(self, axis: Axes) -> float:
-        """Set the view, on the beams: an impactor may leave it; returns its height in mm."""
+        """Set the view, on the beams: an impactor may leave it; returns its height on the axis."""
         rows = [line for _, line in self.lines] + [self.impactor_places[:, 1]] * bool(len(self.impactor_places))
         stops = [-contact.push * contact.gap for contact in self.contact_rows if contact.is_stop]
-        low = 1e3 * min(*(float(row.min()) for row in rows), *stops, 0.0)
-        high = 1e3 * max(*(float(row.max()) for row in rows), *stops, 0.0)
-        spread = max(high - low, 1e-9)
+        low = min(*(float(row.min()) for row in rows), *stops, 0.0)
+        high = max(*(float(row.max()) for row in rows), *stops, 0.0)
         length = max(float(z[-1]) for z, _ in self.lines)
-        axis.set(xlim=(-30 * length, 1030 * length), ylim=(low - 0.25 * spread, high + 0.25 * spread))
-        axis.set(xlabel="z / mm", ylabel="displacement / mm")
+        (self.along, along), (self.across, across) = length_for(length), length_for((low, high))
+        low, high = self.across * low, self.across * high
+        spread = max(high - low, 1e-9)
+        axis.set(xlim=(-0.03 * self.along * length, 1.03 * self.along * length))
+        axis.set(ylim=(low - 0.25 * spread, high + 0.25 * spread), xlabel=f"z / {along}")
+        axis.set_ylabel(f"displacement / {across}")
         return 1.5 * spread
 
     def _sides(self) -> list[float]:
@@ -262,26 +269,30 @@ class _Stage:
     def _fixed(self, axis: Axes) -> None:
         """Supports and stops on the frame."""
         for z, body in self.run.readout.supports:
-            axis.plot(1e3 * z, 1e3 * self.beams[int(body)], "s", color="black", markersize=7, clip_on=False)
+            height = self.across * self.beams[int(body)]
+            axis.plot(self.along * z, height, "s", color="black", markersize=7, clip_on=False)
         for contact in self.contact_rows:
             if contact.on == "frame" and not contact.is_stop:
-                axis.plot(1e3 * contact.z, 1e3 * self.beams[contact.body], "D", color="black", markersize=7,
+                height = self.across * self.beams[contact.body]
+                axis.plot(self.along * contact.z, height, "D", color="black", markersize=7,
                           clip_on=False, zorder=1)  # fmt: skip
             elif contact.is_stop:
-                at = 1e3 * (self.beams[contact.body] - contact.push * contact.gap)
-                axis.plot(1e3 * contact.z, at, marker="^" if contact.push > 0 else "v", color="black", markersize=9,
+                at = self.across * (self.beams[contact.body] - contact.push * contact.gap)
+                marker = "^" if contact.push > 0 else "v"
+                axis.plot(self.along * contact.z, at, marker=marker, color="black", markersize=9,
                           transform=self._beside(-contact.push, 6.0), clip_on=False, zorder=1)  # fmt: skip
 
     def show(self, number: int) -> list[Artist]:
         """Move everything to one frame."""
         for curve, (z, line) in zip(self.curves, self.lines, strict=True):
-            curve.set_data(1e3 * z, 1e3 * line[number])
+            curve.set_data(self.along * z, self.across * line[number])
         for i, (ball, (place, _)) in enumerate(zip(self.balls, self.impactor_places, strict=True)):
-            ball.set_data([1e3 * place], [1e3 * self._ball(i)[number]])
+            ball.set_data([self.along * place], [self.across * self._ball(i)[number]])
         self._point(number)
         now = float(self.run.t[self.samples[number]])
-        self.cursor.set_xdata([now, now])
-        self.title.set_text(f"t = {now:.4f} s{self.pace}")
+        self.cursor.set_xdata([self.tick * now, self.tick * now])
+        said = f"{now:.4f} s" if self.second == "s" else f"{self.tick * now:.2f} {self.second}"
+        self.title.set_text(f"t = {said}{self.pace}")
         return [*self.curves, *self.balls, self.arrows, self.cursor]
 
     def _point(self, number: int) -> None:
@@ -291,7 +302,8 @@ class _Stage:
         ends, lengths = [], []
         for contact, force in zip(self.contact_rows, self.forces, strict=True):
             along, line = self.lines[contact.body]
-            ends.append((1e3 * contact.z, 1e3 * float(np.interp(contact.z, along, line[number]))))
+            height = float(np.interp(contact.z, along, line[number]))
+            ends.append((self.along * contact.z, self.across * height))
             share = float(force[number]) / self.largest if self.largest > 0 else 0.0
             lengths.append(contact.push * share * STAY * self.span if share and not contact.rotation else np.nan)
         at: Any = np.array(ends)

@@ -11,6 +11,7 @@ from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.rig_words import length
 from fembeam.plot.run_signals import between_samples, samples_in, sampling_of
 from fembeam.plot.style import BLUE, GREEN, GREY, RED, Vector, styled, verbatim
+from fembeam.plot.units import length_for, unit_for
 from fembeam.response import states
 from fembeam.structures import direction_of, named
 from fembeam.support import require
@@ -64,12 +65,13 @@ def orbit_in_clearance(
         stuck, slips = touching & (codes == 0.0), touching & (np.abs(codes) == 1.0)
         parts = [(BLUE, "free", ~(stuck | slips)), (RED, "slips", slips), (GREEN, "sticks", stuck)]
     figure, (axis,) = sheet(1, 1, (5.0, 5.0), axes)
-    axis.plot(*_circle(radius), "--", color=GREY, label=f"clearance {length(abs(radius))}")
+    scale, unit = length_for((path, radius))
+    axis.plot(*_circle(scale * radius), "--", color=GREY, label=f"clearance {length(abs(radius))}")
     for colour, label, shown in parts:
-        axis.plot(*_only(path, shown), color=colour, linewidth=0.9, label=label)
+        axis.plot(*_only(scale * path, shown), color=colour, linewidth=0.9, label=label)
     x, y = _ways(run, number)
     of_centre = " from the centre" if any(centre) else ""
-    axis.set(xlabel=f"{x}{of_centre} / mm", ylabel=f"{y}{of_centre} / mm")
+    axis.set(xlabel=f"{x}{of_centre} / {unit}", ylabel=f"{y}{of_centre} / {unit}")
     axis.set_aspect("equal", adjustable="datalim")
     legend(axis, axes is None, "outside lower center", **({"ncols": len(parts) + 1} if axes is None else {}))
     heading([axis], f"Path at {verbatim(run.name(number))}", axes is None, run=run)
@@ -120,9 +122,10 @@ def forces_in_clearance(
     axis: Any = found[0]
     angle, normal = np.arctan2(d[:, 1], d[:, 0]), run._normal_force(number)
     drawn = {"N": (RED, normal)} | ({"$|F_t|$": (GREEN, np.abs(run.friction(number)))} if run.rubs[number, 1] else {})
+    shown = kept[normal[kept] > 0.0]
+    scale, unit = unit_for([force[shown] for _, force in drawn.values()], "N")
     for label, (colour, force) in drawn.items():
-        shown = kept[normal[kept] > 0.0]
-        axis.plot(angle[shown], force[shown], ".", color=colour, markersize=2.5, label=label)
+        axis.plot(angle[shown], scale * force[shown], ".", color=colour, markersize=2.5, label=label)
     x, y = _ways(run, number)
     axis.set_xticks(0.5 * np.pi * np.arange(4), [x, y, f"-{x}", f"-{y}"])
     axis.set_ylim(0.0)
@@ -131,7 +134,7 @@ def forces_in_clearance(
     axis.tick_params(axis="y", labelsize=8, labelcolor=GREY)
     axis.grid(linewidth=0.4)
     legend(axis, axes is None, "outside lower center", **({"ncols": 2} if axes is None else {"loc": "lower right"}))
-    heading([axis], f"Forces at {verbatim(run.name(number))} / N", axes is None, run=run)
+    heading([axis], f"Forces at {verbatim(run.name(number))} / {unit}", axes is None, run=run)
     return figure
 
 
@@ -143,13 +146,15 @@ class Whirl:
         radius = float(run.circles[stop, 0])
         self.path = run.place_in_clearance(stop)
         self.touching = _beyond(self.path, radius)
-        axis.plot(*_circle(radius), "--", color=GREY, linewidth=0.8)
-        axis.plot(*1e3 * self.path[samples[0] : samples[-1] + 1].T, color=GREY, linewidth=0.3)
+        shown = self.path[samples[0] : samples[-1] + 1]
+        self.scale, unit = length_for((shown, radius))
+        axis.plot(*_circle(self.scale * radius), "--", color=GREY, linewidth=0.8)
+        axis.plot(*self.scale * shown.T, color=GREY, linewidth=0.3)
         self.trail = axis.plot([], [], color=BLUE, linewidth=1.2)[0]
         self.pressed = axis.plot([], [], color=RED, linewidth=1.6)[0]
         self.place = axis.plot([], [], "o", color=BLUE, markersize=6)[0]
         x, y = _ways(run, stop)
-        axis.set(xlabel=f"{x} / mm", ylabel=f"{y} / mm")
+        axis.set(xlabel=f"{x} / {unit}", ylabel=f"{y} / {unit}")
         axis.set_title(f"{verbatim(run.name(stop))}, clearance {length(abs(radius))}", fontsize=8)
         axis.set_aspect("equal", adjustable="datalim")
         axis.locator_params(nbins=5)
@@ -157,10 +162,10 @@ class Whirl:
     def show(self, number: int) -> list[Any]:
         """Move the place to one picture; its way is that of the last `TRAIL` pictures."""
         first, now = int(self.samples[max(number - TRAIL, 0)]), int(self.samples[number])
-        way, touching = self.path[first : now + 1], self.touching[first : now + 1]
-        self.trail.set_data(*1e3 * way.T)
+        way, touching = self.scale * self.path[first : now + 1], self.touching[first : now + 1]
+        self.trail.set_data(*way.T)
         self.pressed.set_data(*_only(way, touching))
-        self.place.set_data(*1e3 * self.path[[now]].T)
+        self.place.set_data(*self.scale * self.path[[now]].T)
         self.place.set_color(RED if self.touching[now] else BLUE)
         return [self.trail, self.pressed, self.place]
 
@@ -172,8 +177,8 @@ def _ways(run: Run, stop: int) -> list[str]:
 
 
 def _circle(radius: float) -> Vector:
-    """The clearance (2, k), mm."""
-    return 1e3 * abs(radius) * np.array([np.cos(ROUND), np.sin(ROUND)])
+    """The clearance (2, k)."""
+    return abs(radius) * np.array([np.cos(ROUND), np.sin(ROUND)])
 
 
 def _beyond(path: Vector, radius: float) -> NDArray[np.bool_]:
@@ -182,5 +187,5 @@ def _beyond(path: Vector, radius: float) -> NDArray[np.bool_]:
 
 
 def _only(path: Vector, shown: NDArray[np.bool_]) -> Vector:
-    """Some of a path (k, 2), with the points before them; (2, k) in mm."""
-    return 1e3 * np.where((shown | np.append(shown[1:], False))[:, None], path, np.nan).T
+    """Some of a path (k, 2), with the points before them; (2, k)."""
+    return np.where((shown | np.append(shown[1:], False))[:, None], path, np.nan).T

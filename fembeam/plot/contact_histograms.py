@@ -8,6 +8,7 @@ import numpy as np
 
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.style import BLUE, GREEN, RED, Vector, plain_decades, styled
+from fembeam.plot.units import unit_for
 from fembeam.scene import unit_of
 from solvers.problem import counted
 
@@ -41,13 +42,14 @@ def contacts(run: Run, discard: float = 0.0, axes: Sequence[Axes] | None = None)
     figure, drawn = sheet(2, 2, (7.0, 4.8), axes)
     turning = run.rotational[np.unique(log.stop[kept])]
     force, speed = unit_of("force", turning), unit_of("speed", turning).replace("/s", " s⁻¹")
-    for axis, values, name, unit in (
-        (drawn[0], 1e3 * (log.t_out - log.t_in)[kept], "duration", "ms"),
-        (drawn[1], log.peak_force[kept], "peak force", force),
-        (drawn[2], log.speed_in[kept], "entry speed", speed),
+    per_speed, fast = unit_for(log.speed_in[kept], speed)
+    for axis, values, name, (scale, unit) in (
+        (drawn[0], (times := (log.t_out - log.t_in)[kept]), "duration", unit_for(times, "s", usual=-3)),
+        (drawn[1], (peaks := log.peak_force[kept]), "peak force", unit_for(peaks, force)),
+        (drawn[2], log.speed_in[kept], "entry speed", (per_speed, fast)),
     ):
-        _histogram(axis, values, name, unit)
-    _restitutions(drawn[3], log.speed_in[kept], log.speed_out[kept], speed)
+        _histogram(axis, scale * values, name, unit)
+    _restitutions(drawn[3], per_speed * log.speed_in[kept], per_speed * log.speed_out[kept], fast)
     if axes is None:
         count, stops = int(np.count_nonzero(kept)), len(np.unique(log.stop[kept]))
         of = f" of {stops} stops" if stops > 1 else ""

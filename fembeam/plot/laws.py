@@ -10,6 +10,7 @@ import numpy as np
 from contacts import PUBLISHED, Bounce, Hysteretic, Identified, KelvinVoigt, Law, Viscoelastic, bounce, restitution
 from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.style import BLUE, GREY, RED, Vector, styled, verbatim
+from fembeam.plot.units import length_for, unit_for
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def loops(laws: Mapping[str, Law], entry_rate: float = 1.0, mass: float = 1.0, a
     thrown = {name: bounce(law, entry_rate, mass) for name, law in laws.items()}
     curves = {f"{name}: e = {one.restitution:.3f}": _traced(laws[name], one, mass) for name, one in thrown.items()}
     title = f"Bounce of {mass:g} kg at {entry_rate:g} m/s, achieved restitution e"
-    return _drawn(curves, ("indentation δ / mm", "contact force"), title, axes)
+    return _drawn(curves, ("indentation δ", "contact force"), title, axes)
 
 
 @styled
@@ -77,7 +78,7 @@ def hysteresis(laws: Mapping[str, Law], path: ArrayLike | None = None, axes: Axe
     require(bool(laws), "nothing to draw", laws, "plot.hysteresis", "give laws by name, {name: law}")
     paths = {name: _turns(name, law, path) for name, law in laws.items()}
     curves = {name: (paths[name], law.along(paths[name])) for name, law in laws.items()}
-    return _drawn(curves, ("δ / mm", "force"), "Force along a slow path", axes)
+    return _drawn(curves, ("δ", "force"), "Force along a slow path", axes)
 
 
 @styled
@@ -91,9 +92,10 @@ def equivalent(found: Equivalent, axes: Sequence[Axes] | None = None) -> Figure:
     figure, three = sheet(1, 3, (8.4, 2.6), axes)
     columns = (found.energy, found.stiffness, found.loss_factor)
     names = ("energy per cycle / J", "equivalent stiffness / N/m", "loss factor")
+    scale, unit = length_for(found.amplitude)
     for axis, values, name in zip(three, columns, names, strict=True):
-        axis.plot(1e3 * found.amplitude, values)
-        axis.set(xlabel="amplitude of δ / mm", ylabel=name)
+        axis.plot(scale * found.amplitude, values)
+        axis.set(xlabel=f"amplitude of δ / {unit}", ylabel=name)
         axis.set_ylim(bottom=min(0.0, float(np.nanmin(values))))
     heading(three, f"{verbatim(found.name)} as a spring and a dashpot", axes is None)
     return figure
@@ -134,9 +136,10 @@ def restitutions(axes: Sequence[Axes] | None = None) -> Figure:
 def identification(found: Identified, axes: Sequence[Axes] | None = None) -> Figure:
     """Measured and fitted loops of every collision, and the residuals; into two `axes` where they are given."""
     figure, (above, below) = sheet(2, 1, (7.0, 4.8), axes, sharex=True, height_ratios=[2, 1])
-    scale, unit = _force_unit(max(float(np.abs(one.force).max()) for one in found.collisions))
+    scale, unit = unit_for([one.force for one in found.collisions], "N")
+    per_length, of_length = length_for([one.delta for one in found.collisions])
     for number, one in enumerate(found.collisions):
-        delta, (measured, fitted) = 1e3 * one.delta, ("measured", "fitted") if number == 0 else (None, None)
+        delta, (measured, fitted) = per_length * one.delta, ("measured", "fitted") if number == 0 else (None, None)
         above.plot(delta, scale * one.force, ".", color=BLUE, markersize=3, label=measured)
         below.plot(delta, scale * (one.force - one.fitted), ".", color=BLUE, markersize=3)
         order = np.flatnonzero(one.delta > 0.0)
@@ -147,7 +150,7 @@ def identification(found: Identified, axes: Sequence[Axes] | None = None) -> Fig
     above.set_ylabel(f"contact force / {unit}")
     above.legend(loc="upper left")
     below.set_ylabel(f"residual / {unit}")
-    below.set_xlabel("indentation δ / mm, offsets taken off; dashed: two standard deviations of the noise")
+    below.set_xlabel(f"indentation δ / {of_length}, offsets taken off; dashed: two standard deviations of the noise")
     p, a, r = found.exponent.value, found.damping_factor, found.restitution
     title = f"K = {found.stiffness.value:.4g} N/m^{p:.3g}, a = {a.value:.3g} ({a.low:.3g} to {a.high:.3g}), "
     title += f"restitution {r.value:.3g} ({r.low:.3g} to {r.high:.3g})"
@@ -160,19 +163,15 @@ def _drawn(
 ) -> Figure:
     """Curves (δ, F) by name, under two names of the axes."""
     figure, (axis,) = sheet(1, 1, (7.0, 4.2), axes)
-    scale, unit = _force_unit(max(float(np.abs(force).max()) for _, force in curves.values()))
+    scale, unit = unit_for([force for _, force in curves.values()], "N")
+    per_length, of_length = length_for([delta for delta, _ in curves.values()])
     for number, (name, (delta, force)) in enumerate(curves.items()):
-        axis.plot(1e3 * delta, scale * force, _line(number), label=verbatim(name))
+        axis.plot(per_length * delta, scale * force, _line(number), label=verbatim(name))
     axis.axhline(0.0, color=GREY, linewidth=0.6)
-    axis.set(xlabel=words[0], ylabel=f"{words[1]} / {unit}")
+    axis.set(xlabel=f"{words[0]} / {of_length}", ylabel=f"{words[1]} / {unit}")
     legend(axis, axes is None, "outside right center")
     heading([axis], title, axes is None)
     return figure
-
-
-def _force_unit(strongest: float) -> tuple[float, str]:
-    """Factor and name of the unit that suits a force in N."""
-    return (1e-3, "kN") if strongest > 2e3 else (1.0, "N")
 
 
 def _turns(name: str, law: Law, path: ArrayLike | None) -> Vector:

@@ -10,6 +10,7 @@ import numpy as np
 
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.style import Vector, place_name, plain_decades, styled, verbatim
+from fembeam.plot.units import length_for
 from fembeam.scene import split
 from fembeam.structures import UP
 from fembeam.support import require
@@ -50,6 +51,7 @@ def response_spectrum(
     figure, (upper, lower) = sheet(2, 1, (7.0, 5.2), axes, sharex=True)
     several = spectrum if isinstance(spectrum, Mapping) else {"": spectrum}
     require(bool(several), "nothing to draw", spectrum, "plot.response_spectrum", "give one spectrum or more")
+    scale, unit = length_for([one.displacement for one in several.values()])
     for name, one in several.items():
         order = np.argsort(one.period)
         period = one.period[order]
@@ -58,9 +60,9 @@ def response_spectrum(
             (line,) = upper.loglog(period, one.acceleration[i, order], label=label)
             colour = line.get_color()
             upper.loglog(period, one.pseudo_acceleration[i, order], "k--", linewidth=0.7)  # seen where they coincide
-            lower.loglog(period, 1e3 * one.displacement[i, order], color=colour)
+            lower.loglog(period, scale * one.displacement[i, order], color=colour)
     upper.set(ylabel="largest acceleration / m s⁻²", title="Response spectrum; dashed: pseudo-acceleration ω² max |x|")
-    lower.set(xlabel="period / s", ylabel="largest displacement / mm")
+    lower.set(xlabel="period / s", ylabel=f"largest displacement / {unit}")
     for axis in (upper, lower):
         axis.margins(x=0.0)
         plain_decades(axis.xaxis, *axis.get_xlim())

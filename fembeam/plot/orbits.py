@@ -12,6 +12,7 @@ from fembeam.plot.axis_names import axis_name
 from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.linear import frequencies
 from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, displacement_name, plain_decades, styled, verbatim
+from fembeam.plot.units import length_for, unit_for
 from fembeam.scene import signals_of
 from fembeam.scene.parameters import scalars
 from fembeam.support import require
@@ -64,21 +65,23 @@ def branch(
     model = several[0].family.model
     place = observed(model) if z is None else z
     figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
+    peaks = [np.array([peak(orbit, place) for orbit in one.orbits]) for one in several]
+    scale, unit = length_for([*peaks, *([] if cloud is None else [cloud[1]])])
     if cloud is not None:
-        _draw_cloud(axis, cloud)
+        _draw_cloud(axis, cloud, scale)
     periods = [one.family.period for one in several]
     same = labels is None and len(set(periods)) == len(periods)  # colours: a period has the same on every figure
     colours = [f"C{periods[i] - 1 if same else i}" for i in range(len(several))]
     names = _labels(several) if labels is None else labels
-    for one, colour, label in zip(several, colours, names, strict=True):
-        _draw_branch(axis, one, place, colour, verbatim(label))
-    _draw_ends(axis, several, place)
-    linear = _draw_linear(axis, several, place, colours)
-    _draw_backbones(axis, several, place)
+    for one, heights, colour, label in zip(several, peaks, colours, names, strict=True):
+        _draw_branch(axis, one, scale * heights, colour, verbatim(label))
+    _draw_ends(axis, several, place, scale)
+    linear = _draw_linear(axis, several, place, colours, scale)
+    _draw_backbones(axis, several, place, scale)
     if axes is None and len(linear):
         _widen(axis, linear)
     name = several[0].family.name
-    axis.set(xlabel=verbatim(axis_name(name, model.scene)), ylabel=f"max |{displacement_name(place)}| / mm")
+    axis.set(xlabel=verbatim(axis_name(name, model.scene)), ylabel=f"max |{displacement_name(place)}| / {unit}")
     handles, words = _entries(axis, several)
     legend(axis, axes is None, "outside right upper", handles=handles, labels=words, fontsize=8)
     return figure
@@ -88,8 +91,9 @@ def branch(
 def bifurcation(found: Bifurcation, axes: Axes | None = None) -> Figure:
     """Largest |u| of every settled period against the parameter; `axes` to draw into, None makes a figure."""
     figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
-    _draw_cloud(axis, found.cloud())
-    axis.set(xlabel=verbatim(found.name), ylabel=f"max |{displacement_name(found.z)}| / mm")
+    scale, unit = length_for(found.cloud()[1])
+    _draw_cloud(axis, found.cloud(), scale)
+    axis.set(xlabel=verbatim(found.name), ylabel=f"max |{displacement_name(found.z)}| / {unit}")
     return figure
 
 
@@ -99,9 +103,9 @@ def peak(orbit: Orbit, z: Any) -> float:
     return max(-lowest, highest)
 
 
-def _draw_cloud(axis: Axes, cloud: tuple[Vector, Vector]) -> None:
+def _draw_cloud(axis: Axes, cloud: tuple[Vector, Vector], scale: float) -> None:
     """(parameter, |u|) of runs."""
-    axis.plot(cloud[0], 1e3 * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
+    axis.plot(cloud[0], scale * cloud[1], ".", color=GREY, markersize=2.0, label="simulated", rasterized=True)
 
 
 def _labels(several: list[Branch]) -> list[str]:
@@ -120,10 +124,9 @@ def _labels(several: list[Branch]) -> list[str]:
     return values if len(set(periods)) == 1 else [f"{a}, {b}" for a, b in zip(periods, values, strict=True)]
 
 
-def _draw_branch(axis: Axes, one: Branch, z: Any, color: str, label: str) -> None:
+def _draw_branch(axis: Axes, one: Branch, peaks: Vector, color: str, label: str) -> None:
     """Solid and dashed pieces of a branch, and its marks."""
     parameter, stable = one.parameter, one.stable
-    peaks = 1e3 * np.array([peak(orbit, z) for orbit in one.orbits])
     unstable = ~stable
     unstable[:-1] |= unstable[1:]  # a dashed piece begins at the last stable orbit
     unstable[1:] |= ~stable[:-1]
@@ -137,7 +140,7 @@ def _draw_branch(axis: Axes, one: Branch, z: Any, color: str, label: str) -> Non
             axis.plot(orbit.parameter, height, **_look(orbit.mark))
 
 
-def _draw_ends(axis: Axes, several: list[Branch], z: Any) -> None:
+def _draw_ends(axis: Axes, several: list[Branch], z: Any, scale: float) -> None:
     """A bar at the end of the span, elsewhere a mark for each reason; a closed branch has no end."""
     ends = [(orbit, why.split(":")[0]) for one in several for orbit, why in one.ends]
     reasons = [why for why in dict.fromkeys(why for _, why in ends) if why not in (SPAN, CLOSED)]
@@ -147,7 +150,8 @@ def _draw_ends(axis: Axes, several: list[Branch], z: Any) -> None:
         if why in marks:
             label = None if why in labelled else verbatim(f"end: {why}")
             mark, colour = marks[why]
-            axis.plot(orbit.parameter, 1e3 * peak(orbit, z), mark, color=colour, markersize=8, zorder=3, label=label)
+            height = scale * peak(orbit, z)
+            axis.plot(orbit.parameter, height, mark, color=colour, markersize=8, zorder=3, label=label)
             labelled.add(why)
 
 
@@ -162,7 +166,7 @@ def _span(several: list[Branch]) -> tuple[float, float]:
     return min(min(one.parameter) for one in several), max(max(one.parameter) for one in several)
 
 
-def _draw_linear(axis: Axes, several: list[Branch], z: Any, colours: list[str]) -> Vector:
+def _draw_linear(axis: Axes, several: list[Branch], z: Any, colours: list[str], scale: float) -> Vector:
     """The linear response of every level along the frequency of the only load; all its heights (k,).
 
     Of elements with sliders both limits: stuck, which small motions come to, and slipping, which large ones do.
@@ -171,7 +175,7 @@ def _draw_linear(axis: Axes, several: list[Branch], z: Any, colours: list[str]) 
     for slipping in (False, True) if _sliders(several) else (False,):
         curves: list[tuple[Vector, Vector, str]] = []
         for one, colour in zip(several, colours, strict=True):
-            found = _linear_curve(one, _span(several), z, slipping)
+            found = _linear_curve(one, _span(several), z, slipping, scale)
             if found and not any(len(y) == len(found[1]) and np.allclose(found[1], y) for _, y, _ in curves):
                 curves.append((*found, colour))
         style, name = LIMITS[slipping][len(curves) > 1], _linear_name(several, slipping)
@@ -183,14 +187,16 @@ def _draw_linear(axis: Axes, several: list[Branch], z: Any, colours: list[str]) 
     return heights
 
 
-def _linear_curve(one: Branch, span: tuple[float, float], z: Any, slipping: bool) -> tuple[Vector, Vector] | None:
-    """(omega, |u| in mm) of a branch's linear response, if the frequency of its only load is what varies."""
+def _linear_curve(
+    one: Branch, span: tuple[float, float], z: Any, slipping: bool, scale: float
+) -> tuple[Vector, Vector] | None:
+    """(omega, |u| on the axis) of a branch's linear response, if the frequency of its only load is what varies."""
     model, path = one.family.model, _along_the_load(one)
     if not path:
         return None
     omega = frequencies(model, *span, BEHIND)
     H = model.frequency_response(omega, path, z, slipping=slipping)
-    return omega, 1e3 * H.amplitude * abs(signals_of(model.scene)[path].amplitude)
+    return omega, scale * H.amplitude * abs(signals_of(model.scene)[path].amplitude)
 
 
 def _contact_rows(several: list[Branch]) -> list[Any]:
@@ -212,7 +218,7 @@ def _linear_name(several: list[Branch], slipping: bool = False) -> str:
     return ", ".join(["linear", *said])
 
 
-def _draw_backbones(axis: Axes, several: list[Branch], z: Any) -> None:
+def _draw_backbones(axis: Axes, several: list[Branch], z: Any, scale: float) -> None:
     """The backbone of the lowest mode for each period, as high as the branches."""
     from fembeam.response import backbone
 
@@ -221,7 +227,7 @@ def _draw_backbones(axis: Axes, several: list[Branch], z: Any) -> None:
         return
     heights = np.linspace(0.0, axis.dataLim.y1, BEHIND // 2)[1:]
     for i, period in enumerate(sorted({one.family.period for one in several})):
-        along = period * backbone(model, z, 1e-3 * heights)
+        along = period * backbone(model, z, heights / scale)
         shown = (along >= low) & (along <= high)
         if shown.any():
             _behind(axis, np.where(shown, along, np.nan), heights, "-.", None if i else "backbone of the lowest mode")
@@ -287,14 +293,18 @@ def orbit(one: Orbit, z: Any = None, axes: Sequence[Axes] | None = None) -> Figu
     """
     place = observed(one.model) if z is None else z
     figure, (left, right) = sheet(1, 2, (6.4, 2.8), axes, width_ratios=[3, 2])
-    t, u, v = one.run.t, 1e3 * one.run.displacement(place), one.run.velocity(place)
-    left.plot(1e3 * t, u)
+    t, u, v = one.run.t, one.run.displacement(place), one.run.velocity(place)
+    (scale, unit), (tick, second) = length_for(u), unit_for(t, "s", usual=-3)
+    rate, speed = unit_for(v, "m/s")
+    u, v = scale * u, rate * v
+    left.plot(tick * t, u)
     for t_in, t_out in zip(one.contacts.t_in, one.contacts.t_out, strict=True):
-        left.axvspan(1e3 * t_in, 1e3 * (t_out if np.isfinite(t_out) else t[-1]), color=ORANGE, alpha=0.4, linewidth=0.8)
-    left.set(xlabel="t / ms", ylabel=f"{displacement_name(place)} / mm")
+        end = t_out if np.isfinite(t_out) else t[-1]
+        left.axvspan(tick * t_in, tick * end, color=ORANGE, alpha=0.4, linewidth=0.8)
+    left.set(xlabel=f"t / {second}", ylabel=f"{displacement_name(place)} / {unit}")
     right.plot(u, v)
     right.plot(u[:1], v[:1], "o", color=RED, markersize=3)
-    right.set(xlabel="u / mm", ylabel="velocity / m/s")
+    right.set(xlabel=f"u / {unit}", ylabel=f"velocity / {speed}")
     kind = "stable" if one.stable else "unstable"
     at = "" if np.isnan(one.parameter) else f" at {one.parameter:.6g}"
     title = f"Period {one.period}, {counted(len(one.contacts), 'contact')}, {kind}{at}"

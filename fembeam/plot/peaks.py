@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.style import BLUE, RED, Vector, displacement_name, styled, verbatim
+from fembeam.plot.units import length_for
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,19 +42,21 @@ def peak_curve(found: Peak, axes: Sequence[Axes] | None = None) -> Figure:
     figure, (upper, lower) = sheet(2, 1, (6.4, 4.8), axes, sharex=True, height_ratios=(3, 2))
     tops = sorted([*found.tops, *([found.least] if found.least else [])], key=lambda one: one.value)
     p, at = np.array([one.value for one in tops]), np.array([one.at for one in tops])
-    height = 1e3 * np.array([one.amplitude for one in tops])
+    amplitude = np.array([one.amplitude for one in tops])
+    scale, unit = length_for(amplitude)
+    height = scale * amplitude
     stable = np.array([one.stable for one in tops])
-    upper.plot(*_between(p, height, 1e3 * np.array([one.slope for one in tops])), "-", color=BLUE)
+    upper.plot(*_between(p, height, scale * np.array([one.slope for one in tops])), "-", color=BLUE)
     lower.plot(p, at, "-", color=BLUE)
     _dots(upper, p, height, stable)
     _dots(lower, p, at, stable)
     if found.least is not None:
-        label = f"least: {1e3 * found.least.amplitude:.4g} mm at {found.least.value:.4g}"
-        upper.plot(found.least.value, 1e3 * found.least.amplitude, "*", color=RED, markersize=11, label=label)
+        label = f"least: {scale * found.least.amplitude:.4g} {unit} at {found.least.value:.4g}"
+        upper.plot(found.least.value, scale * found.least.amplitude, "*", color=RED, markersize=11, label=label)
         lower.plot(found.least.value, found.least.at, "*", color=RED, markersize=11)
     if p[0] > 0.0 and p[-1] > WIDE * p[0]:
         lower.set_xscale("log")
-    upper.set_ylabel(f"amplitude of {displacement_name(found.z)} / mm")
+    upper.set_ylabel(f"amplitude of {displacement_name(found.z)} / {unit}")
     lower.set(xlabel=verbatim(found.titles[0]), ylabel=verbatim(found.titles[1]))
     if found.least is not None or not stable.all():
         upper.legend()
@@ -76,14 +79,15 @@ def backbone(found: Backbone, axes: Sequence[Axes] | None = None) -> Figure:
     'ω / rad s⁻¹'
     """
     figure, (upper, lower) = sheet(2, 1, (6.4, 4.8), axes, sharex=True)
-    x, stable = 1e3 * found.amplitude, found.stable
+    scale, unit = length_for(found.amplitude)
+    x, stable = scale * found.amplitude, found.stable
     for axis, y in ((upper, found.omega), (lower, found.zeta)):
         axis.plot(x, y, "-", color=BLUE)
         _dots(axis, x, y, stable)
     if x.max() > WIDE * x.min():
         lower.set_xscale("log")
     upper.set_ylabel("ω / rad s⁻¹")
-    lower.set(xlabel=f"amplitude of {displacement_name(found.z)} / mm", ylabel="equivalent damping ratio ζ")
+    lower.set(xlabel=f"amplitude of {displacement_name(found.z)} / {unit}", ylabel="equivalent damping ratio ζ")
     lower.set_ylim(bottom=0.0)
     if not stable.all():
         upper.legend()
@@ -110,14 +114,15 @@ def fold_curve(found: Fold, axes: Sequence[Axes] | None = None) -> Figure:
     'drive frequency ω / rad s⁻¹'
     """
     figure, (upper, lower) = sheet(2, 1, (6.4, 4.8), axes, sharex=True, height_ratios=(1, 1))
-    height = 1e3 * found.amplitude
+    scale, unit = length_for(found.amplitude)
+    height = scale * found.amplitude
     for axis, y in ((upper, found.at), (lower, height)):
         axis.plot(found.values, y, ".-", color=BLUE)
         axis.plot(found.values[found.cusps], y[found.cusps], "*", color=RED, markersize=11, label="cusp")
     if len(found.cusps) == 1:
         upper.fill(found.values, found.at, color=BLUE, alpha=0.15, label="three orbits")
     upper.set_ylabel(verbatim(found.titles[1]))
-    lower.set(xlabel=verbatim(found.titles[0]), ylabel=f"amplitude of {displacement_name(found.z)} / mm")
+    lower.set(xlabel=verbatim(found.titles[0]), ylabel=f"amplitude of {displacement_name(found.z)} / {unit}")
     if found.cusps:
         upper.legend()
     heading([upper, lower], "Folds of the response", axes is None)

@@ -10,6 +10,7 @@ import numpy as np
 from fembeam.plot.figure import sheet
 from fembeam.plot.orbits import branch
 from fembeam.plot.style import BLUE, GREY, RED, curve, fit_levels, one_legend, ribbon, styled, verbatim
+from fembeam.plot.units import length_for
 from fembeam.statistics import Spectrum
 
 if TYPE_CHECKING:
@@ -90,19 +91,26 @@ def random_densities(signals: Mapping[str, Signal], axes: Axes | Sequence[Axes] 
 
 def density_panels(axes: Sequence[Axes], signals: Mapping[str, Signal]) -> None:
     """One density each, with its confidence where it is known, against its Gaussian."""
+    said = ""
     for axis, (name, signal) in zip(axes, signals.items(), strict=True):
-        density, mean, std = signal.pdf, 1e3 * float(signal.mean.value), 1e3 * float(signal.std.value)
-        x, p = 1e3 * density.x, 1e-3 * density.density
+        density = signal.pdf
+        scale, unit = length_for(density.x)
+        mean, std = scale * float(signal.mean.value), scale * float(signal.std.value)
+        x, p = scale * density.x, density.density / scale
         sure = density.estimate is not None and density.estimate.batches > 1
         axis.step(x, p, where="mid", color=BLUE, label="simulated, 95 % shaded" if sure else "simulated")
         if sure:
-            ribbon(axis, x, [1e-3 * bound for bound in density.interval()], BLUE, step="mid")
+            ribbon(axis, x, [bound / scale for bound in density.interval()], BLUE, step="mid")
         wide = mean + std * np.linspace(-FURTHEST, FURTHEST, 301)
         normal = np.exp(-0.5 * ((wide - mean) / std) ** 2) / (std * np.sqrt(2 * np.pi))
         axis.plot(wide, normal, color=RED, linestyle="--", label="Gaussian")
         axis.set_title(f"{verbatim(name)}: skewness {_rounded(signal.skewness)},\nkurtosis {_rounded(signal.kurtosis)}")
-        axis.set(xlabel=f"{verbatim(name)} / mm", xlim=(wide[0], wide[-1]), ylim=(0, ROOM * max(p.max(), normal.max())))
-    axes[0].set_ylabel("probability density / mm⁻¹")
+        axis.set(
+            xlabel=f"{verbatim(name)} / {unit}", xlim=(wide[0], wide[-1]), ylim=(0, ROOM * max(p.max(), normal.max()))
+        )
+        if unit != said:
+            axis.set_ylabel(f"probability density / {unit}⁻¹")
+        said = unit
     axes[0].legend(loc="upper left", fontsize=8)
 
 
@@ -117,4 +125,6 @@ def _beside(axis: Axes, several: Sequence[Branch] | None, omega_max: float) -> N
     """Periodic motion that explains a spectrum, on the same frequencies."""
     if several:
         branch(several, axes=axis)
-    axis.set(title="periodic motion", xlim=(0, omega_max), ylim=(0, None), xlabel="", ylabel="max |u| at the stop / mm")
+    unit = axis.get_ylabel().rpartition(" / ")[2] or "mm"
+    axis.set(title="periodic motion", xlim=(0, omega_max), ylim=(0, None), xlabel="")
+    axis.set_ylabel(f"max |u| at the stop / {unit}")

@@ -1,6 +1,7 @@
 """Figures of runs and models, as matplotlib Figures that need no display: save them with `figure.savefig(path)`.
 
-Displacements are shown in mm, times in s, spectra one-sided and per rad/s. A run that did not finish says so
+Displacements are shown in mm, forces in N, times in s, or with the prefix that suits very small and large ones; spectra
+are one-sided and per rad/s. A run that did not finish says so
 in the title and, in red, at the foot of every figure.
 
 Examples
@@ -36,6 +37,7 @@ from fembeam.plot.random import density_panels
 from fembeam.plot.run_signals import between_samples, estimated, first_stop, natural, place_of, sampling_of, stationary
 from fembeam.plot.spectra import segment_for
 from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, place_name, styled, verbatim
+from fembeam.plot.units import length_for, unit_for
 from fembeam.scene import persistent_drive, unit_of
 from fembeam.support import require
 
@@ -80,17 +82,18 @@ def time_history(
     body, place = _watched(run, lo, hi) if z is None else (0, z)
     figure, drawn = sheet(2 if len(run.stops) else 1, 1, (7.0, 4.2), axes, sharex=True)
     t, u = _displacement(run, place, body, lo, hi)
-    drawn[0].plot(t, 1e3 * u, color=BLUE)
-    drawn[0].set_ylabel("displacement / mm")
+    (scale, unit), (tick, second) = length_for(u), unit_for((lo, hi), "s")
+    drawn[0].plot(tick * t, scale * u, color=BLUE)
+    drawn[0].set_ylabel(f"displacement / {unit}")
     title = f"Displacement at {verbatim(_name(run, body, place))} relative to the frame"
     if len(run.stops):
         stops = _stops_at(run, body, place)
-        _shade_contacts(drawn, run, stops, lo, hi)
-        _draw_forces(drawn[1], run, lo, hi, FEW * step)
+        _shade_contacts(drawn, run, stops, lo, hi, tick)
+        _draw_forces(drawn[1], run, lo, hi, FEW * step, tick)
         seen = np.isin(run.contacts.stop, stops) & _within(run, lo, hi)
         title += f", contacts of {_listed(stops, run)} shaded" if seen.any() else ""
     beside = 0.0 if window else 0.01 * (hi - lo)  # so that a contact at the first instant is seen
-    drawn[-1].set(xlabel="time / s", xlim=(lo - beside, hi + beside))
+    drawn[-1].set(xlabel=f"time / {second}", xlim=(tick * (lo - beside), tick * (hi + beside)))
     heading(drawn, title, axes is None, run=run)
     return figure
 
@@ -120,7 +123,7 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
         return body_mode_shapes(model, axes)
     figure, (axis,) = sheet(1, 1, (7.0, 3.8), axes)
     z = np.linspace(0.0, model.scene.beam.length, 401)
-    unit = 1e3 if z[-1] <= 1.0 else 1.0
+    unit, name = length_for(z)
     shapes = model.phi(z)
     scale = np.abs(shapes).max(axis=0)
     axis.axhline(0.0, color=GREY, linewidth=0.6)
@@ -128,7 +131,7 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
         label = f"mode {model.names[i]}: {model.omega[i]:.{0 if model.omega[i] >= 1e3 else 1}f} rad/s"
         axis.plot(unit * z, shapes[:, i] / scale[i], label=f"{label}, ζ = {model.zeta[i]:.3g}")
     _mark_features(axis, model, unit)
-    axis.set(xlabel="z / mm" if unit > 1.0 else "z / m", ylabel="φ / max |φ|", yticks=[-1.0, -0.5, 0.0, 0.5, 1.0])
+    axis.set(xlabel=f"z / {name}", ylabel="φ / max |φ|", yticks=[-1.0, -0.5, 0.0, 0.5, 1.0])
     rows = -(-len(axis.get_legend_handles_labels()[1]) // LEGEND_COLUMNS)
     axis.set_ylim(-1.15, 1.2 + LEGEND_ROW * rows)  # the legend has space of its own above the curves
     axis.legend(loc="upper center", ncols=LEGEND_COLUMNS, fontsize=8)
@@ -229,30 +232,32 @@ def _displacement(run: Run, z: Any, body: int, lo: float, hi: float) -> tuple[Ve
     return between_samples(run.t[kept], run.displacement(z, body=body)[kept], run.velocity(z, body=body)[kept])
 
 
-def _shade_contacts(axes: list[Axes], run: Run, stops: NDArray[np.int64], lo: float, hi: float) -> None:
+def _shade_contacts(axes: list[Axes], run: Run, stops: NDArray[np.int64], lo: float, hi: float, tick: float) -> None:
     """A band for every contact of some stops in the window."""
     left, right = run.contacts.t_in, np.where(np.isnan(run.contacts.t_out), run.t[-1], run.contacts.t_out)
     for index in np.flatnonzero(_within(run, lo, hi) & np.isin(run.contacts.stop, stops)):
         for axis in axes:
-            axis.axvspan(left[index], right[index], color=ORANGE, alpha=0.4, linewidth=0.8)
+            axis.axvspan(tick * left[index], tick * right[index], color=ORANGE, alpha=0.4, linewidth=0.8)
 
 
-def _draw_forces(axis: Axes, run: Run, lo: float, hi: float, least: float) -> None:
+def _draw_forces(axis: Axes, run: Run, lo: float, hi: float, least: float, tick: float) -> None:
     """The force of every element and stop touched in the window: sampled, peaks of contacts below `least` s."""
     log, inside = run.contacts, _within(run, lo, hi)
     short = inside & (log.t_out - log.t_in < least)
     kept = (run.t >= lo) & (run.t <= hi)
     always = np.flatnonzero(run.always_acting)
     drawn = np.union1d(always, log.stop[inside])
+    forces = {int(stop): run._normal_force(int(stop))[kept] for stop in drawn}
+    plain = unit_of("force", run.rotational[drawn]) if len(drawn) else run.unit("force")
+    scale, unit = unit_for((log.peak_force[inside], *forces.values()), plain)
     for stop in drawn:
         mine = log.stop == stop
         look: dict[str, Any] = {"color": f"C{stop}", "label": verbatim(run.name(int(stop)))}
         if stop in always or np.any(mine & inside & ~short):
-            axis.plot(run.t[kept], run._normal_force(int(stop))[kept], **look)
+            axis.plot(tick * run.t[kept], scale * forces[int(stop)], **look)
             look.pop("label")
-        axis.vlines(log.t_in[mine & short], 0.0, log.peak_force[mine & short], linewidth=1.2, **look)
+        axis.vlines(tick * log.t_in[mine & short], 0.0, scale * log.peak_force[mine & short], linewidth=1.2, **look)
     kind = "peak contact force" if len(drawn) > len(always) and np.all(short[inside]) else "contact force"
-    unit = unit_of("force", run.rotational[drawn]) if len(drawn) else run.unit("force")
     axis.set_ylabel(f"{'force' if len(always) else kind} / {unit}")
     if len(run.stops) > 1 and len(drawn):
         axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.0, fontsize=8)

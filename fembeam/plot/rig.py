@@ -22,6 +22,7 @@ from fembeam.plot.rig_labels import SIZE, Placed, extent, rows_of, spread
 from fembeam.plot.rig_symbols import COLOURS, Pen
 from fembeam.plot.rig_words import gap_words, label, law_words, length, signal_words
 from fembeam.plot.style import GREY, round_factor, styled
+from fembeam.plot.units import length_for
 from fembeam.scene import Guided, Pinned, PointMoment
 
 if TYPE_CHECKING:
@@ -169,7 +170,7 @@ class _View:
         self.beams = [part.beam for part in (scene, *scene.bodies)]
         ahead = [mass.z + mass.offset for part in (scene, *scene.bodies) for mass in part.masses]
         self.low, self.high = min(0.0, *ahead, 0.0), max(*(beam.length for beam in self.beams), *ahead, 0.0)
-        self.unit = 1e3 if self.high <= 1.0 else 1.0
+        self.unit, self.unit_name = length_for(max(self.high, -self.low))
         self.per_inch = (self.high - self.low) / (width - 2 * PAD)  # m
         gaps = [gap for gap in _gaps(scene) if gap > 1e-9 * self.high]
         self.enlarged = bool(gaps)
@@ -250,7 +251,7 @@ class _View:
         ticks = [
             tick for tick in axis.get_xticks() if self.unit * self.low <= tick <= self.unit * self.high * (1 + 1e-9)
         ]
-        axis.set(xticks=ticks, xlabel="z / mm" if self.unit > 1.0 else "z / m")
+        axis.set(xticks=ticks, xlabel=f"z / {self.unit_name}")
 
     def pen(self, axis: Axes, lane: Lane, x: float, side: int, name: str = "") -> Pen:
         """A pen on the surface of a beam, outwards."""

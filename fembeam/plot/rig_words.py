@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from fembeam.plot.units import length_for
 from fembeam.scene import (
     Clamped,
     Dashpot,
@@ -121,8 +122,9 @@ def friction_words(part: Any) -> str:
 
 
 def length(value: float) -> str:
-    """A length in mm, from 1 m on in m."""
-    return f"{value:.4g} m" if abs(value) >= 1.0 else f"{1e3 * value:.4g} mm"
+    """A length in mm, from 1 m on in m, below 0.01 mm in µm or nm."""
+    scale, unit = (1.0, "m") if abs(value) >= 1.0 else length_for(value)
+    return f"{scale * value:.4g} {unit}"
 
 
 def law_words(law: Any) -> str:

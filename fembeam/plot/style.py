@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec
 import numpy as np
 from numpy.typing import NDArray
 
+from fembeam.plot.units import length_for
 from fembeam.scene import directed_words
 
 if TYPE_CHECKING:
@@ -78,12 +79,13 @@ def verbatim(name: Any) -> str:
 
 
 def place_name(z: Any) -> str:
-    """A place in mm, beyond 1 m in m; one by name with its direction."""
+    """A place in mm, beyond 1 m in m, below 0.01 mm in µm; one by name with its direction."""
     if isinstance(z, tuple):
         return directed_words(z)
     if isinstance(z, str):  # of a part
         return z
-    return f"z = {z:.5g} m" if abs(z) > 1.0 else f"z = {1e3 * z:.5g} mm"
+    scale, unit = length_for(z)
+    return f"z = {scale * z:.5g} {unit}"
 
 
 def displacement_name(z: Any) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from fembeam import plot
 from fembeam.plot.figure import sheet
 from fembeam.plot.style import verbatim
+from fembeam.plot.units import length_for, unit_for
 from fembeam.results.files import prepared, write_figure
 from fembeam.statistics import pdf, psd
 from fembeam.support import aligned
@@ -138,19 +139,21 @@ def write_figures(a: Path, b: Path, out: Path) -> list[Path]:
 def overlaid(runs: dict[str, Run]) -> Figure:
     """Indentation of the first stop (else the tip): the end of the history, its spectrum, its density."""
     (figure, axes), highest = sheet(3, 1, (7.0, 7.0)), 0.0
+    scale, unit = length_for([next(iter(plot.responses(run).values())) for run in runs.values()])
+    tick, second = unit_for([run.t[-1] for run in runs.values()], "s")
     for i, (name, run) in enumerate(runs.items()):
         what, signal = next(iter(plot.responses(run).items()))
         dt, style = float(run.t[1] - run.t[0]), "-" if i == 0 else "--"
         last = min(len(run.t), 600)
-        axes[0].plot(run.t[-last:], 1e3 * signal[-last:], style, label=verbatim(name))
+        axes[0].plot(tick * run.t[-last:], scale * signal[-last:], style, label=verbatim(name))
         omega, level = psd(signal - signal.mean(), dt, plot.segment_for(len(signal), dt))
         axes[1].semilogy(omega[1:], np.maximum(level[1:], 1e-300), style)
         highest = max(highest, float(level.max()))
         x, density = pdf(signal, 50)
-        axes[2].plot(1e3 * x, 1e-3 * density, style)
-    axes[0].set(xlabel="time / s", ylabel=f"{verbatim(what)} / mm")
+        axes[2].plot(scale * x, density / scale, style)
+    axes[0].set(xlabel=f"time / {second}", ylabel=f"{verbatim(what)} / {unit}")
     axes[1].set(xlabel="ω / rad s⁻¹", ylabel="PSD / m² s rad⁻¹")
-    axes[2].set(xlabel=f"{verbatim(what)} / mm", ylabel="density / mm⁻¹")
+    axes[2].set(xlabel=f"{verbatim(what)} / {unit}", ylabel=f"density / {unit}⁻¹")
     if highest > 0:
         axes[1].set_ylim(1e-8 * highest, 5 * highest)  # below it is leakage and rounding
     figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=2)
