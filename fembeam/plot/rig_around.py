@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 Vector = NDArray[np.float64]
 ANGLES, AWAY = 24, (0.07, 0.13, 0.2, 0.3, 0.42, 0.56, 0.72, 0.9)  # inches from a place to its label
 FREE = 0.03  # inches kept free around a label
+APART = np.array([0.12, FREE])  # inches between two labels: side by side they would read as one
 CELL = 0.02  # inches, what points are counted in; lines are sampled twice as fine
 ROUNDS = 5
 FORBIDDEN, COVERED, CROSSED, FOREIGN = 1e3, 8.0, 4.0, 0.3  # costs; an inch away costs 1
@@ -63,9 +64,8 @@ def around(places: Vector, sizes: Vector, drawn: Vector, box: Vector) -> tuple[V
     """
     ink = Ink.of(drawn, box)
     offered = [_offered(place, size) for place, size in zip(places, sizes, strict=True)]
-    alone = [
-        _alone(ink, centres, places, i, sizes[i], box) + cost for i, (centres, cost) in enumerate(offered)
-    ]  # what others do not change
+    # what others do not change
+    alone = [_alone(ink, centres, places, i, sizes[i], box) + cost for i, (centres, cost) in enumerate(offered)]
     centres = np.array([where[np.argmin(cost)] for (where, _), cost in zip(offered, alone, strict=True)]).reshape(-1, 2)
     placed = np.zeros(len(places), dtype=bool)
     largest_first = np.argsort(-sizes.prod(axis=1), kind="stable").tolist()
@@ -107,7 +107,7 @@ def _alone(ink: Ink, centres: Vector, places: Vector, i: int, size: Vector, box:
 def _overlaps(centres: Vector, i: int, sizes: Vector, placed: Vector, others: NDArray[np.int64]) -> Any:
     """(c, o): whether label i at each centre lies on others."""
     apart = np.abs(centres[:, None] - placed[others])
-    return (apart < (sizes[i] + sizes[others]) / 2 + FREE).all(axis=2)
+    return (apart < (sizes[i] + sizes[others]) / 2 + APART).all(axis=2)
 
 
 def _beside(
