@@ -16,13 +16,13 @@ TIP = 0.5
 CUBIC, ZETA, FORCE = 2e7, 0.01, "forces[0].signal.amplitude"
 
 
-def duffing(force=0.3):
-    """One mode of a rod with a cubic spring at its tip."""
+def duffing(force=0.3, faster=1.0, omega=190.0):
+    """One mode of a rod with a cubic spring at its tip; all of it may move ``faster``, as on a clock that goes slow."""
     scene = fb.Scene(
-        ROD,
+        fb.Beam(0.5, fb.Section.circle(2.1e11 * faster**2, 7800.0, 0.01)),
         [fb.Clamped(0.0)],
-        elements=[fb.Element(TIP, Polynomial([0.0, 0.0, CUBIC]), name="spring")],
-        forces=[fb.PointForce(TIP, fb.Harmonic(force, 190.0))],
+        elements=[fb.Element(TIP, Polynomial([0.0, 0.0, CUBIC * faster**2]), name="spring")],
+        forces=[fb.PointForce(TIP, fb.Harmonic(force * faster**2, omega * faster))],
         damping=fb.ModalDamping(ZETA),
     )
     return scene.reduce(modes=1)
@@ -71,6 +71,21 @@ def test_every_orbit_has_a_multiplier_1():
     for one in curve().orbits:
         assert np.abs(one.multipliers - 1.0).min() < 1e-7
         assert one.found.residual < 1e-9
+
+
+def test_folds_alone_have_no_derivative():
+    """Of a structure 1e6 times as fast too, where a condition of Φ that mixes q and q̇ took any orbit for a fold."""
+    branch, faster = known(), 1e6
+    folds = of_branch(duffing(faster=faster), (175.0 * faster, 210.0 * faster)).special
+    assert len(folds) == 2
+    for one in [*branch.special, *folds]:
+        with pytest.raises(ArithmeticError, match="a multiplier is 1"):
+            one.sensitivity("omega")
+    slow = branch.orbits[3]
+    fast = duffing(faster=faster, omega=slow.parameter).orbit(start=slow.state * [1.0, faster])
+    for path, unit in (("omega", faster), (FORCE, faster**2)):
+        found, expected = unit * fast.sensitivity(path).q, slow.sensitivity(path).q
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 
 def test_a_stop_by_its_gap_and_by_the_force():

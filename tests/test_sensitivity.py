@@ -431,6 +431,21 @@ def test_an_orbit_with_a_slider():
     np.testing.assert_allclose(found.state, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("modes", [2, 8])
+def test_an_orbit_of_a_fast_structure(modes):
+    """Force and gap together scale the orbit at a linear stop: F ∂u/∂F + g ∂u/∂g = u, of silicon at 4e5 rad/s too."""
+    bar, force, gap = fb.Section.rectangle(1.6e11, 2330.0, width=2e-5, height=2e-6), 2e-8, 2e-8
+    stop, load = fb.Stop(2e-4, KelvinVoigt(5.0, 1e-8), gap=gap), fb.PointForce(2e-4, fb.Harmonic(force, 4e5))
+    damping = fb.ModalDamping(0.02)
+    beam = fb.Scene(fb.Beam(2e-4, bar), [fb.Clamped(0.0)], stops=[stop], forces=[load], damping=damping)
+    orbit = beam.reduce(modes=modes).orbit()
+    assert len(orbit.contacts) == 1
+    assert abs(orbit.multipliers[0]) < 0.9
+    by_force, by_gap = (orbit.sensitivity(path) for path in ("forces[0].signal.amplitude", "stops[0].gap"))
+    scaled = force * by_force.q + gap * by_gap.q
+    np.testing.assert_allclose(scaled, orbit.run.q, rtol=0, atol=1e-6 * np.abs(orbit.run.q).max())
+
+
 def test_chaos_is_told():
     """Between two elastic stops small changes grow over and over."""
     stops = [fb.Stop(TIP, Hertz(2.1e8), 1e-4, side) for side in ("below", "above")]

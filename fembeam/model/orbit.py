@@ -119,7 +119,7 @@ class Orbit(Printed):
         Raises
         ------
         ValueError : as for `Run.sensitivity`. solvers.NoDerivativeError : a contact grazes. ArithmeticError : at a fold
-            or branch point.
+            or branch point, where |1 - μ| < 1e-6 for one of the multipliers.
         """
         from fembeam.model.sensitivity import of_orbit
 

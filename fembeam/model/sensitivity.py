@@ -49,6 +49,7 @@ FELT = 1e-4  # relative change of frequencies or shapes that the step of a zero 
 FIRST = 1e-6  # SI unit: the step of such a zero that is tried first; 1/FIRST is the largest
 LEAST = 1e-30  # SI unit: the smallest step of such a zero
 ROUGH = 1e-2  # relative difference of the derivatives by one and by two steps, above which modes do not change smoothly
+SINGLE = 1e-6  # least |1 - μ| of an orbit with a derivative; Φ is known to some 1e-8, also at a fold that was located
 CHAOS = 1e6  # growth of small changes above which a derivative says little
 LONGEST = 60  # contacts that are printed
 
@@ -411,6 +412,7 @@ def of_orbit_by_each(orbit: Orbit, parameters: Sequence[str], times: Vector | No
     the whole period.
     """
     model, found = orbit.model, orbit.found
+    _check_single(found)
     varied, n = [_Varied(model, one) for one in parameters], len(model.omega)
     later = [one.systems.map(lambda system: delayed(system, found.phase)) for one in varied]
     system = delayed(found.system, found.phase)
@@ -440,11 +442,22 @@ def _free(found: Any) -> Any:
     return free
 
 
+def _check_single(found: Any) -> None:
+    """ArithmeticError where other orbits are so near that a change of the parameter does not tell which one follows."""
+    nearest = float(np.abs(1.0 - found.transverse).min(initial=np.inf))
+    if not nearest >= SINGLE:
+        raise ArithmeticError(
+            "no derivative: the orbit is at a fold or a branch point, where a multiplier is 1: "
+            f"|1 - μ| = {nearest:.1g} is less than {SINGLE:g}"
+        )
+
+
 def _fixed_point(matrix: Vector, change: Vector, free: Any) -> Vector:
-    """Dx from dx = Φ dx + change: the theorem of implicit functions."""
+    """Dx from dx = Φ dx + change: the theorem of implicit functions; in units of the entries that balance Φ."""
+    from scipy.linalg import matrix_balance
+
     dx = np.zeros(len(change))
-    left = np.eye(int(free.sum())) - matrix[np.ix_(free, free)]
-    if np.linalg.cond(left) > 1e10:
-        raise ArithmeticError("no derivative: the orbit is at a fold or a branch point, where a multiplier is 1")
-    dx[free] = np.linalg.solve(left, change[free])
+    with np.errstate(invalid="ignore"):  # scales beyond the range of integers
+        balanced, (units, _) = matrix_balance(matrix[np.ix_(free, free)], permute=False, separate=True)
+    dx[free] = units * np.linalg.solve(np.eye(len(balanced)) - balanced, change[free] / units)
     return dx
