@@ -75,6 +75,16 @@ def test_a_force_that_jumps_at_entry():
     assert np.isnan(found.exits[0])
 
 
+@pytest.mark.parametrize("speed", [1e-6, 1e-3, 1e3])
+def test_damping_by_the_entry_rate_scales_with_it(speed):
+    """Of F = K δ^p (1 + a δ̇/v) and entries at v: F ~ v^(2p/(p + 1)) at any v, the impulse as v."""
+    law = Hysteretic(2e8, damping_factor=30.0, entry_rate_floor=1e-3 * speed)
+    found = sensitivity(ball(GAP * speed, law), [0.0], [speed], 0.5, start=[0.0, 1.0], method=FINE)
+    log, p = found.contacts, law.exponent
+    assert found.peak_force[0] == pytest.approx(2.0 * p / (p + 1.0) * log.peak_force[0] / speed, rel=3e-6)
+    assert found.impulse[0] == pytest.approx(log.impulse[0] / speed, rel=1e-9)
+
+
 # --- differences of runs ---------------------------------------------------------------------------------------------
 
 OMEGA, ZETA = np.array([109.13, 790.6]), np.array([0.02, 0.01])

@@ -20,6 +20,7 @@ from solvers.sensitivities.sampled import SampledLoads
 
 _RADIANS = 1.5  # of the fastest motion in one panel
 _FEWEST = 2  # panels between two events while elements act
+_MOST_OF_DECAY = 1000  # panels between two events for damping: where they are too few it has decayed long ago
 _MOST_NODES = 4_000_000  # panels × blocks above which a stretch is refused
 
 
@@ -104,28 +105,49 @@ def grouped(rows: Array) -> list[tuple[float, list[Array]]]:
     return [(float(t), list(group)) for t, group in groupby(rows, key=lambda row: row[at.TIME])]
 
 
+@dataclass(frozen=True)
+class Depths:
+    """Largest indentations of an element's contacts, the last one that of a contact that has not ended."""
+
+    ends: Array
+    depths: Array
+
+    @classmethod
+    def of(cls, contact: Any, rows: Array, t: Array, delta: Array, least: float) -> Depths:
+        """From the element's events and its δ at times of the run; of an element that always acts one for the run."""
+        ends = at.ends_of(rows[:0] if contact.always else rows)
+        left = np.abs(delta) if contact.always else delta[t > ends[:, at.TIME].max(initial=-np.inf)]
+        found = np.append(ends[:, at.DEEPEST], left.max(initial=0.0))
+        return cls(ends[:, at.TIME], np.fmax(found, least))
+
+    def after(self, t: float) -> float:
+        """That of the contact under way behind t, m."""
+        return float(self.depths[np.searchsorted(self.ends, t, side="right")])
+
+
 class Division:
     """Divides a run into stretches, with panels fine enough for its modes, its laws and its loads."""
 
-    def __init__(self, system: System, forced: bool, depth: Array, bends: Array, sampled: SampledLoads) -> None:
-        self.system, self.forced, self.bends, self.sampled = system, forced, bends, sampled
-        self.k, self.c = system.blocks.k, system.blocks.c
+    def __init__(
+        self, system: System, forced: bool, depths: Sequence[Depths], bends: Array, sampled: SampledLoads
+    ) -> None:
+        self.system, self.forced, self.depths, self.bends, self.sampled = system, forced, depths, bends, sampled
+        self.k, self.c, self.rows = system.blocks.k, system.blocks.c, law_parameters(system)
         tones = [signal.tones()[0] for _, signal in system.loads if hasattr(signal, "tones")] if forced else []
         speeds = np.sqrt(np.abs(self.k)), np.abs(self.c), *(np.abs(np.asarray(tone, float)) for tone in tones)
         self.fastest = max((float(one.max(initial=0.0)) for one in speeds), default=0.0)
-        self.stiffest = [self._frequency(s, depth[s]) for s in range(len(system.contacts))]
+        M = dense(system.M)
+        self.mobility = [float(np.linalg.norm(x.rows @ np.linalg.solve(M, x.rows.T), 2)) for x in system.contacts]
 
-    def _frequency(self, s: int, depth: float) -> float:
-        """Estimated frequency of an element alone on the system's mass, rad/s."""
-        contact = self.system.contacts[s]
-        places = depth * np.linspace(0.05, 1.0, 7)
+    def _speed(self, s: int, start: float, end: float, entry_rate: float) -> float:
+        """Estimated frequency of an element alone on the system's mass, rad/s, with its decay as far as it lasts."""
+        contact, mobility = self.system.contacts[s], self.mobility[s]
+        places = self.depths[s].after(start) * np.linspace(0.05, 1.0, 7)
         places = np.concatenate((-places, places)) if contact.always else places
-        row = law_parameters(self.system)[s]
-        found = laws.slopes(contact.law, row, (places, 0.0 * places), 1.0)
-        mobility = float(np.linalg.norm(contact.rows @ np.linalg.solve(dense(self.system.M), contact.rows.T), 2))
+        found = laws.slopes(contact.law, self.rows[s], (places, 0.0 * places), entry_rate)
         stiffness, damping = (float(np.nanmax(np.abs(one), initial=0.0)) for one in found[:2])
         stiffness = max(stiffness, float(contact.friction.stiffness or 0.0) if contact.friction else 0.0)
-        return math.sqrt(stiffness * mobility) + damping * mobility
+        return math.sqrt(stiffness * mobility) + min(damping * mobility, _MOST_OF_DECAY * _RADIANS / (end - start))
 
     def stretches(self, acting: Acting, rows: Array, duration: float, refinement: int) -> Iterator[Stretch]:
         """All stretches in the order of time; events at one time are applied together."""
@@ -143,7 +165,8 @@ class Division:
         if not (acting.elements or self.forced):
             return Stretch(start, end, acting)
         clock = Clock(start, end, max([1, *(_power(self.system.contacts[s]) for s in acting.elements)]))
-        speed = max([self.fastest, *(self.stiffest[s] for s in acting.elements)])
+        stiff = (self._speed(s, start, end, acting.entry_rate[s]) for s in acting.elements)
+        speed = max([self.fastest, *stiff])
         count = refinement * (_FEWEST + math.ceil((end - start) * speed / _RADIANS))
         bends = self.bends[(self.bends > start) & (self.bends < end)]
         marks = np.concatenate((bends, self.sampled.edges(start, end)))

@@ -23,7 +23,7 @@ from solvers.sensitivities.flow import Flow, begun_numbers, latched_columns
 from solvers.sensitivities.nearby import Change, Nearby, unchanged
 from solvers.sensitivities.panels import Panels, S, coefficients, interpolated, largest, zeros
 from solvers.sensitivities.sampled import SampledLoads
-from solvers.sensitivities.stretches import Acting, Division, Motion, Stretch, acting_at_start, grouped
+from solvers.sensitivities.stretches import Acting, Depths, Division, Motion, Stretch, acting_at_start, grouped
 
 SMOOTH = 1e-3  # relative size of the last Legendre coefficients of forces' derivatives, above which panels are halved
 _REFINEMENTS, _REPEATS = (1, 2, 4), 2  # of panels, until derivatives are smooth; passes after the first to locate kinks
@@ -194,7 +194,7 @@ class _Request:
     by: Change
     starts: list[Array]  # of [q, q̇], or of what is latched too
     span: Array = field(default_factory=lambda: np.zeros(0))  # (E,) size of each element's displacement
-    depth: Array = field(default_factory=lambda: np.zeros(0))  # (E,) largest indentation, m
+    depths: list[Depths] = field(default_factory=list)  # of each element
 
     @cached_property
     def sampled(self) -> SampledLoads:
@@ -223,14 +223,12 @@ class _Request:
 
     def measure(self, solution: Solution, rows: Array) -> None:
         """Set the sizes of the displacements; NoDerivativeError for a stop that is touched but not entered."""
-        self.span, self.depth = (np.zeros(len(self.system.contacts)) for _ in range(2))
+        self.span, self.depths = np.zeros(len(self.system.contacts)), []
         for s, contact in enumerate(self.system.contacts):
             delta = motion_of(contact, solution.q.T, solution.q_dot.T).delta
             mine = rows[rows[:, at.ELEMENT] == s]
             self.span[s] = np.abs(delta + contact.gap * (-1.0 if contact.outer else 1.0)).max() + 1e-300
-            deepest = np.nanmax(np.append(mine[:, at.DEEPEST], 0.0))
-            deepest = max(deepest, float((np.abs(delta) if contact.always else delta).max()))
-            self.depth[s] = max(deepest, 1e-9 * self.span[s])
+            self.depths.append(Depths.of(contact, mine, solution.t, delta, 1e-9 * self.span[s]))
         self._check_touching(solution)
 
     def _check_touching(self, solution: Solution) -> None:
@@ -316,7 +314,7 @@ class _Walk:
         system, by = asked.system, asked.by
         self.asked, self.rows, self.events = asked, rows, dict(grouped(rows))
         self.acting = acting_at_start(system, asked.x, rows, asked.memory)
-        division = Division(system, by.forced, asked.depth, bends, asked.sampled)
+        division = Division(system, by.forced, asked.depths, bends, asked.sampled)
         self.stretches = list(division.stretches(self.acting, rows, asked.duration, refinement))
         wanted = [np.array([0.0, asked.duration]), asked.times, *(t for one in self.stretches for t in one.times)]
         times = np.unique(np.clip(np.concatenate(wanted), 0.0, asked.duration))
