@@ -164,6 +164,36 @@ def test_an_inertia_and_an_axial_force_that_are_zero(size):
         np.testing.assert_allclose(found, (4.0 * b - 3.0 * a - c) / (2.0 * step), rtol=1e-4)
 
 
+def cantilever_between(**reduction):
+    """A run of a bar in space that is shaken onto either of two stops across it."""
+    bar = fb.Frame({"A": (0.0, 0.0, 0.0), "B": (0.25, 0.0, 0.0)}, [fb.Member("A", "B", BAR, up=(0.0, 0.6, 0.8))])
+    stops = [fb.Stop("B", KelvinVoigt(1e4, 2.0), gap=1e-4, direction=(0.0, side, 0.0)) for side in (1.0, -1.0)]
+    shaken = fb.Scene(bar, [fb.Clamped("A")], stops=stops, damping=fb.ModalDamping(0.02),
+                      base={"y": fb.Harmonic(1e-3, 110.0)})  # fmt: skip
+    return shaken.reduce(modes=2, **reduction).simulate(0.05, 1e-3, solver=FINE)
+
+
+def test_the_share_of_up_along_the_member_changes_nothing():
+    """Steps from 0 grew until the scene refused them."""
+    run = cantilever_between()
+    assert len(run.contacts) > 1
+    along, across = (run.sensitivity(f"beam.members[0].up[{i}]") for i in (0, 1))
+    assert np.abs(along.q).max() < 1e-9 * np.abs(across.q).max()
+    assert np.abs(along.peak_force).max() < 1e-9 * np.abs(across.peak_force).max()
+
+
+def test_a_static_shape_that_two_stops_share():
+    """Turned a little, one has a shape of its own: that ended in the words of NumPy. Modes alone have a derivative."""
+    path, step = "stops[1].direction[2]", 1e-4
+    with pytest.raises(ValueError, match=r"number of coordinates must not change, got .* leave out residual=True"):
+        cantilever_between(residual=True).sensitivity(path)
+    run = cantilever_between()
+    there = [run.model.again(with_value(run.model.scene, path, k * step)).simulate(0.05, 1e-3, solver=FINE).q[-1]
+             for k in (1, -1)]  # fmt: skip
+    expected = (there[0] - there[1]) / (2.0 * step)
+    np.testing.assert_allclose(run.sensitivity(path).q[-1], expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
 def test_what_is_no_number_is_refused_by_name():
     """Text, complex numbers, ragged rows and lists of paths ended in the words of NumPy or of Python."""
     run, law = simulated(rig(), duration=0.01, dt=1e-3), Polynomial([2e4])

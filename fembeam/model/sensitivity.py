@@ -46,8 +46,8 @@ KNOT = 1e-7  # of an indentation where a law has a kink: small, since between bo
 UNIT = 1.0  # SI unit: stands for the value where it is zero, unless it changes modes
 SMALL = 1e-6  # part of its usual step by which a zero is varied whose usual step the scene refuses
 FELT = 1e-4  # relative change of frequencies or shapes that the step of a zero which changes modes shall exceed
-FIRST = 1e-6  # SI unit: the step of such a zero that is tried first; 1/FIRST is the largest
-LEAST = 1e-30  # SI unit: the smallest step of such a zero
+FIRST = 1e-6  # SI unit: the step of such a zero that is tried first
+LEAST, MOST = 1e-30, 2e6  # SI unit: the smallest and the largest step of such a zero
 ROUGH = 1e-2  # relative difference of the derivatives by one and by two steps, above which modes do not change smoothly
 SINGLE = 1e-6  # least |1 - μ| of an orbit with a derivative; Φ is known to some 1e-8, also at a fold that was located
 CHAOS = 1e6  # growth of small changes above which a derivative says little
@@ -231,9 +231,8 @@ class _Varied:
         with self._rewording_refusals():
             step = STRUCTURE * abs(self.value) or self._felt()
         found = self._near(lambda value: self.model.again(self._scene(value)), step)
-        sizes = {len(one.omega) for one in found.systems}
-        require(sizes == {len(self.model.omega)}, "the number of coordinates must not change", sizes, self.called,
-                "name the modes by number, modes=3")  # fmt: skip
+        for one in found.systems:
+            self._check_size(one)
         _check_smooth(found, self.called)
         return found
 
@@ -266,26 +265,44 @@ class _Varied:
         return replaced(self.model.scene, self.path, value)
 
     def _felt(self) -> float:
-        """A step of a number that is zero and changes modes, which they feel about as much as `STRUCTURE`."""
+        """A step of a number that is zero and changes modes, which they feel about as much as `STRUCTURE`.
+
+        Of one that changes next to nothing, such as the share of a direction along the member that it turns about, a
+        tenth of the first step that the scene refuses.
+        """
         step = FIRST
-        while LEAST < step < 1.0 / FIRST:
-            change = self._change(step)
+        while LEAST < step <= MOST:
+            try:
+                there = self.model.again(self._scene(step))
+            except ValueError:
+                if step <= FIRST:
+                    raise
+                break
+            change = self._change(there, step)
             if change > STRUCTURE:
                 step *= 0.1
             elif step < FIRST or change > FELT:
-                break
+                return step
             else:
                 step *= 10.0
-        return step
+        return 0.1 * step if step > FIRST else step
 
-    def _change(self, step: float) -> float:
+    def _change(self, there: Model, step: float) -> float:
         """Largest relative change of frequencies, shapes or damping by a step from zero."""
-        here, there = self.model, self.model.again(self._scene(step))
+        here = self.model
         require(len(there.system.loads) == len(here.system.loads), "it must not bring a load that is not there yet",
                 step, self.called, "begin from a small value, such as gravity=1e-6")  # fmt: skip
+        self._check_size(there)
         pairs = (here.omega**2, there.omega**2), (here.directions, there.directions), (here.zeta, there.zeta)
         sizes = [(np.abs(b - a).max(initial=0.0), np.abs(a).max(initial=0.0)) for a, b in pairs]
         return max(0.0 if change == 0.0 else change / size if size > 0.0 else np.inf for change, size in sizes)
+
+    def _check_size(self, there: Model) -> None:
+        """ValueError where another value of the number brings coordinates, or takes them away."""
+        sizes, options = {len(self.model.omega), len(there.omega)}, self.model.reduction_options
+        asked = [f"{name}=True" for name in ("residual", "interface") if options.get(name)]
+        advice = f"places share a static shape here alone: leave out {asked[0]}" if asked else "name modes by number"
+        require(len(sizes) == 1, "the number of coordinates must not change", sizes, self.called, advice)
 
     def _near(self, make: Any, step: float) -> Nearby:
         """What is made at five-point formulas' values."""
