@@ -2,8 +2,8 @@
 
 `problem` holds what is to be solved and what comes out, `compiled` what all compiled functions share. `stepping` has
 the methods of constant or controlled step, `exponential` the main method; `integration` runs any of them, `many` runs
-many starts. `sensitivities` derives runs by their start and by parameters. `orbits` finds periodic motion, `branches`
-continues it over a parameter. Imports: numpy, scipy, numba;
+many starts. `energy_norm` measures small changes. `sensitivities` derives runs by their start and by parameters.
+`orbits` finds periodic motion, `branches` continues it over a parameter. Imports: numpy, scipy, numba;
 nothing is compiled or imported from numba before a method is used. Begin with `problem.system`, then `integration`.
 """
 

@@ -298,6 +298,20 @@ def test_what_is_discarded_does_not_count():
         assert late.error < 1e-6
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e-6, 1e4])
+def test_exponent_in_any_unit_of_time(unit):
+    """Of the norm of energy, in which e^(-2 t) shows from the start; contacts at a stop as stiff are no exception."""
+    omega = np.array([100.0]) / unit
+    value, error = lyapunov(System.modal(omega, [0.02]), [1.0], [0.0], duration=10.0 * unit)
+    assert value * unit == pytest.approx(-2.0, rel=3e-3)
+    assert error * unit < 0.03
+    stop = Contact([1.0], KelvinVoigt(1e4 / unit**2, 10.0 / unit), 0.1)
+    impacting = lyapunov(System.modal(omega, [0.02], [stop]), [1.0], [0.0], duration=1.0 * unit)
+    in_seconds = lyapunov(System.modal(omega * unit, [0.02], [Contact([1.0], KelvinVoigt(1e4, 10.0), 0.1)]), [1.0],
+                          [0.0], duration=1.0)  # fmt: skip
+    assert np.array(impacting) * unit == pytest.approx(in_seconds, rel=1e-6)
+
+
 def test_exponent_of_a_motion_whose_tangent_nearly_vanishes():
     free = System.modal(omega=[10.0], zeta=[0.1])
     assert lyapunov(free, [1.0], [0.0], duration=600.0).value == pytest.approx(-1.0, rel=0.01)  # e^-600 squared is 0

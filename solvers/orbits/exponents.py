@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.compiled.state import T_END
+from solvers.energy_norm import energy_norm
 from solvers.exponential.method import Exponential
 from solvers.integration import prepared_run
-from solvers.problem import SolverError, Status, System
+from solvers.problem import Array, SolverError, Status, System
 from solvers.problem.whole_runs import whole_runs
 
 _BATCHES = 20
@@ -27,14 +28,15 @@ class Exponent(NamedTuple):
 def lyapunov(
     system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, discard: float = 0.0, method: Any = None
 ) -> Exponent:
-    """Mean rate at which the tangent grows, λ = lim ln‖∂x(t)/∂x(0)‖ / t.
+    """Mean rate at which the tangent grows in the norm of energy, λ = lim ln‖∂x(t)/∂x(0)‖ / t.
 
     Positive for chaotic motion; ln|μ|/T on a periodic orbit of period T and largest multiplier μ.
 
     Parameters
     ----------
     system, q0, q_dot0, duration, method : as for `integrate`; an `Exponential`.
-    discard : s from the start on that are not counted, in [0, duration).
+    discard : s from the start on that are not counted, in [0, duration); without it the result depends a little on the
+        units of numbers that laws latch, on no others.
 
     Returns
     -------
@@ -57,15 +59,25 @@ def lyapunov(
     if not 0.0 <= discard < duration:
         raise ValueError(f"discard must lie in [0, duration), got {discard!r} of {duration!r} s")
     run = prepared_run(system, q0, q_dot0, duration, None, Exponential() if method is None else method, True)
+    norm = energy_norm(system, duration)
+    inverse, growth = np.linalg.inv(norm), [0.5 * math.log(len(norm))] if discard == 0.0 else []
     borders = np.linspace(discard, duration, _BATCHES + 1)
-    for border in borders[borders > 0.0]:  # the size of the tangent is recorded where a stretch ends
+    for border in borders[borders > 0.0]:  # the tangent follows to where a stretch ends
         run.state.now[T_END] = border
         with whole_runs():
             status = run.to_the_end(None)
         if status is not Status.DONE:
             raise SolverError(f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}")
-    t, growth = np.array([(0.0, 0.0), *run.tangent.history]).T
+        growth.append(_log_size(run.tangent, norm, inverse))
     if not np.all(np.isfinite(growth)):
         raise SolverError("the tangent vanished: neighbouring motions meet below the range of numbers; shorten the run")
-    rates = np.diff(np.interp(borders, t, growth)) / np.diff(borders)
+    rates = np.diff(growth) / np.diff(borders)
     return Exponent(float(rates.mean()), float(rates.std(ddof=1) / math.sqrt(_BATCHES)))
+
+
+def _log_size(tangent: Any, norm: Array, inverse: Any) -> float:
+    """Logarithm of the tangent's size at the time reached: of N ∂[q, q̇]/∂x(0) N⁻¹, latched numbers as they are."""
+    matrix = norm @ tangent.blocks.T @ tangent.y[:, tangent.places].T
+    matrix[:, : len(norm)] = matrix[:, : len(norm)] @ inverse
+    largest = float(np.abs(matrix).max())
+    return tangent.log_scale + math.log(largest * np.linalg.norm(matrix / largest)) if largest > 0.0 else -math.inf

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.compiled.state import LOGGED
+from solvers.energy_norm import energy_norm
 from solvers.integration import prepared_run
-from solvers.problem import Array, ContactLog, Solution, SolverError, Status, System, dense
+from solvers.problem import Array, ContactLog, Solution, SolverError, Status, System
 from solvers.problem import event_list as at
 from solvers.problem.friction import tell_sliders
 from solvers.problem.whole_runs import whole_runs
@@ -482,16 +483,6 @@ class _Walk:
 
     def _growth(self) -> float:
         """Largest factor from start to end in the norm of energy, with an added spring so that rigid motions count."""
-        system, duration = self.asked.system, self.asked.duration
-        M, K = dense(system.M), dense(system.K)
-        n, stiff = system.size, K + M / duration**2
-        norm = np.block([[_root(stiff), np.zeros((n, n))], [np.zeros((n, n)), _root(M)]])
-        by_start = self.flow.state[:, : 2 * n]
+        norm = energy_norm(self.asked.system, self.asked.duration)
+        by_start = self.flow.state[:, : len(norm)]
         return float(np.linalg.norm(norm @ by_start @ np.linalg.inv(norm), 2))
-
-
-def _root(matrix: Array) -> Array:
-    """Square root of a symmetric matrix, with the absolute values of its eigenvalues."""
-    values, vectors = np.linalg.eigh(matrix)
-    values = np.abs(values)
-    return np.asarray((vectors * np.sqrt(np.maximum(values, 1e-12 * values.max()))) @ vectors.T)
