@@ -74,17 +74,17 @@ class Tangent:
         derivatives, past = (words + start for start in layout.starts)
         self.addresses = here, ahead, behind, *engine.addresses[1:], past, derivatives, variation
         self.log_scale = 0.0  # the derivatives are exp(log_scale) times the arrays
-        self.history: list[tuple[float, float]] = []  # (time, ln of their size)
+        self.begun = False
 
     def follow(self) -> None:
         """Move the derivatives to the time the engine has reached, and empty its event record."""
         engine = self.engine
-        linearise_run(self.addresses, self.blocks.k.size, not self.history)
+        linearise_run(self.addresses, self.blocks.k.size, not self.begun)
+        self.begun = True
         self.y[:, self.tones] = 0.0  # rounding there would not decay
         if not np.all(np.isfinite(self.y)):
             raise SolverError(f"the tangent is not finite any more at t = {engine.state.now[T]:g} s: a contact grazes")
         size = _size(self.y)
-        self.history.append((float(engine.state.now[T]), self.log_scale + math.log(size) if size > 0.0 else -math.inf))
         if not 1.0 / _LARGE < size < _LARGE and size > 0.0:
             for array in (self.y, self.entry, self.shift, self.latched):
                 array /= size
