@@ -283,21 +283,26 @@ def bends_at(problem, row):
     return both[1] != both[e + 1] or both[2] != both[e + 2]
 
 
+@inlined
+def quintic(problem, j, cell):
+    """Coefficients of the quintic of node table j on a cell, in powers of (t - start)/dt."""
+    dt = problem.table_dt[j]
+    row, e = problem.table_start[j] + cell, at_end(problem)
+    a, b = problem.table[row], problem.table[row + 1]
+    s1, s2 = a[1] * dt, 0.5 * a[2] * dt * dt
+    e0 = b[e] - a[0] - s1 - s2
+    e1 = b[e + 1] * dt - s1 - 2.0 * s2
+    e2 = 0.5 * b[e + 2] * dt * dt - s2
+    return a[0], s1, s2, 10.0 * e0 - 4.0 * e1 + e2, -15.0 * e0 + 7.0 * e1 - 2.0 * e2, 6.0 * e0 - 3.0 * e1 + e2
+
+
 @inner
 def table_value(problem, j, t):
     """Quintic Hermite value of node table j at time t."""
-    dt, start = problem.table_dt[j], problem.table_start[j]
-    cell = min(max(int(t / dt), 0), problem.table_start[j + 1] - start - 2)
-    x = t / dt - cell
-    a, b, e = problem.table[start + cell], problem.table[start + cell + 1], at_end(problem)
-    s0, s1 = a[1] * dt, a[2] * dt * dt * 0.5
-    e0 = b[e] - a[0] - s0 - s1
-    e1 = b[e + 1] * dt - s0 - 2.0 * s1
-    e2 = b[e + 2] * dt * dt * 0.5 - s1
-    c3 = 10.0 * e0 - 4.0 * e1 + e2
-    c4 = -15.0 * e0 + 7.0 * e1 - 2.0 * e2
-    c5 = 6.0 * e0 - 3.0 * e1 + e2
-    return a[0] + x * (s0 + x * (s1 + x * (c3 + x * (c4 + x * c5))))
+    dt, cells = problem.table_dt[j], problem.table_start[j + 1] - problem.table_start[j] - 1
+    cell = min(max(int(t / dt), 0), cells - 1)
+    x, (s0, s1, s2, s3, s4, s5) = t / dt - cell, quintic(problem, j, cell)
+    return s0 + x * (s1 + x * (s2 + x * (s3 + x * (s4 + x * s5))))
 
 
 @inner

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from solvers.compiled.kernels import at_end, copy, inlined, inner
+from solvers.compiled.kernels import at_end, copy, inlined, inner, quintic
 from solvers.compiled.simd import WIDTH, bit_pattern, load8, splat8, sqrt8, store8, sum8
 from solvers.compiled.sums import combine
 
@@ -38,19 +38,6 @@ def cell_of(problem, t):
     last = problem.table_start[1] - problem.table_start[0] - 2
     cell = min(max(int(t / dt + 1e-9), 0), last)
     return cell, t - cell * dt
-
-
-@inlined
-def quintic(problem, j, cell):
-    """Coefficients of the quintic of node table j on a cell, in powers of (t - start)/dt."""
-    dt = problem.table_dt[j]
-    row, e = problem.table_start[j] + cell, at_end(problem)
-    a, b = problem.table[row], problem.table[row + 1]
-    s1, s2 = a[1] * dt, 0.5 * a[2] * dt * dt
-    e0 = b[e] - a[0] - s1 - s2
-    e1 = b[e + 1] * dt - s1 - 2.0 * s2
-    e2 = 0.5 * b[e + 2] * dt * dt - s2
-    return a[0], s1, s2, 10.0 * e0 - 4.0 * e1 + e2, -15.0 * e0 + 7.0 * e1 - 2.0 * e2, 6.0 * e0 - 3.0 * e1 + e2
 
 
 @inner

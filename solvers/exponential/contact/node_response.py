@@ -15,6 +15,7 @@ from solvers.compiled.kernels import (
     law_forces,
     merged,
     place_of,
+    quintic,
     reordered,
     row_of,
     rubs,
@@ -37,7 +38,6 @@ from solvers.exponential.contact.many_stops import (
     uses_blocks,
 )
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.flight import quintic
 
 SHORT = STAGES
 DIFFERENCE, BATCH, LANDED, WITHIN, START = STAGES + 1, *range(STAGES + 4, STAGES + 8)
