@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 import fembeam as fb
 from contacts import Hertz, KelvinVoigt, Polynomial
 from solvers import RK4, Contact, DormandPrince, Exponential, System, integrate, integrate_many
+from solvers.exponential.flight import cell_of
 from solvers.exponential.phi_functions import signal_responses
 from solvers.integration import prepared_once
 
@@ -345,3 +346,12 @@ def test_a_signal_that_can_change_is_sampled_anew():
     assert ends == pytest.approx([1.0, 2.0], rel=1e-12)
     slope.setflags(write=False)
     assert prepared_once(system, Exponential(), 1.0) is prepared_once(system, Exponential(), 1.0)
+
+
+@pytest.mark.parametrize("dt", [1e-3, 0.0009765625, 0.0007, 1.0 / 3.0])
+def test_a_time_on_a_node_is_in_the_cell_behind_it_however_late(dt):
+    """From 2^23 cells on rounding put it in the cell before: the input of band noise was off by a quarter."""
+    problem = SimpleNamespace(table_dt=np.array([dt]), table_start=np.array([0, 1 << 40]))
+    cells = np.random.default_rng(1).integers(0, 1 << 33, 2000).tolist()
+    for times in ([cell * dt for cell in cells], [cell * dt - dt + dt for cell in cells]):
+        assert [cell_of.py_func(problem, t)[0] for t in times] == cells

@@ -18,6 +18,7 @@ ORDER = 6  # of Taylor steps
 _LOG_ERROR = int(0.345 * 2**50)  # four times 0.0863, the error of a logarithm linear between powers of two
 SERIES_TERMS = 14  # terms of a series that is exact to rounding up to |λ| x = SERIES_REACH: 0.6^14/14! = 9e-15
 SERIES_REACH = 0.6
+_ROUNDING = 9e-16  # of a time over the length of a cell, relative
 
 
 @inlined
@@ -33,10 +34,10 @@ def level_within(tables, span):
 
 @inner
 def cell_of(problem, t):
-    """(cell, time since its begin, s) of the sampled signals' common grid."""
-    dt = problem.table_dt[0]
+    """(cell, time since its begin, s) of the sampled signals' common grid; a time within rounding of a node is there."""
+    dt, place = problem.table_dt[0], t / problem.table_dt[0]
     last = problem.table_start[1] - problem.table_start[0] - 2
-    cell = min(max(int(t / dt + 1e-9), 0), last)
+    cell = min(max(int(place + 1e-9 + _ROUNDING * place), 0), last)
     return cell, t - cell * dt
 
 
