@@ -387,7 +387,7 @@ def test_a_full_stdout_is_an_error(capsys, monkeypatch):
 def test_the_new_scene_is_checked_and_runs(tmp_path, capsys):
     path, out = tmp_path / "new.toml", tmp_path / "out"
     printed(capsys, "new", path)
-    assert "File exists" in refused(capsys, "new", path)
+    assert "exists: give another name, or delete it" in refused(capsys, "new", path)
     found = json.loads(printed(capsys, "check", path, "--json"))
     assert [row["omega"] for row in found["modes"]] == pytest.approx([106.945812, 813.508628, 2384.149653], rel=1e-6)
     stop = found["stops"][0]

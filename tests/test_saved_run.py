@@ -240,3 +240,8 @@ def test_quantities_of_a_run_are_those_of_its_file(tmp_path):
     bare = scene.reduce(modes=2).simulate(0.1)
     with pytest.raises(ValueError, match="the run must have samples, got 1 in Psd; give dt"):
         Psd()(bare)
+
+
+def test_a_folder_is_no_saved_run(tmp_path):
+    with pytest.raises(ValueError, match=r"is a folder: give the file of a run in it, .*run\.npz"):
+        fb.load(tmp_path)

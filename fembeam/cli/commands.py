@@ -161,7 +161,9 @@ def _new(arguments: argparse.Namespace) -> int:
     """The command `new`."""
     from fembeam.scene_file import template
 
-    with arguments.path.open("x", encoding="utf-8") as file:  # x: what exists is kept
+    if arguments.path.exists():
+        raise ValueError(f"{arguments.path} exists: give another name, or delete it")
+    with arguments.path.open("x", encoding="utf-8") as file:  # x: what exists by now is kept
         file.write(template(arguments.path.name))
     say(f"wrote {arguments.path}; next: fembeam check {arguments.path}")
     return 0

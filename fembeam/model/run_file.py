@@ -170,6 +170,8 @@ def load(path: str | os.PathLike[str]) -> Run:
     >>> again.status, len(again.t)
     ('finished', 11)
     """
+    if Path(path).is_dir():
+        raise ValueError(f"{path} is a folder: give the file of a run in it, {Path(path) / 'run.npz'}")
     try:
         return _of_arrays(*_read(Path(path)), Path(path))
     except _OtherFormatError as error:

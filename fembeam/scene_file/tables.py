@@ -74,7 +74,7 @@ class TableReader:
         self.check_keys(tables, [*parts, *BODIES, "reduce", *known], "the file", "table")
         bodies = [name for name in ("beam", *BODIES) if name in tables]
         if not bodies:
-            self.fail("the file", "needs a table [beam]")
+            self.fail("the file", f"needs a table [{'] or ['.join(('beam', *BODIES))}]")
         if len(bodies) > 1:
             self.fail("the file", f"needs one of the tables [{'] and ['.join(bodies)}], not both")
         for name in tables:

@@ -34,7 +34,7 @@ def level_within(tables, span):
 
 @inner
 def cell_of(problem, t):
-    """(cell, time since its begin, s) of the sampled signals' common grid; a time within rounding of a node is there."""
+    """(cell, time since its begin, s) of the sampled signals' grid; a time within rounding of a node is on it."""
     dt, place = problem.table_dt[0], t / problem.table_dt[0]
     last = problem.table_start[1] - problem.table_start[0] - 2
     cell = min(max(int(place + 1e-9 + _ROUNDING * place), 0), last)
