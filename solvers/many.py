@@ -130,7 +130,8 @@ def integrate_many(
         workers = [Worker(engine, of_blocks, own_gaps, outcomes, BLOCK_STEPS) for engine in engines]
         _to_the_end(workers, len(starts), progress)
         status = final_statuses(engines[0], outcomes)
-        again = bool(np.any(status == Status.STEP_TOO_SMALL)) and engines[0].shorten()
+        whole = not np.any(status == Status.INTERRUPTED)
+        again = bool(whole and np.any(status == Status.STEP_TOO_SMALL)) and engines[0].shorten()
         for engine in engines:
             engine.release()
     motion, n = _products(engines[0].back, outcomes.x), system.size

@@ -161,6 +161,15 @@ def test_two_records_of_unequal_steps(step, omega):
     assert (np.abs([run.q[-1, 0], run.q_dot[-1, 0]] - exact[-1]) / np.abs(exact).max(axis=0)).max() < 1e-9
 
 
+def test_a_coarse_record_beside_a_fine_smooth_one_keeps_the_grid_of_the_fine():
+    """One step of it holds more cells than a rough table is cut into; a fast structure must not cut these further."""
+    fine = fb.BandNoise(1.0, (0.0, 400.0), seed=1)
+    system = System.modal([1e5], 0.01, [], [([1.0], record(5.0, 9)), ([1.0], fine)])
+    alone = System.modal([1e5], 0.01, [], [([1.0], fine)])
+    together, by_itself = (prepared_once(one, Exponential(1e-8), 20.0)[0].table_dt for one in (system, alone))
+    assert 0.5 * by_itself[0] < together[0] <= by_itself[0]
+
+
 # --- kinks --------------------------------------------------------------------------------------------------------
 
 

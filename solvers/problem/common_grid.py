@@ -57,7 +57,8 @@ def _common_step(tables: list[Array], steps: list[float], duration: float, faste
         return most
     dt = _part_of(steps[worst], most)
     others = [steps[i] for i in np.flatnonzero(np.array(rough) > _ROUGH)]
-    for parts in range(round(steps[worst] / dt), _CELLS_A_STEP + 1):
+    fewest = round(steps[worst] / dt)
+    for parts in range(fewest, max(fewest, _CELLS_A_STEP) + 1):
         if all(_divides(steps[worst] / parts, step) for step in others):
             return steps[worst] / parts
     resolved = max(_RESOLVED / max(fastest, 1e-300), duration / _MOST_CELLS)
