@@ -138,6 +138,8 @@ def _leave_or_rest(problem, tables, state, scratch, stop, time_to_knot):
     any error is allowed, unless it may last longer than the shortest step: by the rounding of δ at the rate.
     """
     if switch_on_surface(problem, state, True):
+        if in_contact(state):
+            begin_steps(problem, tables, state, scratch, latest_entered(state))
         return MOVES_OUT
     if not time_to_knot < tables.contact_step[tables.contact_step.size - 1]:
         return NEITHER
@@ -343,8 +345,6 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
     if time_to_knot < tables.contact_step[shortest] or control[NEXT_LEVEL] == shortest:
         found = _leave_or_rest(problem, tables, state, scratch, stop, time_to_knot)
         if found == MOVES_OUT:
-            if in_contact(state):
-                begin_steps(problem, tables, state, scratch, latest_entered(state))
             return RUNNING
         if found == RESTS:
             time_to_knot, stop, direction = np.inf, -1, 0
@@ -383,9 +383,8 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
         state.count[REJECTED] += 1
         if crossing >= 0:
             level = _end_before(tables, state, scratch, level, crossing, first)
-            continue
-        level = min(shortest, level + (1 + int(2.0 / _ORDER * math.log2(error / _ERROR_GOAL)) if error < np.inf else 2))
-        wanted = level
+        else:
+            level = wanted = min(shortest, level + _levels_shorter(error))
     if level == shortest and _relaxes_within(problem, tables, state, scratch):
         return STEP_TOO_SMALL
     _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, crossing)
@@ -422,6 +421,12 @@ def _force_not_finite(problem, state, scratch):
             if acts(problem, state, r) and not abs(scratch.force[r, i]) < np.inf:
                 return True
     return False
+
+
+@inlined
+def _levels_shorter(error):
+    """Levels by which a step is tried shorter: 1 + ⌊2/15 log₂(error/goal)⌋, or 2 if the error is not known."""
+    return 1 + int(2.0 / _ORDER * math.log2(error / _ERROR_GOAL)) if error < np.inf else 2
 
 
 @inlined
