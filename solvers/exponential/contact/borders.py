@@ -34,7 +34,14 @@ from solvers.compiled.simd import load8, splat8, sum8
 from solvers.compiled.sliding import DELTA, RATE
 from solvers.compiled.state import AT_ONCE, LAST_EVENT, PEAK_FORCE, T, rate_tolerance
 from solvers.exponential.circles.friction import TANGENTIAL
-from solvers.exponential.contact.crossings import extremum
+from solvers.exponential.contact.crossings import (
+    ON_BORDER,
+    REST,
+    ROUNDING,
+    WATCHED_BELOW,
+    extremum,
+    time_of_place,
+)
 from solvers.exponential.contact.first_step import UNKNOWN
 from solvers.exponential.contact.node_response import (
     DELTAS,
@@ -59,8 +66,6 @@ from solvers.exponential.contact.slider_margins import (
 from solvers.problem.friction import CODE, FREE, PRESSES, STICK
 
 UNRESOLVED = -2  # in place of an element: the step is too long to tell whether a border is crossed
-_ON_BORDER = 1e-9  # margin, in units of its largest on the step, up to which the step counts as begun on the border
-_ROUNDING = 1e-11  # rounding of a margin, in the same units
 _TOGETHER = 1e-9  # margin, relative to its value at the start, at which a border counts as reached along with another
 _MISSED = 1e-5  # the most, in units of its largest, by which a margin may be negative after a landing on its border
 _SHORTLY = 1e-3  # part of a step or landing over which a margin is extrapolated by the rates at its end
@@ -73,10 +78,8 @@ _ROOT_EXPECTED = 1e-4  # the same beyond the end of the step, where the polynomi
 _SLOPE_STEP = 1e-5  # relative step in σ for the slope of this polynomial at its root
 _OFF_NODES = 1e-200  # keeps σ off a node where this polynomial is evaluated
 _MOST_ILLINOIS = 6  # iterations for a root of the polynomial through the nodes
-_REST = 1e-14  # rate, in units of the reference speed, below which a rate at rest is rounding
 _INTERPOLATED = 4.0  # rounding of a margin at points around a node, in units of that at the nodes
 _LOWEST = 2  # place in `Scratch.ends`, once the rounding is known, of the lowest margin at the end or between nodes
-_WATCHED_BELOW = 0.2  # margin at a node, in units of the largest, below which the motion around the node is evaluated
 _CHECKED_BELOW = 0.5  # margin at an end of a landing, in the same units, below which a minimum inside is looked for
 _CLEAR = 0.03  # estimate of such a minimum, in the same units, that counts as positive
 
@@ -136,7 +139,7 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
         deltas[i], rates[i] = delta + direction * rounding, rate
     deltas[1], rates[1] = indentation_and_rate(problem, s, scratch.x_new)
     deltas[2] += direction * rounding
-    rates[3] += direction * max(rate_tolerance(problem, s, state.x), _REST * scratch.reference_speed[s])
+    rates[3] += direction * max(rate_tolerance(problem, s, state.x), REST * scratch.reference_speed[s])
     deltas[4] += direction * ripple_of(weight, alias, state.x, n)
     rates[5] += direction * rate_ripple_of(weight, problem.k, alias, state.x, n)
     margins(problem, state, s, ENDS, deltas, rates, scratch.ends)
@@ -147,7 +150,7 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
         for i in range(S):
             largest = max(largest, abs(scratch.margin[S * j + i]))
         scratch.largest[s, j] = largest
-        scratch.noise[s, j] = max(_ROUNDING * largest, 2.0 * (abs(ends[2] - ends[0]) + abs(ends[3] - ends[0])))
+        scratch.noise[s, j] = max(ROUNDING * largest, 2.0 * (abs(ends[2] - ends[0]) + abs(ends[3] - ends[0])))
 
 
 @merged
@@ -305,7 +308,7 @@ def _crossing_time(problem, tables, state, scratch, s, j, node_set, h):
     instant for ever.
     """
     noise, before, t = scratch.noise[s, j], scratch.ends[ENDS * j], 0.0
-    tolerance = max(_ON_BORDER * scratch.largest[s, j], noise)
+    tolerance = max(ON_BORDER * scratch.largest[s, j], noise)
     overshot = state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0 and scratch.margin[S * j] > before
     overshot &= before > -_MISSED * scratch.largest[s, j]
     if before < -tolerance and not overshot:
@@ -346,7 +349,7 @@ def _crossing_between_nodes(problem, tables, state, scratch, s, j, node_set, h):
     before the next node.
     """
     ends, values = scratch.ends[ENDS * j : ENDS * (j + 1)], scratch.margin[S * j : S * j + S]
-    watched, t = _WATCHED_BELOW * scratch.largest[s, j], tables.times[node_set]
+    watched, t = WATCHED_BELOW * scratch.largest[s, j], tables.times[node_set]
     ends[_LOWEST] = ends[1]
     for i in range(S):
         before, after = values[i - 1] if i > 0 else ends[0], values[i + 1] if i < S - 1 else ends[1]
@@ -378,9 +381,7 @@ def _crossing_around(problem, tables, state, scratch, s, j, node_set, h, lowest)
     scratch.ends[ENDS * j + _LOWEST] = min(scratch.ends[ENDS * j + _LOWEST], -deep)
     if deep <= _INTERPOLATED * scratch.noise[s, j]:
         return np.inf
-    begin, end = tables.local_interval[node_set, lowest, 0], tables.local_interval[node_set, lowest, 1]
-    sigma = begin + 0.5 * ((place if place > LOCAL[0] else LOCAL[1]) + 1.0) * (end - begin)
-    return h * sigma ** tables.time_exponent[node_set]
+    return time_of_place(tables, node_set, h, lowest, place if place > LOCAL[0] else LOCAL[1])
 
 
 @inlined
@@ -466,7 +467,7 @@ def _estimate_rounding(problem, state, scratch, s, t, x, begin, end):
         for i in range(3):
             deltas[i], rates[i] = delta, rate
         deltas[1] += surface_tolerance(problem, s, x)
-        rates[2] += max(rate_tolerance(problem, s, x), _REST * scratch.reference_speed[s])
+        rates[2] += max(rate_tolerance(problem, s, x), REST * scratch.reference_speed[s])
         margins(problem, state, s, 3, deltas, rates, scratch.ends)
     for j in range(count):
         peak = 0.0
@@ -478,7 +479,7 @@ def _estimate_rounding(problem, state, scratch, s, t, x, begin, end):
             there = scratch.ends[3 * j : 3 * j + 3]
             rounding = abs(there[1] - there[0]) + abs(there[2] - there[0])
         scratch.largest[s, j] = max(abs(begin[j]), abs(end[j]))
-        scratch.noise[s, j] = max(_ROUNDING * max(scratch.largest[s, j], peak), 2.0 * rounding)
+        scratch.noise[s, j] = max(ROUNDING * max(scratch.largest[s, j], peak), 2.0 * rounding)
 
 
 @part(BEHIND, types.UniTuple(types.int64, 2))

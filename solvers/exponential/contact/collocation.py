@@ -154,11 +154,11 @@ def solve_forces(problem, tables, state, scratch, node_set, level):
     if _set_accuracy(problem, tables, state, scratch, tables.contact_step[level]):
         return newton(problem, tables, state, scratch, node_set, level)
     before, alone = 0.0, _single_power_law(problem, tables, state)
-    law, unit = tables.power_law[max(alone, 0)], 1.0 / scratch.force_tolerance[max(alone, 0)] ** 2
-    row = row_of(problem, max(alone, 0))
+    s = max(alone, 0)  # without such a stop what follows is not used
+    law, row, unit = tables.power_law[s], row_of(problem, s), 1.0 / scratch.force_tolerance[s] ** 2
     own = pair_response(problem, tables, scratch, node_set, level, row, row)
     stiffness, rooted, damping = law[STIFFNESS], law[EXPONENT] == 1.5, law[DAMPING]
-    factor = law[FACTOR] / state.entry_rate[max(alone, 0)]
+    factor = law[FACTOR] / state.entry_rate[s]
     for iteration in range(MOST_ITERATIONS):
         if alone >= 0:
             change, largest = iterate_power_law(

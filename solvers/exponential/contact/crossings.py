@@ -48,10 +48,12 @@ from solvers.exponential.flight import energy_norms
 
 RATE, FORCE = 1.0, 2.0  # kinds of bends in Tables.bend, named by their event function; 0 for a law without one
 CLEAR, TOO_LONG = -1, -2  # results of `before_landing`: no other event, or one that requires shorter steps
-_ON_BEND = 1e-9  # event function, in units of its largest on the step, up to which a stop counts as on its bend
-_TOGETHER = 1e-6  # the same, relative to its value at the start, by which a bend may be crossed as another stop lands
-_ROUNDING = 1e-11  # the same, in units of its largest on the step, up to which a node may be on the wrong side
-_WATCHED_BELOW = 0.2  # the same at a node, below which the motion around the node is evaluated
+# event functions of bends, and margins of borders, in units of their largest on the step:
+ROUNDING = 1e-11  # up to which they may be rounding
+ON_BORDER = 1e-9  # up to which a step counts as begun on the bend or border
+WATCHED_BELOW = 0.2  # at a node, below which the motion around the node is evaluated
+REST = 1e-14  # rate, in units of the reference speed, below which a rate at rest is rounding
+_AS_ANOTHER_LANDS = 1e-6  # event function, relative to its value at the start, by which a bend may be crossed then
 _WITHIN = 8  # a stage of DOP853 inside its step, at 0.65
 _JUST_INSIDE = 1e-3  # δ, in units of that at the start of a landing on δ = 0, at which the sign of a force is told
 
@@ -200,6 +202,13 @@ def leaves_segment(problem, tables, state, scratch, node_set, level):
 
 
 @inlined
+def time_of_place(tables, node_set, h, i, place):
+    """Time after the start of the step of a place, -1 to 1, in the interval around node i."""
+    begin, end = tables.local_interval[node_set, i, 0], tables.local_interval[node_set, i, 1]
+    return h * (begin + 0.5 * (place + 1.0) * (end - begin)) ** tables.time_exponent[node_set]
+
+
+@inlined
 def _sides(tables, state, s, n, delta, rate, out):
     """Event function of a bend, δ̇ or the force before its cut, at n points with δ >= 0, into ``out``."""
     if tables.bend[s] == RATE:
@@ -249,8 +258,8 @@ def first_bend(problem, tables, state, scratch, node_set, level, is_new):
             negligible = 0.01 * scratch.accuracy[RTOL] * scratch.reference_speed[s]
         if largest <= negligible:
             continue
-        begins_on = scratch.side[s] * begin < 0.0 or (is_new and abs(begin) <= _ON_BEND * largest)
-        if begins_on and scratch.side[s] * values[0] < -_ROUNDING * largest:
+        begins_on = scratch.side[s] * begin < 0.0 or (is_new and abs(begin) <= ON_BORDER * largest)
+        if begins_on and scratch.side[s] * values[0] < -ROUNDING * largest:
             scratch.side[s] = -scratch.side[s]
         time = _bend_at_nodes(tables, scratch, node_set, h, s, begin, largest)
         if time == np.inf:
@@ -267,7 +276,7 @@ def _bend_at_nodes(tables, scratch, node_set, h, s, begin, largest):
     values, side, before, t = scratch.bend_values, scratch.side[s], begin, 0.0
     for i in range(S + 1):
         after = h * tables.times[node_set, i] if i < S else h
-        if side * values[i] < -_ROUNDING * largest:
+        if side * values[i] < -ROUNDING * largest:
             share = before / (before - values[i]) if side * before > 0.0 else 0.0
             return t + share * (after - t)
         before, t = values[i], after
@@ -278,10 +287,10 @@ def _bend_at_nodes(tables, scratch, node_set, h, s, begin, largest):
 def _bend_between_nodes(problem, tables, state, scratch, node_set, h, s, begin, largest):
     """The time of a minimum between nodes on the wrong side, where all nodes are on the right one; or inf."""
     values, side, there = scratch.bend_values, scratch.side[s], scratch.numbers
-    tolerance = max(_ROUNDING * largest, -2.0 * side * begin)
+    tolerance = max(ROUNDING * largest, -2.0 * side * begin)
     for i in range(S):
         before, after = values[i - 1] if i > 0 else begin, values[i + 1]
-        if side * values[i] > min(side * before, side * after, _WATCHED_BELOW * largest):
+        if side * values[i] > min(side * before, side * after, WATCHED_BELOW * largest):
             continue
         motion_around(problem, tables, state, scratch, node_set, h, s, i)
         above(scratch.local_motion[DELTAS], problem.knots[s, 0], scratch.clipped)
@@ -290,8 +299,7 @@ def _bend_between_nodes(problem, tables, state, scratch, node_set, h, s, begin, 
             there[j] *= -side
         deep, place = maximum_and_place(there, 1.0, scratch.clipped)
         if deep > tolerance and place > LOCAL[0]:
-            left, right = tables.local_interval[node_set, i, 0], tables.local_interval[node_set, i, 1]
-            return h * (left + 0.5 * (place + 1.0) * (right - left)) ** tables.time_exponent[node_set]
+            return time_of_place(tables, node_set, h, i, place)
     return np.inf
 
 
@@ -317,10 +325,10 @@ def _crosses_bend(problem, tables, state, scratch, s, w, x):
     """Whether a stop crosses its bend on a landing that is not on it."""
     side = scratch.side[s]
     before = side * side_at(problem, tables, state, s, w, scratch.trial)
-    if side * side_at(problem, tables, state, s, x, scratch.trial) < -_TOGETHER * abs(before):
+    if side * side_at(problem, tables, state, s, x, scratch.trial) < -_AS_ANOTHER_LANDS * abs(before):
         return True
     turns = tables.bend[s] == RATE and not is_circle(problem, s)
-    return turns and _turns_inside(problem, scratch.stages, s, side, _TOGETHER * abs(before), state.x.size)
+    return turns and _turns_inside(problem, scratch.stages, s, side, _AS_ANOTHER_LANDS * abs(before), state.x.size)
 
 
 @inlined
@@ -342,7 +350,7 @@ def _passes_cut(problem, tables, state, scratch, stop, s, w, x):
 def _peaks_on_landing(problem, tables, state, scratch, stop, s, slopes):
     """Whether δ or the force of stop s has a maximum inside a landing; δ of one with a bend at δ̇ = 0 may end on it."""
     # a law that opens may have a border where δ̇ falls to zero
-    rest = -_TOGETHER * slopes[0] if problem.opening[s] >= 0 else 0.0
+    rest = -_AS_ANOTHER_LANDS * slopes[0] if problem.opening[s] >= 0 else 0.0
     if slopes[0] > 0.0 and slopes[1] < rest and (s != stop or tables.bend[s] != RATE):
         return True
     column, known = 2 * problem.k.size + 3 + 2 * s, state.active[s, PEAK_FORCE]

@@ -66,7 +66,7 @@ from solvers.compiled.state import (
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import land_on_circle
 from solvers.exponential.contact.borders import margins_later, margins_of, passed
-from solvers.exponential.contact.crossings import CLEAR, TOO_LONG, before_landing, force_turns, side_at
+from solvers.exponential.contact.crossings import CLEAR, ROUNDING, TOO_LONG, before_landing, force_turns, side_at
 from solvers.exponential.contact.first_step import BALANCED, NEW, NODE_SET
 from solvers.exponential.contact.landing_step import INDENTATION, ROOT, SINCE, TIME, landing_step, start_landing
 from solvers.exponential.contact.node_response import (
@@ -91,7 +91,7 @@ LAST_RESORT = 3  # the same: 1 where no step could end before the border, nor th
 _MOST_TRIALS = 8  # iterations for the step that ends at an output time
 _MIDPOINT_UP_TO = 1e-4  # change of a landing's length, relative, that the midpoint rule makes: its error is the cube
 _CLASSICAL_UP_TO = 4e-3  # the same by the classical rule, of order 4
-_ON_BORDER = 1e-6  # margin, in units of its largest, below which a landing begins on the border that it ends on
+_BEGINS_ON_BORDER = 1e-6  # margin, in units of its largest, below which a landing begins on the border that it ends on
 _STAGNATION = 1e-10  # margin, in units of its largest, below which trials that do not halve it show its rounding
 _FOUND = 1e-6  # the same, up to which a landing has found its border
 _NEAR_ZERO = 1e-4  # the same, up to which another border may be reached together with the one landed on
@@ -103,7 +103,6 @@ _MOST_BORDER_TRIALS = 40  # the same on a bend or border: it may change only nea
 _ERROR_SHARE = 0.1  # part of the embedded difference that counts as the error
 _ERROR_SHARE_FOURTH_ROOT = 3e-2  # the same with u = δ^{1/4}: terms t² = u⁸, exact in the step, make up the difference
 _DERIVATIVE_SHARE, _MOST_FACTOR = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
-_ROUNDING = 1e-11  # rounding of a margin, in units of its largest
 _SHARE_OF_CONTACT = 0.2  # longest landing in time on a border of friction, in units of the contact's duration × reach
 _SHARE_SINCE_ENTRY = 0.016  # the same of one from the entry on
 _NEAR_SURFACE = 1e-6  # δ, in units of its peak, below which its rounding may hide a border
@@ -619,7 +618,7 @@ def _guess_before_opening(problem, tables, state, scratch, stop, border, guess, 
     force = slider[STIFFNESS] * spring_stretch(radius, slider, scratch.point[1, XI]) if sticks > 0.0 else 0.0
     largest = max(abs(begin), largest)
     rounding = margin_rounding(problem, state, stop, border, state.now[T], state.x)
-    scratch.largest[stop, border], scratch.noise[stop, border] = largest, max(_ROUNDING * largest, 2.0 * rounding)
+    scratch.largest[stop, border], scratch.noise[stop, border] = largest, max(ROUNDING * largest, 2.0 * rounding)
     if end < 0.0 and border == SLIDES and slider[CODE] != FREE:
         coefficients = _margin_before_opening(problem, scratch, stop, sign, begin, end, force)
         r, slope = _root_before_opening(coefficients, kappa)
@@ -703,7 +702,7 @@ def _locate(problem, tables, state, scratch, stop, border, search):
     # With a known slope and no other margin of friction to compare, the value at the start is not needed.
     if slope == 0.0 or forward < 0.0 or problem.border_count[stop] > 1 or not rubs(problem, stop):
         value_before, sign = _event_function(problem, tables, state, scratch, stop, border, w, sign, begin)
-        begins_on_border = (value_before if border >= 0 else abs(value_before)) <= _ON_BORDER * largest
+        begins_on_border = (value_before if border >= 0 else abs(value_before)) <= _BEGINS_ON_BORDER * largest
     shortest = 0.0 if border >= 0 and not begins_on_border else 0.1 * span
     if begins_on_border and slope == 0.0:  # the secant needs another point
         span_before = 0.9 * span

@@ -52,6 +52,7 @@ from solvers.exponential.circles.friction import (
     xi_and_rate_at_nodes,
     xi_continued,
 )
+from solvers.exponential.contact.crossings import REST, ROUNDING
 from solvers.exponential.contact.first_step import NEW
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import LOCAL_SLOPES, S
@@ -61,9 +62,7 @@ from solvers.exponential.tables import STIFFNESS as ELASTICITY
 from solvers.problem.friction import CODE, CUT, FREE, MU, PEAK, PRESSES, SLIDES, STICK, STIFFNESS
 
 ENDS = 6  # margins in `Scratch.ends` for a border: at start, end; at the start with rounding, then ripple, in δ and δ̇
-_ROUNDING = 1e-11  # rounding of a margin, in units of its largest on the step
-_SLOPE_ROUNDING = 1e-8  # the same of a margin that contains the slope of a polynomial
-_REST = 1e-14  # rate, in units of the reference speed, below which a rate at rest is rounding
+_SLOPE_ROUNDING = 1e-8  # of a margin, in units of its largest, that contains the slope of a polynomial
 _TINY = 1e-300  # m, keeps N/δ finite
 _DIFFERENCE_STEP = 1e-6  # relative step in δ and δ̇ for differences of the slopes of N
 _LEFT_OUT, _CLEAR_OF_ZERO = 4.0, 0.05  # see `_ends_by_polynomial`
@@ -291,7 +290,7 @@ def _add_rounding(problem, state, scratch, s, by, ripple, faster):
     of_delta, of_rate, of_normal, of_its_rate = by
     slider, slips = slider_of(problem, s), _slips(slider_of(problem, s))
     xi, xi_rate = xi_tolerances(problem, s, state.now[T], state.x)
-    rest, of_way = _REST * scratch.reference_speed[s], slider[STIFFNESS] if slider[CODE] == STICK else 0.0
+    rest, of_way = REST * scratch.reference_speed[s], slider[STIFFNESS] if slider[CODE] == STICK else 0.0
     delta, rate = surface_tolerance(problem, s, state.x), max(rate_tolerance(problem, s, state.x), rest)
     for j in range(problem.border_count[s]):
         by, of_speed = (of_delta, of_rate, of_way), 1.0 if slips else 0.0
@@ -301,7 +300,7 @@ def _add_rounding(problem, state, scratch, s, by, ripple, faster):
             scratch.ends[ENDS * j + 4] += (by[0] + by[2]) * ripple + of_speed * faster
         noise = by[0] * delta + by[1] * rate + by[2] * xi + of_speed * max(xi_rate, rest)
         differenced = j == SLIDES and slips and _rate_dependent(problem, s)
-        share = _SLOPE_ROUNDING if differenced else _ROUNDING
+        share = _SLOPE_ROUNDING if differenced else ROUNDING
         scratch.noise[s, j] = max(share * scratch.largest[s, j], 2.0 * noise)
 
 
