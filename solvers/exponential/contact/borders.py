@@ -30,7 +30,7 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.parts import BEHIND, PASSED, part
 from solvers.compiled.renewals import count_event, margins, margins_after, margins_in, renew
-from solvers.compiled.simd import load8, splat8, sum8
+from solvers.compiled.simd import load8
 from solvers.compiled.sliding import DELTA, RATE
 from solvers.compiled.state import AT_ONCE, LAST_EVENT, PEAK_FORCE, T, rate_tolerance
 from solvers.exponential.circles.friction import TANGENTIAL
@@ -54,7 +54,7 @@ from solvers.exponential.contact.node_response import (
     ripple_of,
 )
 from solvers.exponential.contact.nodes import LOCAL, S
-from solvers.exponential.contact.peaks import maximum_and_place, motion_around
+from solvers.exponential.contact.peaks import maximum_and_place, motion_around, polynomial
 from solvers.exponential.contact.slider_margins import (
     ENDS,
     margin_rounding,
@@ -76,7 +76,6 @@ _LONGER = 8.0  # factor of the time of extrapolation until it is clear whether a
 _ROOT_FOUND = 1e-6  # value of the polynomial, in units of the largest margin, that ends the search for its root
 _ROOT_EXPECTED = 1e-4  # the same beyond the end of the step, where the polynomial is no better
 _SLOPE_STEP = 1e-5  # relative step in σ for the slope of this polynomial at its root
-_OFF_NODES = 1e-200  # keeps σ off a node where this polynomial is evaluated
 _MOST_ILLINOIS = 6  # iterations for a root of the polynomial through the nodes
 _INTERPOLATED = 4.0  # rounding of a margin at points around a node, in units of that at the nodes
 _LOWEST = 2  # place in `Scratch.ends`, once the rounding is known, of the lowest margin at the end or between nodes
@@ -216,12 +215,8 @@ def _before_first_node(problem, state, scratch, s, j, start, time, h):
 
 @inner
 def _polynomial(tables, scratch, j, node_set, sigma):
-    """Value at σ of the polynomial through margin j at the nodes: Π (σ - σ_i) Σ w_i margin_i/(σ - σ_i)."""
-    nodes, product = tables.nodes[node_set], 1.0
-    for i in range(S):
-        product *= sigma - nodes[i] + _OFF_NODES
-    apart = splat8(sigma) - load8(nodes, 0) + splat8(_OFF_NODES)
-    return product * sum8(load8(tables.lagrange[node_set, 0], 0) * load8(scratch.margin, S * j) / apart)
+    """Value at σ of the polynomial through margin j at the nodes."""
+    return polynomial(tables, node_set, load8(scratch.margin, S * j), sigma)
 
 
 @inlined

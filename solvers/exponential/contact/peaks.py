@@ -2,8 +2,8 @@
 
 In the interval between the neighbours of the highest node, δ and δ̇ at eight points are interpolated by Hermite's
 polynomial of degree 17 through δ and δ̇ at all nodes and at the start of the step; the forces there are those of the
-law. The maximum of the polynomial through these points differs less from that of the motion than the motion from the
-exact one.
+law. On steps so short that rounding of δ would show in δ̇, the values of δ̇ alone tell it. The maximum of the polynomial
+through these points differs less from that of the motion than the motion from the exact one.
 """
 
 from __future__ import annotations
@@ -25,15 +25,26 @@ from solvers.compiled.kernels import (
     slider_of,
     surface_tolerance,
 )
-from solvers.compiled.simd import largest8, load8
+from solvers.compiled.simd import largest8, load8, splat8, sum8
 from solvers.compiled.sliding import slider_force
 from solvers.compiled.state import PEAK_DELTA, PEAK_FORCE, T, acting_segment, begins_and_ends
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, force_of, motion_of, own_accelerance
+from solvers.exponential.contact.node_response import (
+    DELTAS,
+    FORCES,
+    KNOWN,
+    RATES,
+    force_of,
+    largest_size,
+    motion_of,
+    own_accelerance,
+)
 from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S
 from solvers.problem.friction import MU, PEAK
 
 _MOST_NEWTON_STEPS = 6  # to a maximum
+_HIDES_RATES = 1e-11  # rounding of δ, over the way on a step, above which it shows in slopes of polynomials
+_OFF_NODES = 1e-200  # keeps σ off a node where a polynomial is evaluated
 _BELOW_PEAK = 0.95  # of a peak: if all node values are below, no higher maximum is between them
 
 
@@ -109,6 +120,16 @@ def _highest_node(tables, values, node_set, limit):
 
 
 @inner
+def polynomial(tables, node_set, values, sigma):
+    """Value at σ of the polynomial through eight values y_i at the nodes: Π (σ - σ_i) Σ w_i y_i/(σ - σ_i)."""
+    nodes, product = tables.nodes[node_set], 1.0
+    for i in range(S):
+        product *= sigma - nodes[i] + _OFF_NODES
+    apart = splat8(sigma) - load8(nodes, 0) + splat8(_OFF_NODES)
+    return product * sum8(load8(tables.lagrange[node_set, 0], 0) * values / apart)
+
+
+@inner
 def motion_around(problem, tables, state, scratch, node_set, h, s, place):
     """Indentations and rates of stop s at points around a node of the step, into ``scratch.local_motion``."""
     local_motion, motion, known = scratch.local_motion, motion_of(problem, scratch, s), scratch.local_motion[KNOWN]
@@ -118,8 +139,14 @@ def motion_around(problem, tables, state, scratch, node_set, h, s, place):
     known[2 * S] = indentation(problem, s, state.x)
     known[2 * S + 1] = h * indentation_rate(problem, s, state.x)
     combine(tables.local_interpolation[node_set, place], known, 2 * S + 2, None, local_motion[DELTAS])
+    if surface_tolerance(problem, s, state.x) <= _HIDES_RATES * h * largest_size(motion[1]):
+        for i in range(S):
+            local_motion[RATES, i] = local_motion[DELTAS, S + i] / h
+        return
+    begin, end = tables.local_interval[node_set, place]
     for i in range(S):
-        local_motion[RATES, i] = local_motion[DELTAS, S + i] / h
+        sigma = begin + 0.5 * (LOCAL[i] + 1.0) * (end - begin)
+        local_motion[RATES, i] = polynomial(tables, node_set, load8(motion[1], 0), sigma)
 
 
 @merged
