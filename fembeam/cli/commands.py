@@ -18,6 +18,7 @@ from fembeam.cli.messages import (
     interrupted,
     one_line,
     say,
+    show_doubts,
     show_warning,
     warned,
     write_anywhere,
@@ -196,11 +197,8 @@ def _check(arguments: argparse.Namespace) -> int:
     from fembeam.inspection import check
 
     file = _read(arguments)
-    study: Any = file.studies.get("simulate")
-    of_run = {} if study is None else {"duration": study.duration, "dt": study.dt, "discard": study.discard}
-    found = check(file.model(**_counted(arguments.modes)), **of_run)
-    for doubt in (one for one in found if one not in warned):  # the scene itself warned when it was made
-        show_warning(doubt)
+    found = check(file.model(**_counted(arguments.modes)), **file.of_run)
+    show_doubts(found)
     _print(found.plain() | {"warnings": warned} if arguments.json else replace(found, warnings=[]), arguments.json)
     return 0
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 import json
 import time
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fembeam.cli.messages import BAD_INPUT, FAILED, interrupted, one_line, say, warned
+from fembeam.cli.messages import BAD_INPUT, FAILED, interrupted, one_line, say, show_doubts, warned
 from fembeam.results import files as report
 from fembeam.results import folder as folders
 from fembeam.support import interrupts
@@ -31,6 +32,22 @@ class Job:
     resume: bool = False
     quiet: bool = False
     json: bool = False
+
+    @cached_property
+    def model(self) -> Model:
+        """The scene reduced as [reduce] says."""
+        return self.file.model()
+
+    @cached_property
+    def doubts(self) -> list[str]:
+        """What `fembeam check` warns of; none where the scene cannot be reduced, which the study says."""
+        from fembeam.inspection import doubts
+
+        try:
+            return doubts(self.model, **self.file.of_run)
+        except (ValueError, ArithmeticError, MemoryError, RuntimeError):
+            interrupts.check()  # a compiler that is stopped in the middle raises what it likes
+            return []
 
 
 @dataclass
@@ -110,6 +127,7 @@ def _study_outcome(job: Job, name: str) -> Outcome:
         return _kept_results(name, files)
     try:
         folders.record(job.folder, name, scene, [])
+        show_doubts(_doubts(job, name))
         outcome = _simulation(job) if name == "simulate" else _computed(job, name)
         with interrupts.deferred():
             folders.record(job.folder, name, scene, [] if outcome.code else outcome.files)
@@ -121,6 +139,14 @@ def _study_outcome(job: Job, name: str) -> Outcome:
     if interrupts.received():
         outcome.code, outcome.last = outcome.code or interrupted(), True
     return outcome
+
+
+def _doubts(job: Job, name: str) -> list[str]:
+    """What looks wrong before a study: of one that takes modes of its own, with the numbers of the scene alone."""
+    from fembeam.inspection.units import of_bodies
+    from fembeam.scene_file.study_tables import OWN_MODES
+
+    return of_bodies(job.file.scene) if name in OWN_MODES else job.doubts
 
 
 def _how_to_resume(job: Job, name: str) -> str:
@@ -169,7 +195,7 @@ def _computed(job: Job, name: str) -> Outcome:
 def _simulation(job: Job) -> Outcome:
     """The study [simulate]."""
     started, study = time.perf_counter(), job.file.studies["simulate"]
-    model = job.file.model()
+    model = job.model
     if not job.quiet:
         say(f"{len(model.omega)} modes: " + ", ".join(f"{w:.6g}" for w in model.omega) + " rad/s")
     with interrupts.deferred():
@@ -179,9 +205,9 @@ def _simulation(job: Job) -> Outcome:
             say(f"error: {job.file.placed('[simulate]', error)}")
             return Outcome(BAD_INPUT)
         found = report.summary(done, study.discard, time.perf_counter() - started, study.outputs)
+        found["warnings"] = list(warned)
         outcome = Outcome(code, found, report.text(found))
         try:
-            found = {**found, "warnings": list(warned)}
             outcome.files = report.write(done, job.folder, study.discard, found, study.outputs)
         except OSError as error:
             outcome.code, outcome.last = _unwritten(error).code, True

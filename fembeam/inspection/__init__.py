@@ -4,4 +4,4 @@
 `sampling` what looks wrong with duration and steps. Imports: `study` and what it imports. Begin with `check`.
 """
 
-from fembeam.inspection.check import Check, check
+from fembeam.inspection.check import Check, check, doubts

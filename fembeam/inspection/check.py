@@ -134,15 +134,33 @@ def check(
         steps["output step dt, 20 in the shortest period kept"] = 2 * math.pi / (20 * fastest(model))
     if shortest < math.inf:
         steps["output step dt to see the force, 20 in a contact"] = shortest / 20
-    moved = getattr(model.scene.beam, "doubts", [])
-    found = [*model.scene.doubts, *moved, *said, *units.doubts(model), *sampling.of_run(model, duration, dt, discard)]
-    found += [*failed, *of_contacts(model, touched)]
+    found = _sentences(model, (touched, failed), (duration, dt, discard), said)
     modes = _suggested_modes(model.scene, shortest)
     return Check(model, touched, steps | _limits(model), modes, _correlation_time(model), found)
 
 
+def doubts(model: Model, duration: float | None = None, dt: float | None = None, discard: float = 0.0) -> list[str]:
+    """The warnings of `check` alone, without what its tables need: the model is not reduced again."""
+    return _sentences(model, expected(model), (duration, dt, discard))
+
+
+def _sentences(
+    model: Model,
+    trial: tuple[list[Touched], list[str]],
+    run: tuple[float | None, float | None, float],
+    said: Sequence[str] = (),
+) -> list[str]:
+    """What looks wrong with a scene, its numbers, a run of (duration, dt, discard), and the contacts of its trial."""
+    touched, failed = trial
+    moved = getattr(model.scene.beam, "doubts", [])
+    found = [*model.scene.doubts, *moved, *said, *units.doubts(model), *sampling.of_run(model, *run)]
+    return [*found, *failed, *of_contacts(model, touched)]
+
+
 def _suggested_modes(scene: Scene, shortest: float) -> dict[str, int]:
-    """Numbers of modes for what drives the beam and for its contacts."""
+    """Numbers of modes for what drives the beam and for its contacts: the last is the first above the limit, which
+    shows that none below is missing, so that `of_contacts` and `units.of_loads` do not warn of them.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         try:
@@ -152,11 +170,11 @@ def _suggested_modes(scene: Scene, shortest: float) -> dict[str, int]:
     wanted = {}
     top = units.highest_driven(scene)
     if 0 < top < math.inf:
-        wanted["modes for the motion, up to 1.5 times the highest frequency that drives it"] = 1.5 * top
+        wanted["modes for the motion, to the first above 1.5 times the highest frequency that drives it"] = 1.5 * top
     if shortest < math.inf:
-        wanted["modes for contact forces, up to 3π over the contact time"] = 3 * math.pi / shortest
-    counts = {name: max(1, int(np.count_nonzero(omega <= w))) for name, w in wanted.items()}
-    return {name if n < MOST_MODES else f"{name} (at least)": n for name, n in counts.items()}
+        wanted["modes for contact forces, to the first above 3π over the contact time"] = 3 * math.pi / shortest
+    counts = {name: 1 + int(np.count_nonzero(omega <= w)) for name, w in wanted.items()}
+    return {name if n <= len(omega) else f"{name} (at least)": min(n, len(omega)) for name, n in counts.items()}
 
 
 def _limits(model: Model) -> dict[str, float]:

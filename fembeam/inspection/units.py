@@ -21,11 +21,15 @@ STICKY = 3.0  # a coefficient of friction beyond that of rubber
 
 def doubts(model: Model) -> list[str]:
     """Warnings about the numbers of a model's scene, as sentences; of its bodies, too."""
-    scene = model.scene
+    return [*of_bodies(model.scene), *of_loads(model.scene, model)]
+
+
+def of_bodies(scene: Scene) -> list[str]:
+    """Those that need no modes: about beams, frames, and what stands on them."""
     found = _of_body(scene)
     for i, body in enumerate(scene.bodies):
         found += [f"bodies[{i}]: {said}" for said in _of_body(body)]
-    return [*found, *of_loads(scene, model)]
+    return found
 
 
 def _of_body(scene: Scene) -> list[str]:

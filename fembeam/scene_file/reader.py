@@ -40,6 +40,12 @@ class SceneFile:
         """The file."""
         return self.source.path
 
+    @property
+    def of_run(self) -> dict[str, Any]:
+        """Duration, output step and transient of [simulate], for `fembeam.inspection`; empty without that study."""
+        study = self.studies.get("simulate")
+        return {} if study is None else {"duration": study.duration, "dt": study.dt, "discard": study.discard}
+
     def model(self, **others: Any) -> Model:
         """The scene reduced as [reduce] says, or with other arguments; ValueError names the file."""
         try:

@@ -808,3 +808,4 @@ STUDIES: Constructors = {
     "vary": VaryTable,
     "minimise": MinimiseTable,
 }
+OWN_MODES = ("campbell", "mode_count", "smallest_model", "speed_accuracy")  # choose modes themselves, beside [reduce]
