@@ -270,7 +270,9 @@ def test_an_ensemble_is_written_and_goes_on(tmp_path, capsys):
     assert (out / "ensemble.npz").stat().st_mtime_ns == before
     ensemble_scene(tmp_path, ("gap = 0.0", "gap = 1e-4"))
     said = said_on_failure(capsys, 2, "run", path, "--out", out, "--resume")
-    assert "belongs to another study: stops is" in said
+    assert "belongs to another study: stops[0].gap is 0.0 there and 0.0001 here; set it back" in said
+    said = refused(capsys, "run", path, "--out", out)
+    assert "of another scene: stops[0].gap is 0.0 there and 0.0001 here; set it back and add --resume" in said
 
 
 @pytest.mark.parametrize(
@@ -336,7 +338,10 @@ def test_every_study_is_run_and_kept(tmp_path, capsys):
     changed = [p.name for p in written if p.stat().st_mtime_ns != written[p]]
     assert sorted(changed) == [*(f"mode_count.{kind}" for kind in ("csv", "json", "npz", "png", "txt")), "studies.json"]
     other = "--set", "mode_count.counts=[1, 3]", "--set", "branch.span=[150.0, 200.0]"
-    assert "belongs to another branch" in said_on_failure(capsys, 2, *again, *other)
+    said = said_on_failure(capsys, 2, *again, *other)
+    assert "belongs to another branch: span[0] is 194.0 there and 150.0 here; span[1] is 196.0 there" in said
+    said = said_on_failure(capsys, 2, *again, "--set", "base.amplitude=2e-4")
+    assert re.search(r"belongs to another scene: base\.amplitude is 0\.\d+ there and 0\.0002 here; set it back", said)
     (out / "studies.json").write_text("{")
     assert "studies.json is damaged" in said_on_failure(capsys, 2, *again)
 
@@ -358,7 +363,8 @@ def test_a_study_that_fails_does_not_stop_the_others(tmp_path, capsys):
     assert "Mode count" in text
     assert "Contacts" in text
     assert "Orbit" not in text
-    assert set(json.loads((out / "studies.json").read_text())) == {"simulate", "mode_count"}
+    recorded = json.loads((out / "studies.json").read_text())
+    assert {name for name, one in recorded.items() if one["files"]} == {"simulate", "mode_count"}
 
 
 def test_a_report_shows_one_scene_only(tmp_path, capsys):

@@ -217,7 +217,9 @@ def test_studies_of_modes_go_on_where_they_were_interrupted(tmp_path, monkeypatc
         found = call(checkpoint=kept)
         one, other = ([{**row, "seconds": 0.0} for row in each.table()] for each in (whole, found))
         np.testing.assert_equal(one, other)
-        with pytest.raises(ValueError, match="belongs to another study: study is amplitude there and rms here"):
+        with pytest.raises(
+            ValueError, match=r"belongs to another study: study\.quantity is 'amplitude' there and 'rms' here"
+        ):
             study(quantity="rms", checkpoint=kept, **runs)
     rows = mode_count(SCENE, [1, 4], "amplitude", checkpoint=tmp_path / "mode_count.npz", **runs).rows
     assert [row.modes for row in rows] == [1, 4, 1, 4]

@@ -94,7 +94,9 @@ def _check_checkpoints(job: Job, studies: list[str]) -> None:
     for name in studies:
         path = job.folder / f"{name}.npz"
         if path.exists():
-            raise ValueError(f"{path} holds results of [{name}]: add --resume to continue, delete it to start "
+            said = folders.changed(job.folder, job.file, name)
+            of = f" of another scene: {said}; set it back and add" if said else ": add"
+            raise ValueError(f"{path} holds results of [{name}]{of} --resume to continue, delete the file to start "
                              "anew, or choose another folder")  # fmt: skip
 
 
@@ -126,11 +128,12 @@ def _study_outcome(job: Job, name: str) -> Outcome:
             say(f"[{name}] is done already; its results are kept")
         return _kept_results(name, files)
     try:
-        folders.record(job.folder, name, scene, [])
+        folders.record(job.folder, job.file, name)
         show_doubts(_doubts(job, name))
         outcome = _simulation(job) if name == "simulate" else _computed(job, name)
         with interrupts.deferred():
-            folders.record(job.folder, name, scene, [] if outcome.code else outcome.files)
+            if not outcome.code:
+                folders.record(job.folder, job.file, name, outcome.files)
     except OSError as error:
         return _unwritten(error)
     except KeyboardInterrupt:

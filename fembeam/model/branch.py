@@ -17,7 +17,7 @@ import solvers
 from fembeam.model.equations import load_period
 from fembeam.model.orbit import Orbit, checked_period, orbit
 from fembeam.scene import changes_structure, path_of, replaced, value_of
-from fembeam.support import Part, Printed, counting, note, numbers, require, write_rows, written_whole
+from fembeam.support import Part, Printed, changes, counting, note, numbers, require, write_rows, written_whole
 from solvers.branches import recorded, restarted
 from solvers.problem import counted, dataframe
 
@@ -211,11 +211,17 @@ def _checked_span(span: Any) -> tuple[float, float]:
 def resumed(model: Model, path: str | Path) -> Branch:
     """A saved branch of this model, to be continued."""
     record = _record_of(path)
-    same = record["scene"] == repr(model.scene) and tuple(record["modes"]) == tuple(model.modes)
+    differing = [
+        changes(record["scene"], repr(model.scene)),
+        changes(repr(tuple(record["modes"])), repr(tuple(model.modes)), "modes"),
+    ]
     omega = np.array(record["omega"])
-    same = same and omega.shape == model.omega.shape and bool(np.allclose(omega, model.omega, rtol=SAME, atol=0.0))
-    require(same, f"{path} belongs to another scene, other modes or another mesh", record["modes"], "Model.resume",
-            f"use the model of {record['scene']}")  # fmt: skip
+    same = omega.shape == model.omega.shape and bool(np.allclose(omega, model.omega, rtol=SAME, atol=0.0))
+    if not same and not any(differing):
+        differing = [f"the frequencies, {omega} there and {model.omega} here in rad/s, of another mesh"]
+    if said := "; ".join(filter(None, differing)):
+        raise ValueError(f"{path} belongs to another scene: {said}; set it back, delete the file to begin anew, "
+                         "or choose another place")  # fmt: skip
     family = Family(model, record["name"], record["period"])
     return Branch(family, restarted(family, record["walks"]))
 

@@ -66,7 +66,7 @@ from fembeam.study.smallest_model import MOST, SmallestModel, check_goal, smalle
 from fembeam.study.stationary import FEWEST_IN_SEGMENT
 from fembeam.study.trial import Trial
 from fembeam.study.variation import points_of
-from fembeam.support import Part, require, require_non_negative, require_positive
+from fembeam.support import Part, changes, require, require_non_negative, require_positive
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -435,11 +435,14 @@ class BranchTable:
         """A saved branch answers this table."""
         walk = branch.found.walks[0]
         begun = walk.first.chain.parameter
-        theirs = branch.family.name, branch.family.period, *map(float, walk.span), walk.largest, begun
-        at = begun if self.at is None else float(self.at)
-        mine = path_of(model.scene, self.parameter), self.period, *map(float, self.span), self.step, at
-        require(theirs == mine, f"{path} belongs to another branch", theirs, "[branch]",
-                f"parameter, period, span, step, at are {mine} here; choose another folder or delete it")  # fmt: skip
+        theirs = {"parameter": branch.family.name, "period": branch.family.period, "span": tuple(map(float, walk.span)),
+                  "step": walk.largest, "at": begun}  # fmt: skip
+        mine = {"parameter": path_of(model.scene, self.parameter), "period": self.period,
+                "span": tuple(map(float, self.span)), "step": self.step,
+                "at": begun if self.at is None else float(self.at)}  # fmt: skip
+        if said := changes(repr(theirs), repr(mine)):
+            raise ValueError(f"{path} belongs to another branch: {said}; set it back, delete the file to begin anew, "
+                             "or choose another folder")  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,9 +29,8 @@ from fembeam.model import Model, Run, load_period
 from fembeam.response import latched_before, mean_force
 from fembeam.scene import Scene, signals_of
 from fembeam.study.decay import correlation_time
-from fembeam.study.execution.checkpoint import Checkpoint, scene_identity
+from fembeam.study.execution.checkpoint import Checkpoint, digested, scene_identity
 from fembeam.study.execution.executors import spread
-from fembeam.study.execution.fingerprint import fingerprint
 from fembeam.study.quantities import Quantity, label
 from fembeam.study.realisations import child, renewed, seed_key
 from fembeam.support import is_whole, require, require_non_negative, require_positive
@@ -169,7 +168,8 @@ def measured(cases: Sequence[Case], executor: Executor | None, told: str, kept: 
 
 def identity_of(scene: Scene, plan: Plan, quantity: Quantity) -> dict[str, str]:
     """What the measures of a model depend on besides how it is reduced and its solver."""
-    return scene_identity(scene) | {"study": f"{label(quantity)} #{fingerprint((plan, quantity), 'the study')}"}
+    told = digested((plan, quantity), "the study", repr({"quantity": label(quantity), "plan": plan}))
+    return scene_identity(scene) | {"study": told}
 
 
 def measure(case: Case) -> list[Measured]:

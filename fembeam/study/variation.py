@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from fembeam import plot
 from fembeam.scene import Scene
 from fembeam.statistics import Estimate
-from fembeam.study.execution.checkpoint import Checkpoint, scene_identity
+from fembeam.study.execution.checkpoint import Checkpoint, digested, scene_identity
 from fembeam.study.execution.executors import spread
-from fembeam.study.execution.fingerprint import fingerprint
 from fembeam.study.measure import Plan, Start
 from fembeam.study.result import Result
 from fembeam.study.trial import Asked, Maker, Refused, Trial
@@ -234,7 +233,8 @@ def _key(point: Vector) -> str:
 def identity_of(trial: Trial) -> dict[str, str]:
     """What the values of a point depend on besides the point."""
     study = trial.plan, trial.method, trial.asked, sorted(trial.reduction.items())
-    told = f"{', '.join(trial.asked.names)} #{fingerprint(study, 'the study')}"
+    shown = {"quantities": trial.asked.names, "plan": trial.plan, "solver": trial.method, "reduce": trial.reduction}
+    told = digested(study, "the study", repr(shown))
     return scene_identity(trial.scene) | {"parameters": ", ".join(trial.names), "study": told}
 
 

@@ -3,6 +3,7 @@
 Imports nothing of ours.
 """
 
+from fembeam.support.changes import changes
 from fembeam.support.checks import (
     frozen,
     in_mm,

@@ -18,7 +18,7 @@ from fembeam.model import Model
 from fembeam.scene import Scene
 from fembeam.study.execution.fingerprint import fingerprint
 from fembeam.study.realisations import renewed
-from fembeam.support import require, written_whole
+from fembeam.support import changes, require, written_whole
 
 FORMAT = 2
 Values = dict[str, NDArray[Any]]
@@ -75,8 +75,11 @@ class Checkpoint:
         names = sorted({*theirs, *self.about})
         differing = [name for name in names if _deciding(theirs.get(name)) != _deciding(self.about.get(name))]
         if differing:
-            pairs = [_difference(name, theirs.get(name), self.about.get(name)) for name in differing]
-            raise ValueError(f"checkpoint {path} belongs to another study: {'; '.join(pairs)}; give another path")
+            named = [name for name in differing if name != "frequencies"] or differing  # they follow from the others
+            pairs = [_difference(name, theirs.get(name), self.about.get(name)) for name in named]
+            said = [one for one, seen in pairs if seen] or [one for one, _ in pairs]
+            raise ValueError(f"checkpoint {path} belongs to another study: {'; '.join(said)}; set it back, "
+                             "delete the file to begin anew, or choose another place")  # fmt: skip
 
 
 def identity(model: Model, quantity: Callable[..., Any]) -> dict[str, str]:
@@ -90,13 +93,16 @@ def identity(model: Model, quantity: Callable[..., Any]) -> dict[str, str]:
     ------
     ValueError : something the quantity or the scene reads cannot be told from another of its kind.
     """
-    asked = f"{_name(quantity)} #{fingerprint(quantity, 'the quantity')}"
+    asked = digested(quantity, "the quantity", _name(quantity))
     return model_identity(renewed(model, lambda j, _: j)) | {"quantity": asked}
 
 
 def model_identity(model: Model) -> dict[str, str]:
     """The same of a model: its scene, seeds among it, and its modes."""
-    return scene_identity(model.scene) | {"modes": repr(model.modes), "frequencies": fingerprint(model.omega)}
+    return scene_identity(model.scene) | {
+        "modes": repr(model.modes),
+        "frequencies": digested(model.omega, "frequencies", f"[{', '.join(f'{w:.6g}' for w in model.omega)}]"),
+    }
 
 
 def scene_identity(scene: Scene | Callable[..., Scene]) -> dict[str, str]:
@@ -104,20 +110,21 @@ def scene_identity(scene: Scene | Callable[..., Scene]) -> dict[str, str]:
     from fembeam import __version__
 
     parts = [f.name for f in fields(scene)] if is_dataclass(scene) else []
-    about = {name: _digested(getattr(scene, name), name) for name in parts} or {"scene": _digested(scene, "scene")}
+    about = {name: digested(getattr(scene, name), name) for name in parts} or {"scene": digested(scene, "scene")}
     return about | {"fembeam": __version__}
 
 
-def _digested(value: Any, name: str) -> str:
-    """A part of a scene as text to be read, then its digest to be compared."""
-    readable = re.sub(" at 0x[0-9a-f]+", "", repr(value)).replace(" #", " ")
+def digested(value: Any, name: str, text: str | None = None) -> str:
+    """A part of a scene or study as text to be read, its `repr` if none is given, then its digest to be compared."""
+    readable = re.sub(" at 0x[0-9a-f]+", "", repr(value) if text is None else text).replace(" #", " ")
     return f"{readable} #{fingerprint(value, name)}"
 
 
 def _name(quantity: Any) -> str:
-    """A callable by its name."""
+    """A callable by its name, with the arguments that it is given already."""
     if isinstance(quantity, partial):
-        return _name(quantity.func)
+        given = [*map(repr, quantity.args), *(f"{key}={one!r}" for key, one in quantity.keywords.items())]
+        return f"{_name(quantity.func)}({', '.join(given)})"
     return f"{getattr(quantity, '__module__', '')}.{getattr(quantity, '__qualname__', type(quantity).__qualname__)}"
 
 
@@ -126,16 +133,15 @@ def _deciding(text: str | None) -> str | None:
     return None if text is None else text.partition(" #")[2] or text
 
 
-def _difference(name: str, theirs: str | None, ours: str | None) -> str:
-    """What differs, as text."""
+def _difference(name: str, theirs: str | None, ours: str | None) -> tuple[str, bool]:
+    """What differs, and whether its text shows it."""
     readable = [None if text is None else text.partition(" #")[0] for text in (theirs, ours)]
-    if readable[0] == readable[1]:
-        return f"{name} {_short(readable[1])} has other code, or reads other values, than there"
-    return f"{name} is {_short(readable[0])} there and {_short(readable[1])} here"
+    said = changes(readable[0] or "not there", readable[1] or "not there", name)
+    unseen = f"{name} {_short(readable[1])} has other code, or reads other values, than there"
+    return said or unseen, bool(said)
 
 
 def _short(text: str | None) -> str:
     """A text shortened for a message."""
-    if text is None:
-        return "not there"
+    text = str(text)
     return text if len(text) <= 160 else f"{text[:80]}…{text[-78:]}"
