@@ -117,7 +117,7 @@ def test_bad_input_is_one_line_and_exit_code_two(tmp_path, capsys):
     assert "did you mean 'mass'?" in refused(capsys, "run", path, *out)
     path = scene(tmp_path, ("modes = 2", "modes = 50\nelements = 4"))
     assert "[reduce]: modes must be at most 8" in refused(capsys, "run", path, *out)
-    assert "[reduce]: modes must be a count above 0" in refused(capsys, "modes", EXAMPLE, "--modes", "0")
+    assert "with --modes 0: modes must be a count above 0" in refused(capsys, "modes", EXAMPLE, "--modes", "0")
     no_study = tmp_path / "no_study.toml"
     no_study.write_text(path.read_text().split("[reduce]")[0])
     assert "needs a study, such as a table [simulate]" in refused(capsys, "run", no_study, *out)
@@ -432,6 +432,27 @@ def test_every_example_in_the_new_scene_is_right(tmp_path, number):
     path = tmp_path / "scene.toml"
     path.write_text(text, encoding="utf-8")
     read(path).scene.reduce(modes=3)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--set", "stops.0.gap=abc"), "with --set stops.0.gap=abc: [[stops]] number 1: gap must be a number"),
+        (("--set", "beam.section.E=-1"), "with --set beam.section.E=-1: [beam] section: E must be finite"),
+        (("--set", "masses[0].z=9"), "with --set masses[0].z=9: the scene: z must lie on the beam"),
+        (("--set", "stopps.0.gap=1"), "with --set stopps.0.gap=1: the file: unknown table 'stopps'"),
+        (("--set", "reduce.modes=500"), "with --set reduce.modes=500: [reduce]: modes must be at most 300"),
+        (("--modes", "-3"), "with --modes -3: modes must be a count above 0"),
+        (("--modes", "400"), "with --modes 400: modes must be at most 300"),
+    ],
+)
+def test_an_option_is_blamed_for_its_value_and_no_line_of_the_file(capsys, options, message):
+    assert f"beam_stop.toml {message}" in refused(capsys, "check", EXAMPLE, *options)
+
+
+def test_a_line_is_blamed_beside_the_option_that_does_not_agree_with_it(capsys):
+    said = refused(capsys, "check", EXAMPLE, "--set", "beam.length=0.2")
+    assert re.search(r"beam_stop\.toml:\d+: the scene with --set beam\.length=0\.2: z must lie on the beam", said)
 
 
 def test_a_stop_that_is_too_soft(capsys):

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     import argparse
     from collections.abc import Sequence
 
+    from fembeam.model import Model
     from fembeam.scene_file import SceneFile
 
 MODES_SHOWN = 10
@@ -197,7 +198,7 @@ def _check(arguments: argparse.Namespace) -> int:
     from fembeam.inspection import check
 
     file = _read(arguments)
-    found = check(file.model(**_counted(arguments.modes)), **file.of_run)
+    found = check(_model(file, arguments.modes), **file.of_run)
     show_doubts(found)
     _print(found.plain() | {"warnings": warned} if arguments.json else replace(found, warnings=[]), arguments.json)
     return 0
@@ -218,7 +219,7 @@ def _modes(arguments: argparse.Namespace) -> int:
 
     file = _read(arguments)
     usual = None if {"modes", "omega_max", "mass_share"} & set(file.reduce) else MODES_SHOWN
-    model = file.model(**_counted(usual if arguments.modes is None else arguments.modes))
+    model = file.model(**_counted(usual)) if arguments.modes is None else _model(file, arguments.modes)
     _print(mode_rows(model) if arguments.json else mode_table(model), arguments.json)
     return 0
 
@@ -264,6 +265,17 @@ def _read(arguments: argparse.Namespace) -> SceneFile:
     from fembeam import scene_file
 
     return scene_file.read(arguments.scene, arguments.set)
+
+
+def _model(file: SceneFile, modes: int | None) -> Model:
+    """The model with the modes that --modes asks for, which is named where that number is refused."""
+    try:
+        return file.model(**_counted(modes))
+    except ValueError as error:
+        refused = str(error.__cause__)
+        if modes is None or not refused.startswith("modes"):
+            raise
+        raise ValueError(f"{file.path} with --modes {modes}: {refused}") from error
 
 
 def _counted(modes: int | None) -> dict[str, Any]:

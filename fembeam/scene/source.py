@@ -12,6 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+TABLE = re.compile(r"\[\[?(\w+)(?:\.(\w+))?\]\]?(?: number (\d+))?(.*)")  # what messages call tables
 HEADER = re.compile(r"^\s*\[\[?\s*([\w.\"' -]+?)\s*\]")
 
 
@@ -53,15 +54,26 @@ class Source:
     def place(self, where: str, message: str = "") -> str:
         r"""`path:line: where`, as editors like it; the line is that of the table, or of the key the message names.
 
+        A value that an override gave is in no line: it is named in its place. Overrides of the same table, and all
+        where the scene as a whole is wrong, are named beside the line.
+
         Examples
         --------
         >>> Source(Path("a.toml"), "[[masses]]\nz = 1\nmas = 2").place("[[masses]] number 1", "unknown key 'mas'")
         'a.toml:3: [[masses]] number 1'
         >>> Source(Path("a.toml"), "[[stops]]\nkind = 1\n[base.x]\nkind = 2").place("[base.x]", "kind must be")
         'a.toml:4: [base.x]'
+        >>> Source(Path("a.toml"), "[[masses]]\nz = 1", ("masses.0.z=-1",)).place("[[masses]] number 1", "z must lie")
+        'a.toml with --set masses.0.z=-1: [[masses]] number 1'
         """
+        for override in reversed(self.overrides):
+            if _gave(override, where, message):
+                return f"{self.path} with --set {override}: {where}"
+        table = TABLE.match(where)
+        beside = [one for one in self.overrides if table is None or _steps(one.partition("=")[0])[0] == table[1]]
         line = _line(self.text.splitlines(), where, message)
-        return f"{self.path}:{line}: {where}" if line else f"{self.path}: {where}"
+        said = where + "".join(f" with --set {override}" for override in beside)
+        return f"{self.path}:{line}: {said}" if line else f"{self.path}: {said}"
 
     @contextmanager
     def unpacked(self) -> Iterator[dict[str, Path]]:
@@ -73,10 +85,28 @@ class Source:
             yield places
 
 
+def _steps(key: str) -> list[str]:
+    """Names and numbers that lead to a value: `stops[0].gap` is stops, 0, gap."""
+    return [inside or part for inside, part in re.findall(r"\[\s*([^\]]+?)\s*\]|([^.\[\]\s]+)", key)]
+
+
+def _gave(override: str, where: str, message: str) -> bool:
+    """Whether an override gave what a message is about: the table is its own, the key among the first words."""
+    first, *steps = _steps(override.partition("=")[0])
+    table = TABLE.match(where) or re.search(r"(\w+)()\[(\d+)\]()", message)  # the scene says masses[0]
+    words = re.findall(r"\w+", message)[:4]
+    if table is None:
+        return first in words  # of the file: a table that is unknown
+    shift = 1 if where.startswith("[[") else 0
+    if steps and steps[0].isdecimal() and table[3] and int(steps.pop(0)) + shift != int(table[3]):
+        return False
+    return first == table[1] and (not steps or steps[-1] in [*words, *re.findall(r"\w+", f"{table[2]} {table[4]}")])
+
+
 def _override(tables: dict[str, Any], text: str) -> None:
     """Set one value: `stops[0].gap=1e-3`, `stops.0.gap = 1e-3`, `stops[valve].gap=0`; missing tables are made."""
     key, equals, value = text.partition("=")
-    path = [inside or part for inside, part in re.findall(r"\[\s*([^\]]+?)\s*\]|([^.\[\]\s]+)", key)]
+    path = _steps(key)
     if not (equals and path):
         raise ValueError(f"--set {text}: write table.key=value, such as simulate.duration=10 or stops[0].gap=1e-3")
     try:
@@ -103,7 +133,7 @@ def _override(tables: dict[str, Any], text: str) -> None:
 
 def _line(lines: list[str], where: str, message: str) -> int:
     """Number of the line that is meant, 0 when unknown."""
-    named = re.match(r"\[\[?(\w+)(?:\.(\w+))?\]\]?(?: number (\d+))?(.*)", where)
+    named = TABLE.match(where)
     inside = re.search(r"(\w+)\[(\d+)\]", message)
     if not named and inside:  # the scene says masses[0]
         found = _table(lines, inside[1], int(inside[2]) + 1)
