@@ -243,6 +243,8 @@ def test_solvers_by_name(file_of):
         ("modes = 2", "mode = 2", r"\[reduce\]: unknown key 'mode'; did you mean 'modes'"),
         ("modes = 2", "modes = 2\ngravity = 9.81", r"unknown key 'gravity'; gravity stands above all tables \(valid"),
         ("modes = 2", "modes = -1", r"\[reduce\]: modes must be a count above 0 or a list"),
+        ("[base]", "[base.y]", r"\[base.y\]: the base of a beam moves along y alone: write \[base\] with kind = "),
+        ("seed = 1", "frequency_hz = 9", r"unknown key 'frequency_hz'; frequencies are in rad/s, 2π times hertz: band"),
         ("modes = 2", "modes = 'most'", r"\[reduce\]: modes must be"),
         ("modes = 2", "modes = 2\nelements = 0", r"\[reduce\]: elements must be a whole number above 0"),
         ("modes = 2", "omega_max = -1.0", r"\[reduce\]: omega_max must be positive"),

@@ -7,6 +7,7 @@ The check itself and its messages are in `tables.TableReader.check_keys`.
 from __future__ import annotations
 
 import inspect
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
@@ -111,6 +112,19 @@ def converted(value: Any, hint: Any) -> Any:
         return tuple(value)
     whole = isinstance(value, int) and not isinstance(value, bool)
     return float(value) if whole and float in allowed and int not in allowed else value
+
+
+def angular(key: str, valid: Sequence[str]) -> str:
+    """A hint at the key of a frequency in rad/s, for one that seems to be in hertz.
+
+    Examples
+    --------
+    >>> angular("frequency_hz", ["kind", "amplitude", "omega", "phase"])
+    '; frequencies are in rad/s, 2π times hertz: omega'
+    """
+    asked = re.search(r"freq|hz|hertz|^f\d?$", key.lower())
+    names = [name for name in valid if name.startswith("omega") or name == "band"]
+    return f"; frequencies are in rad/s, 2π times hertz: {' or '.join(names)}" if asked and names else ""
 
 
 def nearest(key: Any, valid: Sequence[str] | Constructors) -> str:

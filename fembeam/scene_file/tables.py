@@ -16,6 +16,7 @@ from fembeam.scene import FEATURES, Scene, Source
 from fembeam.scene_file import bodies as further
 from fembeam.scene_file.keys import (
     Constructors,
+    angular,
     converted,
     fits,
     listed,
@@ -130,6 +131,10 @@ class TableReader:
         if name == "base":
             if self.named and not value:
                 self.fail("[base]", "must have a table for each direction, such as [base.y]")
+            ways = [key for key, one in value.items() if isinstance(one, dict)]
+            if not self.named and "kind" not in value and ways:
+                self.fail(f"[base.{ways[0]}]", "the base of a beam moves along y alone: write [base] with kind = … and "
+                          "the keys of that signal; tables for each direction are for frames")  # fmt: skip
             if self.named and all(isinstance(one, dict) for one in value.values()):
                 return {direction: self.chosen(SIGNAL, one, f"[base.{direction}]") for direction, one in value.items()}
             return self.chosen(SIGNAL, value, "[base]")
@@ -272,7 +277,8 @@ class TableReader:
         for key in table:
             if key not in valid:
                 above = "; gravity stands above all tables" if key == "gravity" else ""
-                self.fail(where, f"unknown {what} {key!r}{nearest(key, valid)}{above} (valid: {listed(valid)})")
+                hint = angular(key, valid) or nearest(key, valid)
+                self.fail(where, f"unknown {what} {key!r}{hint}{above} (valid: {listed(valid)})")
 
     def need(self, table: Table, keys: Sequence[str], where: str, told: str = "") -> None:
         """Every key stands in the table."""
