@@ -509,6 +509,26 @@ def test_results_are_compared_in_standard_errors_of_their_own(tmp_path):
     assert rows["minimise value"].deviations == pytest.approx(1.0 / (0.4 * math.sqrt(2.0)))
 
 
+def test_branches_are_compared_at_equal_parameters(tmp_path, capsys):
+    """Peaks of 2 omega on one grid and on another, where orbits of equal number differ by 10 % and more."""
+
+    def written(name, grid, fold=()):
+        orbits = [{"omega": w, "peak": 2.0 * w, "impacts": 1 + (w > 4.0), "residual": 1e-9 * w} for w in (*grid, *fold)]
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "branch.json").write_text(json.dumps({"orbits": orbits, "status": "done"}))
+        return tmp_path / name
+
+    a, b = written("a", [1.0, 2.0, 3.5, 5.0]), written("b", [5.5, 4.5, 2.5, 1.2])
+    rows = {row.name: row for row in compare(a, b)}
+    assert all(row.a == pytest.approx(row.b) for row in rows.values() if None not in (row.a, row.b))
+    assert {name for name, row in rows.items() if row.b is None} == {
+        "branch at omega = 1 peak", "branch at omega = 1 impacts", "branch at omega = 3.5 impacts"}  # fmt: skip
+    assert "the second interpolated linearly" in printed(capsys, "compare", a, b)
+    folded = written("c", [1.0, 3.0], [2.0, 4.0])
+    assert [(row.name, row.a, row.b) for row in compare(a, folded)] == [("branch folds along omega", 0, 2)]
+    assert all(row.difference == 0.0 for row in compare(folded, folded))
+
+
 def test_a_run_reads_no_file_outside_its_folder_unless_asked(tmp_path, capsys):
     def named(path, *overrides):
         text = head + f'[base]\nkind = "record"\npath = "{path}"\nquantity = "displacement"\n' + rest

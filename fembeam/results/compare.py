@@ -15,6 +15,7 @@ from fembeam import plot
 from fembeam.plot.figure import sheet
 from fembeam.plot.style import verbatim
 from fembeam.plot.units import length_for, unit_for
+from fembeam.results.compare_branches import at_equal_parameters
 from fembeam.results.files import prepared, write_figure
 from fembeam.statistics import pdf, psd
 from fembeam.support import aligned
@@ -49,29 +50,40 @@ class Row:
 def compare(a: Path, b: Path) -> list[Row]:
     """All numbers of two result folders, in the order of the first; those only one has are None in the other.
 
+    Those of branches at equal values of their parameter: the second is interpolated there.
+
     Raises
     ------
     ValueError : a folder holds no results, or a file in it is damaged.
     """
-    first, second = numbers(a), numbers(b)
+    contents, others = _contents(a), _contents(b)
+    both = [contents.get("branch"), others.get("branch")]
+    if all(both):
+        contents["branch"], others["branch"] = at_equal_parameters(*(one["orbits"] for one in both if one))
+    first, second = _numbers(contents), _numbers(others)
     names = [*first, *(name for name in second if name not in first)]
     errors = {*map(_error_of, names)}
     rows = [_row(name, first, second) for name in names if name not in errors]
     return [row for row in rows if (row.a, row.b) != (None, None)]
 
 
-def numbers(folder: Path) -> dict[str, Any]:
-    """Every number in the JSON files of a folder, by its path."""
+def _contents(folder: Path) -> dict[str, Any]:
+    """The JSON files of a folder."""
     files = sorted(Path(folder).glob("*.json"))
     if not files:
         raise ValueError(f"{folder} holds no results; give a folder that `fembeam run` wrote")
     found: dict[str, Any] = {}
     for path in files:
         try:
-            found |= dict(_flat(path.stem, json.loads(path.read_text(encoding="utf-8"))))
+            found[path.stem] = json.loads(path.read_text(encoding="utf-8"))
         except ValueError as error:
             raise ValueError(f"{path} is damaged: {error}; run it again") from None
     return found
+
+
+def _numbers(contents: dict[str, Any]) -> dict[str, Any]:
+    """Every number by its path."""
+    return {name: value for stem, content in contents.items() for name, value in _flat(stem, content)}
 
 
 def _flat(name: str, value: Any) -> Iterator[tuple[str, Any]]:
@@ -121,7 +133,9 @@ def table(rows: list[Row], a: Path, b: Path) -> str:
     ]  # fmt: skip
     same = f"{len(rows) - len(unlike)} of {len(rows)} numbers are equal"
     head = ("", str(a), str(b), "difference", "in standard errors")
-    return "\n\n".join([aligned(head, cells), same] if unlike else [same])
+    between = ["branches: the second interpolated linearly where the first has an orbit"]
+    notes = between if any(row.name.startswith("branch at ") for row in unlike) else []
+    return "\n\n".join([aligned(head, cells), *notes, same] if unlike else [same])
 
 
 def write_figures(a: Path, b: Path, out: Path) -> list[Path]:
