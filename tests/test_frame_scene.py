@@ -318,3 +318,38 @@ def test_a_load_across_all_modes_moves_nothing():
         run = across_its_plane("y").reduce(modes=[0]).simulate(0.5, 1e-3)
     assert len(run.contacts) == 0
     assert not run.q.any()
+
+
+def bent_frame(space, shear):
+    section = fb.Section.tube(2.1e11, 7850.0, 0.05, 0.04)
+    section = replace(section, shear=0.5 if shear else None)
+    corner = (1.2, 0.3, 1.0) if space else (1.2, 1.0)
+    up = (0.0, 0.0, 1.0) if space else (0.0, 1.0)
+    nodes = {"A": (0.0,) * len(up), "B": up, "C": corner}
+    return fb.Frame(nodes, [fb.Member("A", "B", section), fb.Member("B", "C", section)])
+
+
+@pytest.mark.parametrize("space", [False, True])
+@pytest.mark.parametrize("shear", [False, True])
+def test_a_run_read_from_a_file_moves_between_the_nodes_of_members(tmp_path, space, shear):
+    """Across a member as the model does; along and about it up to the parabolas, which are not in the file."""
+    scene = fb.Scene(bent_frame(space, shear), [fb.Clamped("A")], base={"x": fb.Harmonic(1e-3, 60.0)})
+    run = scene.reduce(modes=6).simulate(0.1, 1e-3)
+    again = fb.load(run.save(tmp_path / "run.npz"))
+    for s in (0.1, 0.3331, 0.7123):
+        mine, theirs = run.motion(("B-C", s)), again.motion(("B-C", s))
+        np.testing.assert_allclose(theirs, mine, atol=1e-4 * np.abs(mine).max())
+    with pytest.raises(ValueError, match=r"the distance along member 'B-C' must lie within 0 to"):
+        again.displacement(("B-C", 7.0), "x")
+    with pytest.raises(ValueError, match="must be one that the run keeps; 'C' is the nearest there is, got 'Q'"):
+        again.displacement("Q", "x")
+
+
+def test_a_joined_run_read_from_a_file_moves_between_the_nodes_of_members(tmp_path):
+    held = fb.Scene(bent_frame(True, False), [fb.Clamped("A")], base={"x": fb.Harmonic(1e-3, 60.0)})
+    scene = replace(held, bodies=[fb.Scene(bent_frame(True, False))], joints=[fb.Joint("C", to=(1, "A"))])
+    run = scene.reduce(modes=6).simulate(0.1, 1e-3)
+    again = fb.load(run.save(tmp_path / "run.npz"))
+    for place in (("B-C", 0.3331), (1, ("B-C", 0.3331))):
+        mine = run.displacement(place, "y")
+        np.testing.assert_allclose(again.displacement(place, "y"), mine, atol=1e-5 * np.abs(mine).max())

@@ -15,7 +15,17 @@ import numpy as np
 import solvers
 from fembeam.model import saved_arrays
 from fembeam.model.run import Run
-from fembeam.response import READOUT_UNITS, PlacedLog, PlacedShapes, Shapes, Site, packed, site, unpacked
+from fembeam.response import (
+    READOUT_UNITS,
+    PlacedLog,
+    PlacedShapes,
+    Shapes,
+    Site,
+    known_along_members,
+    packed,
+    site,
+    unpacked,
+)
 from fembeam.scene import Source
 from fembeam.support import tuples, versions, written_whole
 from solvers.problem import FrictionLog, Losses, Transitions, columns_of, optional
@@ -232,6 +242,8 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         raise ValueError("its words and its arrays are of other bodies and stops")
     numbered = zip(about["bodies"], ("", *(f"_{j}" for j in range(1, bodies))), strict=True)
     shapes = [_shapes_of(words, arrays[f"nodes{i}"], arrays[f"shapes{i}"]) for words, i in numbered]
+    readout = unpacked(about["readout"], arrays, [getattr(one, "nodes", None) for one in shapes])
+    shapes = [known_along_members(*one) for one in zip(shapes, readout["section_forces"], strict=True)]
     work, stored, slip, *rubbed = arrays["losses"].T
     names = _names(about, len(arrays["stops"]))
     log = (arrays[f"contact_{name}"] for name in columns_of(solvers.ContactLog))
@@ -250,7 +262,7 @@ def _of_arrays(about: dict[str, Any], arrays: dict[str, Any], path: Path) -> Run
         make_transitions=partial(Transitions, *_unpacked(about["events"], arrays["transitions"]), names=names),
         make_losses=partial(Losses, work, stored, slip, arrays["work"], names=names, **_rubbed(rubbed)),
         end=arrays["end"],
-        kept_readout=unpacked(about["readout"], arrays, [getattr(one, "nodes", None) for one in shapes]),
+        kept_readout=readout,
         others=tuple(shapes[1:]),
         source=source,
         versions=about["versions"],

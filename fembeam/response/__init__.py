@@ -7,6 +7,7 @@ are functions of these or of a `Model`. Imports: `scene`, `beams`, `support`, `r
 `histories`.
 """
 
+from fembeam.response.along_members import known_along_members
 from fembeam.response.backbone import backbone
 from fembeam.response.contact_force import forces, latched_before
 from fembeam.response.contact_log import PlacedLog, Site, site

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.scene import At, BodyMatrices, LocalCoordinate, at_parts, directed_words, quoted, split
-from fembeam.structures import COMPONENTS, direction_of, named, nearest, require_components, turns
+from fembeam.structures import COMPONENTS, FrameMatrices, direction_of, named, nearest, require_components, turns
 from fembeam.support import is_numbered, is_pair, require, tuples
 
 Vector = NDArray[np.float64]
@@ -169,6 +169,7 @@ def placed_shapes(
     extra += [at.to[1] for at in loaded if at.to is not None and at.to[0] == 0]
     joined = list(getattr(body.beam, "edges", ()))
     drawn = [place for pair in joined for place in pair]
+    extra += _mesh_nodes(body.assembled)
     names = list(dict.fromkeys([*_places(body), *(tuple(z) if isinstance(z, list) else z for z in extra), *drawn]))
     number = {name: i for i, name in enumerate(names)}
     n, full = vectors.shape[1], np.hstack([body.spread @ vectors, carried])
@@ -190,6 +191,14 @@ def placed_shapes(
     )
     seen = {name: at for name, at in made.usual.items() if np.any(made(at))}
     return replace(made, usual=dict(list((seen or made.usual).items())[:USUAL]))
+
+
+def _mesh_nodes(made: Any) -> list[Any]:
+    """All nodes of the meshes of frames, between which a run read from a file interpolates."""
+    if isinstance(made, FrameMatrices):
+        return list(made.mesh.sections())
+    each = getattr(made, "made", ())
+    return [(number, at) if number else at for number, one in enumerate(each) for at in _mesh_nodes(one)]
 
 
 def _places(body: BodyMatrices) -> list[Any]:

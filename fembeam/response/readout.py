@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from fembeam.beams import Beam, Section, Taper
 from fembeam.response.section_forces import SectionForces
 from fembeam.scene import FEATURES, heights, loads
-from fembeam.structures import Frame, FrameForces, FrameMesh, JoinedForces, Member, located_among
+from fembeam.structures import Frame, FrameForces, FrameMesh, JoinedForces, Member, located_among, points_of
 from fembeam.support import require, tuples
 
 if TYPE_CHECKING:
@@ -307,9 +308,8 @@ def _frame_of_words(words: Mapping[str, Any], values: Vector) -> FrameForces:
     """Section forces of one frame."""
     about, names = dict(words["frame"]), list(words["names"])
     members = [Member(**{**one, "section": _section(one["section"])}) for one in about.pop("members")]
-    mesh = FrameMesh(
-        Frame(members=members, **about), tuple(np.array(s, dtype=float) for s in words["borders"]), (), None
-    )
+    frame, borders = Frame(members=members, **about), tuple(np.array(s, dtype=float) for s in words["borders"])
+    mesh = FrameMesh(frame, borders, (), sparse.identity(points_of(borders), format="csr"))  # dofs are its points'
     if values.shape[:4] != (2, len(names), int(mesh.first[-1]), 2) or len(mesh.borders) != len(members):
         raise ValueError(f"section forces must be of {int(mesh.first[-1])} elements, they have shape {values.shape}")
     ends, slopes = (dict(zip(names, kind, strict=True)) for kind in values)

@@ -21,7 +21,7 @@ from fembeam.structures.directions import (
 from fembeam.structures.frame import Frame
 from fembeam.structures.frame_checks import arm_matrix
 from fembeam.structures.frame_forces import FORCES, FrameForces
-from fembeam.structures.frame_mesh import FrameMatrices, FrameMesh
+from fembeam.structures.frame_mesh import FrameMatrices, FrameMesh, points_of
 from fembeam.structures.joined_bodies import JoinedBodies, JoinedForces, has_place, located_among
 from fembeam.structures.joints import Joint, joining
 from fembeam.structures.massless import following

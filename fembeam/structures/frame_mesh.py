@@ -160,6 +160,11 @@ class FrameMesh:
         return stacked[order.ravel()]
 
 
+def points_of(borders: Sequence[Vector]) -> int:
+    """Displacements and rotations of all points of a mesh, ends of members apart, and parabolas of its elements."""
+    return sum(6 * len(s) + len(PARABOLAS) * (len(s) - 1) for s in borders)
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class FrameMatrices(Assembled):
     """Matrices of a frame, and the mesh they stand on."""
