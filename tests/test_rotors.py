@@ -320,6 +320,17 @@ def test_half_a_pair_is_told():
         rotor().reduce(3)
 
 
+@pytest.mark.filterwarnings("default")
+def test_half_a_pair_of_each_of_two_equal_bodies_is_told():
+    """Python shows a text once: of equal bodies it did not say that the second is cut, too."""
+    straight = fb.Frame.straight(1.0, fb.Section.circle(2.1e11, 7850.0, 0.02))
+    held = fb.Scene(straight, [fb.Clamped("A")])
+    with pytest.warns(UserWarning, match="cut a pair") as said:
+        fb.Scene(straight, [fb.Clamped("A")], bodies=[held]).reduce(3)
+    texts = [str(one.message).partition(" cut")[0] for one in said]
+    assert texts == ["3 modes of the scene's own body", "3 modes of bodies[0]"]
+
+
 def test_pairs_of_a_round_shaft_lie_along_x_and_y():
     model = rotor().reduce(6)
     mass = model.effective_mass

@@ -61,7 +61,8 @@ def reduced(
     matrices, asked, chosen = _chosen(scene, DEFAULT_MODES if modes is None else modes, elements, interface)
     bodies = []
     for number, (body, listed) in enumerate(zip(matrices.beams, chosen, strict=True)):
-        basis = _of_beam(body, loaded(scene, number), listed, residual, interface)
+        of = f" of {body_words(number)}" * bool(scene.bodies)
+        basis = _of_beam(body, loaded(scene, number), listed, residual, interface, of)
         bodies.append(_Reduced(body, _oriented(basis, body, watched(scene, number)), None if interface else listed))
     if elements is not None and not isinstance(modes, str):
         highest = max(
@@ -134,25 +135,25 @@ def check_reduction(
 
 
 def _of_beam(
-    beam: Matrices, places: list[LocalCoordinate], chosen: tuple[int, ...], residual: bool, interface: bool
+    beam: Matrices, places: list[LocalCoordinate], chosen: tuple[int, ...], residual: bool, interface: bool, of: str
 ) -> reduction.Basis:
-    """The basis of one beam by itself, static shapes where it is loaded included."""
+    """The basis of one beam by itself, static shapes where it is loaded included; `of`: its name in warnings."""
     if interface:
         return reduction.craig_bampton(beam.M, beam.K, _directions(beam, places), len(chosen), beam.root)
-    basis = _modes(beam, chosen)
+    basis = _modes(beam, chosen, of)
     rows = [*([_rows(beam, places)] if residual and places else []), *beam.following_loads]
     if rows:
         basis = reduction.with_residual(basis, beam.M, beam.K, sparse.vstack(rows).T, beam.root)
     return basis
 
 
-def _modes(beam: Matrices, chosen: tuple[int, ...]) -> reduction.Basis:
+def _modes(beam: Matrices, chosen: tuple[int, ...], of: str) -> reduction.Basis:
     """Modes by their numbers; of a body one more is computed, so that of a cut pair always the same one stays."""
     size = beam.M.shape[0]
     if not isinstance(beam, BodyMatrices) or chosen[-1] >= size:
         return reduction.modal_basis(beam.M, beam.K, indices=chosen, root=beam.root)
     wide = _along_axes(reduction.modal_basis(beam.M, beam.K, min(chosen[-1] + 2, size), root=beam.root), beam)
-    _warn_of_cut_pairs(beam, wide.omega, chosen)
+    _warn_of_cut_pairs(beam, wide.omega, chosen, of)
     return reduction.Basis(wide.vectors[:, list(chosen)], wide.omega[list(chosen)])
 
 
@@ -243,14 +244,17 @@ def _warn_of_still_places(model: Model) -> None:
         warnings.warn(said, UserWarning, stacklevel=4)
 
 
-def _warn_of_cut_pairs(beam: Matrices, omega: Vector, chosen: tuple[int, ...]) -> None:
-    """Warn when of two modes of one frequency, such as those of a round section's two planes, one is kept."""
+def _warn_of_cut_pairs(beam: Matrices, omega: Vector, chosen: tuple[int, ...], of: str) -> None:
+    """Warn when of two modes of one frequency, such as those of a round section's two planes, one is kept.
+
+    The body is named: Python shows a text once, and that of an equal body would be lost.
+    """
     for i in chosen:
         near = np.flatnonzero(np.abs(omega - omega[i]) < PAIR * omega[i])
         if set(near.tolist()) <= set(chosen):
             continue
         what = "which whirl together" if beam.gyroscopic is not None else "that move across each other"
-        cut = f"{counted(len(chosen), 'mode')} cut{'s' * (len(chosen) == 1)} a pair of one frequency"
+        cut = f"{counted(len(chosen), 'mode')}{of} cut{'s' * (len(chosen) == 1)} a pair of one frequency"
         said = f"{cut}, {omega[i]:.6g} rad/s, {what}; ask for one more"
         warnings.warn(said, UserWarning, stacklevel=6)
         return
