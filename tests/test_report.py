@@ -2,12 +2,14 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from problems import paper_scene
 
 import fembeam as fb
+from contacts import Hertz
 from fembeam.results import files
 from fembeam.results import html_page as html
 
@@ -52,6 +54,22 @@ def test_what_standard_errors_of_one_realisation_are_is_told(folder):
     """In 100 seeds of 60 s they were 3.3 times the scatter in linear motion, 1.5 times with the stop."""
     found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert "Under noise they are upper bounds" in found["confidence"]
+
+
+def test_why_there_are_no_standard_errors_is_told():
+    """It was "too short, or the structure has no damping" of a damped beam and an impactor, too."""
+
+    def said(scene, duration=2.0):
+        return files.summary(scene.reduce(2).simulate(duration, 1e-2), discard=0.5)["confidence"]
+
+    damped = paper_scene()
+    short = re.search(
+        r"the 1\.5 s behind discard are shorter than 4 independent parts; simulate at least (.*) s", said(damped)
+    )
+    assert said(damped, 1.001 * float(short[1])).startswith("Standard errors")
+    assert "mode 2 has no damping, so" in said(replace(damped, damping=fb.ModalDamping((0.02, 0.0))))
+    striker = fb.Impactor(0.1, mass=0.01, law=Hertz(1e8), velocity=-0.01, gap=1.0)
+    assert "impactor 1 has no damping, so" in said(replace(damped, impactors=[striker]))
 
 
 def test_sentences_wrap_and_tables_keep_their_lines(folder):

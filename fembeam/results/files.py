@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from fembeam import plot
 from fembeam.model import Run
 from fembeam.model.run_csv import extremes_table, histories
+from fembeam.plot.run_signals import FEWEST_BATCHES, MEMORIES
 from fembeam.scene import unit_of
 from fembeam.statistics import Batches, Estimate, moments
 from fembeam.support import aligned, require, versions, written_whole
@@ -181,13 +182,28 @@ def _confidence(run: Run, discard: float) -> str:
     """What the standard errors rest on."""
     parts = plot.batches(run, discard)
     if not parts:
-        return "No standard errors: too short for independent parts, or the structure has no damping."
+        return f"No standard errors: {_why_no_parts(run, discard)}."
     span = (float(run.t[-1]) - discard) / parts
     return (
         f"Standard errors (s.e.) come from {parts} parts of {span:.3g} s each; 95 % lies within two of them. "
         "Under noise they are upper bounds, as one realisation has the same power for every seed; [ensemble] tells the "
         "scatter of seeds."
     )
+
+
+def _why_no_parts(run: Run, discard: float) -> str:
+    """Why a run has no independent parts: `plot.batches` goes by the slowest decay of a coordinate."""
+    decay = np.diag(run.readout.damping) / 2
+    least, modes = int(np.argmin(decay)), len(decay) - len(run.impactor_masses)
+    if len(run.t) < 2:
+        return "the run has a single sample"
+    if not decay[least] > 0.0:
+        name = f"mode {least + 1}" if least < modes else f"impactor {least - modes + 1}"
+        return f"{name} has no damping, so that parts of the run never become independent"
+    needed = FEWEST_BATCHES * MEMORIES / decay[least]
+    # rounded up, to three digits
+    return (f"the {max(float(run.t[-1]) - discard, 0.0):.3g} s behind discard are shorter than {FEWEST_BATCHES} "
+            f"independent parts; simulate at least {1.005 * (discard + needed):.3g} s")  # fmt: skip
 
 
 def _contacts(run: Run, discard: float) -> list[dict[str, Any]]:
