@@ -353,3 +353,9 @@ def test_a_joined_run_read_from_a_file_moves_between_the_nodes_of_members(tmp_pa
     for place in (("B-C", 0.3331), (1, ("B-C", 0.3331))):
         mine = run.displacement(place, "y")
         np.testing.assert_allclose(again.displacement(place, "y"), mine, atol=1e-5 * np.abs(mine).max())
+
+
+def test_the_base_load_of_a_frame_is_that_along_y():
+    own = fb.Scene(portal(), [fb.Clamped("A"), fb.Clamped("D")]).matrices(4)
+    assert np.array_equal(own.base_load, own.base_loads["y"])
+    assert own.base_load.any()

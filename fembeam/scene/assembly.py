@@ -8,7 +8,7 @@ of the scene, its `bodies`, then one dof for every impactor.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -69,7 +69,8 @@ class Matrices:
     root : (k, N) sparse R with RᵀR = K; `reduction.modal_basis(M, K, root=root)` is accurate on fine meshes. None
         under compression.
     dashpots : (N, N) sparse, the dashpots' part of C alone.
-    base_load : (M_all r) (N,) in kg, columns of the supported dofs included; the load is -base_load ÿ.
+    base_load : (M_all r) (N,) in kg, columns of the supported dofs included; the load is -base_load ÿ. Of a body with
+        directions that along y, else along the first that it has; `base_loads` has all.
     nodes : (m,) coordinates in m.
     dofs : (m, 2) free dof of (u, u_z) at each node, -1 where supported.
     modes : number of modes the mesh was made for, None if the elements were given.
@@ -316,10 +317,15 @@ def _joined(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> Mat
         root=stacked(roots, np.sqrt(stiffness)) if len(roots) == len(beams) else None,
         dashpots=stacked([beam.dashpots for beam in beams], damping),
         gyroscopic=stacked(turning, 0.0 * mass) if spins else None,
-        base_load=along.get("y", next(iter(along.values()), np.zeros(0))),
+        base_load=main_load(along, 0),
         bodies=beams,
         impactors=impactors,
     )
+
+
+def main_load(along: Mapping[str, Vector], size: int) -> Vector:
+    """The load of the frame's motion along y, of a body that does not move along y that of its first direction."""
+    return along.get("y", next(iter(along.values()), np.zeros(size)))
 
 
 def _base_loads(beams: tuple[Matrices, ...], impactors: tuple[Impactor, ...]) -> dict[str, Vector]:

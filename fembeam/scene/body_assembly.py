@@ -18,7 +18,7 @@ from scipy import sparse
 
 import reduction
 from fembeam.beams import MESHED_MODES
-from fembeam.scene.assembly import UNIT, Matrices, Vector, moved_by_rows, moving
+from fembeam.scene.assembly import UNIT, Matrices, Vector, main_load, moved_by_rows, moving
 from fembeam.scene.places import place_words, quoted
 from fembeam.scene.rotors import Disk, gyroscopic, shaft_axes
 from fembeam.scene.signals import support_motion
@@ -240,7 +240,7 @@ def _of(scene: Scene, assembled: Assembled, modes: int | None, held: Any, conden
         None if root is None else (root @ S).tocsr(),
         C,
         scene.damping,
-        base_load=np.zeros(S.shape[1]),
+        base_load=main_load(moved, S.shape[1]),
         nodes=np.zeros(0),
         dofs=np.zeros((0, 2), dtype=int),
         modes=modes,
