@@ -250,7 +250,7 @@ def test_tables(corner, tube, tmp_path):
     head = (tmp_path / "histories.csv").read_text().splitlines()[0]
     assert head == "t [s],force 0 x [N],force 0 y [N],friction 0 [N],friction loss 0 [J]"
     first = (tmp_path / "friction.csv").read_text().splitlines()[0]
-    assert first.startswith("contact,name,t_in [s],t_out [s],angle_in [rad]")
+    assert first.startswith("stop,name,t_in [s],t_out [s],angle_in [rad]")
     corner.to_csv(tmp_path)
     head = (tmp_path / "histories.csv").read_text().splitlines()[0]
     assert head.endswith("force 0 [N],force 0 along [N]")

@@ -67,8 +67,8 @@ def write(run: Run, folder: Path, stride: int = 1, **chosen: Any) -> list[Path]:
     written = [_write(folder / "histories.csv", kept), _write(folder / "contacts.csv", log)]
     if not run.rubs.any():
         return written
-    rubbed = {f"{name} [{FRICTION_UNITS[name]}]" if name in FRICTION_UNITS else name: column
-              for name, column in run.friction_log.named_arrays().items()}  # fmt: skip
+    heads = {name: f"{name} [{unit}]" for name, unit in FRICTION_UNITS.items()} | {"contact": "stop"}  # as contacts.csv
+    rubbed = {heads.get(name, name): column for name, column in run.friction_log.named_arrays().items()}
     return [*written, _write(folder / "friction.csv", rubbed)]
 
 

@@ -53,7 +53,7 @@ UNITS = {
 }
 
 RUBS = "of each contact with friction: μ, k_t / N/m, R / m (negative outside a circle), Ω / rad/s; or zeros"
-FRICTION_LOG = "rows of contact, t_in, t_out / s, angles / rad, speeds / m/s, peak / N, N s, slip / m, loss / J"
+FRICTION_LOG = "rows of stop, t_in, t_out / s, angles / rad, speeds / m/s, peak / N, N s, slip / m, loss / J"
 CIRCLES = "m, of each contact: radius of a circular clearance, negative of an outer one, and its centre; or zeros"
 
 
