@@ -148,3 +148,32 @@ def test_checking_changes_nothing():
     before = repr(scene)
     assert str(scene.check()) == str(check(scene.reduce()))
     assert repr(scene) == before
+
+
+def test_a_command_warns_once_however_often_it_reduces_the_scene(tmp_path, capsys):
+    text = """
+    [frame.nodes]
+    A = [0, 0, 0]
+    B = [0, 0, 1]
+    [[frame.members]]
+    nodes = ["A", "B"]
+    section = { shape = "circle", E = 2.1e11, rho = 7800, diameter = 0.02 }
+    [[supports]]
+    kind = "clamped"
+    at = "A"
+    [damping]
+    zeta = [0.02]
+    [base.x]
+    kind = "harmonic"
+    amplitude = 1e-3
+    omega = 25.0
+    [reduce]
+    modes = 3
+    [simulate]
+    duration = 1.0
+    dt = 1e-3
+    [orbit]
+    """
+    (tmp_path / "scene.toml").write_text(text)
+    assert main(["run", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    assert capsys.readouterr().err.count("3 modes cut a pair of one frequency") == 1

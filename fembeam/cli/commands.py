@@ -18,7 +18,6 @@ from fembeam.cli.messages import (
     interrupted,
     one_line,
     say,
-    show_doubts,
     show_warning,
     warned,
     write_anywhere,
@@ -199,7 +198,8 @@ def _check(arguments: argparse.Namespace) -> int:
 
     file = _read(arguments)
     found = check(_model(file, arguments.modes), **file.of_run)
-    show_doubts(found)
+    for doubt in found:
+        show_warning(doubt)
     _print(found.plain() | {"warnings": warned} if arguments.json else replace(found, warnings=[]), arguments.json)
     return 0
 

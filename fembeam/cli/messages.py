@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import codecs
 import sys
-from collections.abc import Iterable
 from typing import Any
 
 FAILED, BAD_INPUT, INTERRUPTED, TERMINATED = 1, 2, 130, 143
@@ -39,16 +38,10 @@ def say(message: str) -> None:
 
 
 def show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    """A warning as one line, remembered for the report."""
-    warned.append(one_line(message))
-    say(f"warning: {warned[-1]}")
-
-
-def show_doubts(doubts: Iterable[str]) -> None:
-    """What looks wrong with a scene, but for what the scene itself warned of when it was made."""
-    for doubt in doubts:
-        if one_line(doubt) not in warned:
-            show_warning(doubt)
+    """A warning as one line, once in a command however often a scene is reduced; remembered for the report."""
+    if (said := one_line(message)) not in warned:
+        warned.append(said)
+        say(f"warning: {said}")
 
 
 def one_line(message: object) -> str:

@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fembeam.cli.messages import BAD_INPUT, FAILED, interrupted, one_line, say, show_doubts, warned
+from fembeam.cli.messages import BAD_INPUT, FAILED, interrupted, one_line, say, show_warning, warned
 from fembeam.results import files as report
 from fembeam.results import folder as folders
 from fembeam.support import interrupts
@@ -129,7 +129,8 @@ def _study_outcome(job: Job, name: str) -> Outcome:
         return _kept_results(name, files)
     try:
         folders.record(job.folder, job.file, name)
-        show_doubts(_doubts(job, name))
+        for doubt in _doubts(job, name):
+            show_warning(doubt)
         outcome = _simulation(job) if name == "simulate" else _computed(job, name)
         with interrupts.deferred():
             if not outcome.code:
