@@ -1,5 +1,7 @@
 """Figures of frames: where the drawn lines lie, how much they are magnified, in the plane and in space."""
 
+import dataclasses
+
 import meshio
 import numpy as np
 import pytest
@@ -150,3 +152,15 @@ def test_flat_frames_in_space_have_axes_whose_numbers_do_not_meet():
     for axis in figure.axes:
         assert np.ptp(axis.get_zlim()) > 0.25 * np.hypot(0.5, 0.3)
         assert len(axis.get_zticks()) <= 4
+
+
+def test_each_curve_of_a_spectrum_has_its_own_colour(plane):
+    """Base motions along two directions stand above, beside δ; below is another place alone."""
+    noise = {c: fb.BandNoise(1e-3, (5.0, 60.0), seed=i) for i, c in enumerate("xy")}
+    scene = dataclasses.replace(plane.model.scene, base=noise)
+    upper, lower = fb.plot.spectrum(scene.reduce(modes=3, elements=12).simulate(5.0, 1e-2)).axes
+    shown = [[(line.get_label(), line.get_color()) for line in axis.lines if line.get_linestyle() == "-"]
+             for axis in (upper, lower)]  # fmt: skip
+    assert [label for label, _ in shown[0]] == ["base x", "base y", "δ"]
+    assert [label.startswith("base") for label, _ in shown[1]] == [False]
+    assert len({colour for _, colour in shown[0] + shown[1]}) == 4

@@ -11,12 +11,12 @@ from fembeam.model import places
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.linear import frequencies
 from fembeam.plot.run_signals import estimated, first_stop, natural, place_of, responses, sampling_of
-from fembeam.plot.style import BLUE, GREEN, GREY, Vector, curve, drawable, fit_levels, styled, verbatim
+from fembeam.plot.style import BLUE, CYCLE, GREEN, GREY, Vector, curve, drawable, fit_levels, styled, verbatim
 from fembeam.response import frame_motion
 from fembeam.scene import signals_of
 from fembeam.statistics import Spectrum, psd
 from fembeam.statistics.spectra import FINEST_RESOLUTION
-from fembeam.structures import direction_of
+from fembeam.structures import COMPONENTS, direction_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 LABEL_WIDTH = 0.05  # of the axis, taken up by a frequency of four digits
 NAME_WIDTH, UPRIGHT = 0.13, 0.026  # of the axis, taken up by the name of a natural frequency, level and upright
 LINEAR_POINTS = 2000
+BASES = [f"base {component}" for component in COMPONENTS]
+BASE_COLOURS = GREY, *(colour for colour in CYCLE if colour not in (BLUE, GREEN)), "black"
 
 
 def segment_for(samples: int, dt: float) -> int:
@@ -57,19 +59,19 @@ def spectrum(
     """
     figure, (upper, lower) = sheet(2, 1, (7.0, 5.6), axes, sharex=True)
     spectra, linear = spectra_of(run, discard), _linear(run)
-    response = {name: s for name, s in spectra.items() if name != "base y"}
-    main, *others = response
-    top = omega_max or _axis_end(run, response[main])
-    for axis, names in ((upper, [n for n in ("base y", main) if n in spectra]), (lower, others or [main])):
+    bases = [name for name in spectra if name in BASES]
+    main, *others = (name for name in spectra if name not in BASES)
+    colours = {main: BLUE, **dict.fromkeys(others, GREEN), **dict(zip(bases, BASE_COLOURS, strict=False))}
+    top = omega_max or _axis_end(run, spectra[main])
+    for axis, names in ((upper, [*bases, main]), (lower, others or [main])):
         behind = [linear[name] for name in names if name in linear]
         for name in names:
-            colour = {"base y": GREY, main: BLUE}.get(name, GREEN)
-            curve(axis, spectra[name], top, color=colour, label=verbatim(name))
+            curve(axis, spectra[name], top, color=colours[name], label=verbatim(name))
         for line in behind:  # thin, and in front: where both agree both are seen
             curve(axis, line, top, color="black", linestyle="--", linewidth=0.7, label="linear, no contact")
         axis.set_ylabel("PSD / m² s rad⁻¹")
         axis.legend(loc="upper right")
-        fit_levels(axis, [spectra[name] for name in names if name != "base y"], top, behind)
+        fit_levels(axis, [spectra[name] for name in names if name not in BASES], top, behind)
     _mark_peaks(upper, spectra[main], top)
     _mark_frequencies((upper, lower), run, top)
     lower.set(xlabel="ω / rad s⁻¹", xlim=(0, top))

@@ -29,6 +29,7 @@ P = ParamSpec("P")
 
 
 BLUE, RED, GREEN, ORANGE, GREY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#777777"  # Okabe and Ito
+CYCLE = BLUE, RED, GREEN, ORANGE, "#CC79A7", "#56B4E9"
 
 
 STYLE = {
@@ -38,7 +39,7 @@ STYLE = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.linewidth": 0.6,
-    "axes.prop_cycle": "cycler('color', ['#0072B2', '#D55E00', '#009E73', '#E69F00', '#CC79A7', '#56B4E9'])",
+    "axes.prop_cycle": f"cycler('color', {list(CYCLE)})",
     "lines.linewidth": 1.0,
     "legend.frameon": False,
     "figure.dpi": 120,
