@@ -27,7 +27,7 @@ from contacts import (
 from fembeam import plot, statistics
 from fembeam.plot.axis_names import axis_name
 from fembeam.plot.orbits import _widen
-from fembeam.plot.style import GREY
+from fembeam.plot.style import BLUE, GREY, RED
 from fembeam.response import backbone
 from fembeam.results import files as report
 
@@ -469,7 +469,7 @@ def test_the_linear_response_of_a_slider_is_that_of_a_stuck_one_for_every_level(
     labels = [line.get_label() for line in axis.lines]
     assert labels.count("base amplitude 1e-06 m") == labels.count("base amplitude 3e-06 m") == 1
     drawn = [line for line in axis.lines if line.get_linestyle() == ":"]
-    assert [line.get_color() for line in drawn] == ["C0", "C1", GREY]
+    assert [line.get_color() for line in drawn] == [BLUE, RED, GREY]
     assert drawn[-1].get_label() == "linear, elements stuck"
     for line, one in zip(drawn, found, strict=False):  # neither slips
         heights = [1e6 * plot.peak(orbit, 0.24445) for orbit in one.orbits]
@@ -545,3 +545,10 @@ def test_a_figure_of_the_wrong_object_says_what_it_draws(run):
         plot.time_history(Hertz(1.0))
     with pytest.raises(TypeError, match=r"plot\.mode_shapes draws one Model, got Run"):
         plot.mode_shapes(run)
+
+
+def test_curves_keep_the_librarys_colours_when_they_are_drawn_later(run):
+    """matplotlib looks "C1" up only as it draws, in the settings of that time: legends then had other colours."""
+    shown = [plot.time_history(run), plot.loops({"a": KelvinVoigt(1e4, 1.0), "b": KelvinVoigt(1e4, 2.0)})]
+    lines = [line for figure in shown for axis in figure.axes for line in axis.lines]
+    assert all(str(line.get_color()).startswith("#") for line in lines)

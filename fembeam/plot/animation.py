@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fembeam.plot.bodies import BodyStage
 from fembeam.plot.run_signals import samples_in
-from fembeam.plot.style import BLUE, GREY, ORANGE, RED, styled, verbatim
+from fembeam.plot.style import BLUE, GREY, ORANGE, RED, own_colour, styled, verbatim
 from fembeam.plot.units import length_for, unit_for
 from fembeam.scene import ON
 from fembeam.support import require, written_beside
@@ -223,7 +223,7 @@ class _Stage:
         t = self.tick * self.run.t[self.samples]
         for i, force in enumerate(self.forces):
             label = verbatim(self.run.name(i))
-            self.force_axis.step(t, scale * force, color=f"C{i}", where="mid", label=label)
+            self.force_axis.step(t, scale * force, color=own_colour(i), where="mid", label=label)
         self.cursor = self.force_axis.axvline(t[0], color=ORANGE)
         self.force_axis.set(xlabel=f"time / {self.second}", ylabel=f"peak contact\nforce / {unit}")
         self.force_axis.set_xlim(*self.tick * self.run.t[self.samples[[0, -1]]])

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from contacts import PUBLISHED, Bounce, Hysteretic, Identified, KelvinVoigt, Law, Viscoelastic, bounce, restitution
 from fembeam.plot.figure import heading, legend, sheet
-from fembeam.plot.style import BLUE, GREY, RED, Vector, styled, verbatim
+from fembeam.plot.style import BLUE, CYCLE, GREY, RED, Vector, own_colour, styled, verbatim
 from fembeam.plot.units import length_for, unit_for
 from fembeam.support import require
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from fembeam.study import Equivalent
 
 POINTS = 100  # between two turning points of a path
-COLOURS = 6  # of the library's style
 
 
 @styled
@@ -124,8 +123,8 @@ def restitutions(axes: Sequence[Axes] | None = None) -> Figure:
     whole.plot([0, 1], [0, 1], color=GREY, linewidth=4, alpha=0.4, label=exact)
     near.axhline(0.0, color=GREY, linewidth=4, alpha=0.4)
     for number, (name, achieved) in enumerate(lines.items()):
-        whole.plot(nominal, achieved, _line(number), label=name)
-        near.plot(nominal, np.array(achieved) - nominal, _line(number))
+        whole.plot(nominal, achieved, **_line(number), label=name)
+        near.plot(nominal, np.array(achieved) - nominal, **_line(number))
     whole.set(xlim=(0, 1), ylim=(0, 1), xlabel="nominal restitution", ylabel="achieved by a free mass")
     near.set(xlim=(0, 1), ylim=(-0.05, 0.1), xlabel="nominal restitution", ylabel="achieved - nominal")
     legend(whole, axes is None, "outside lower center", ncols=3 if axes is None else 1)
@@ -166,7 +165,7 @@ def _drawn(
     scale, unit = unit_for([force for _, force in curves.values()], "N")
     per_length, of_length = length_for([delta for delta, _ in curves.values()])
     for number, (name, (delta, force)) in enumerate(curves.items()):
-        axis.plot(per_length * delta, scale * force, _line(number), label=verbatim(name))
+        axis.plot(per_length * delta, scale * force, **_line(number), label=verbatim(name))
     axis.axhline(0.0, color=GREY, linewidth=0.6)
     axis.set(xlabel=f"{words[0]} / {of_length}", ylabel=f"{words[1]} / {unit}")
     legend(axis, axes is None, "outside right center")
@@ -186,9 +185,9 @@ def _turns(name: str, law: Law, path: ArrayLike | None) -> Vector:
     return np.interp(places, np.arange(turns.size), turns)
 
 
-def _line(number: int) -> str:
+def _line(number: int) -> dict[str, Any]:
     """Dashes tell lines apart once the colours repeat."""
-    return f"C{number % COLOURS}" + ("-", "--", ":")[number // COLOURS % 3]
+    return {"color": own_colour(number), "linestyle": ("-", "--", ":")[number // len(CYCLE) % 3]}
 
 
 def _traced(law: Law, thrown: Bounce, mass: float) -> tuple[Vector, Vector]:

@@ -11,7 +11,18 @@ from fembeam.model import observed
 from fembeam.plot.axis_names import axis_name
 from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.linear import frequencies
-from fembeam.plot.style import GREEN, GREY, ORANGE, RED, Vector, displacement_name, plain_decades, styled, verbatim
+from fembeam.plot.style import (
+    GREEN,
+    GREY,
+    ORANGE,
+    RED,
+    Vector,
+    displacement_name,
+    own_colour,
+    plain_decades,
+    styled,
+    verbatim,
+)
 from fembeam.plot.units import length_for, unit_for
 from fembeam.scene import signals_of
 from fembeam.scene.parameters import scalars
@@ -71,7 +82,7 @@ def branch(
         _draw_cloud(axis, cloud, scale)
     periods = [one.family.period for one in several]
     same = labels is None and len(set(periods)) == len(periods)  # colours: a period has the same on every figure
-    colours = [f"C{periods[i] - 1 if same else i}" for i in range(len(several))]
+    colours = [own_colour(periods[i] - 1 if same else i) for i in range(len(several))]
     names = _labels(several) if labels is None else labels
     for one, heights, colour, label in zip(several, peaks, colours, names, strict=True):
         _draw_branch(axis, one, scale * heights, colour, verbatim(label))

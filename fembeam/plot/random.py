@@ -9,7 +9,7 @@ import numpy as np
 
 from fembeam.plot.figure import sheet
 from fembeam.plot.orbits import branch
-from fembeam.plot.style import BLUE, GREY, RED, curve, fit_levels, one_legend, ribbon, styled, verbatim
+from fembeam.plot.style import BLUE, GREY, RED, curve, fit_levels, one_legend, own_colour, ribbon, styled, verbatim
 from fembeam.plot.units import length_for
 from fembeam.statistics import Spectrum
 
@@ -49,7 +49,7 @@ def random_spectra(
         lines = {label: x if isinstance(x, Spectrum) else x.psd for label, x in shown.items()}
         axis = drawn[row * columns]
         for i, (label, line) in enumerate(lines.items()):
-            curve(axis, line, omega_max, label=verbatim(label), color=f"C{i}")
+            curve(axis, line, omega_max, label=verbatim(label), color=own_colour(i))
         fit_levels(axis, list(lines.values()), omega_max)
         if bands and title in bands:
             axis.axvspan(*bands[title], ymin=0.96, color=GREY, alpha=0.6, linewidth=0)

@@ -65,6 +65,11 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return inside
 
 
+def own_colour(number: int) -> str:
+    """The colour of one of several curves; matplotlib would look "C1" up as it draws, in the user's settings."""
+    return CYCLE[number % len(CYCLE)]
+
+
 def verbatim(name: Any) -> str:
     r"""Text of a figure that shows a user's name as it is: matplotlib makes formulas of what stands between two $.
 
