@@ -164,3 +164,11 @@ def test_each_curve_of_a_spectrum_has_its_own_colour(plane):
     assert [label for label, _ in shown[0]] == ["base x", "base y", "δ"]
     assert [label.startswith("base") for label, _ in shown[1]] == [False]
     assert len({colour for _, colour in shown[0] + shown[1]}) == 4
+
+
+def test_drawing_frames_reports_nothing(plane, caplog):
+    """matplotlib reports every fixed limit that it moves for equal scales, again at each layout."""
+    rig = fb.plot.rig(plane.model.scene)
+    for figure in (fb.plot.mode_shapes(plane.model), fb.plot.deflected(plane), fb.plot.frame(plane, t=0.3), rig):
+        figure.draw_without_rendering()
+    assert not caplog.records

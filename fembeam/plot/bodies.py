@@ -91,7 +91,10 @@ def finish(axis: Any, shapes: PlacedShapes, room: float = 0.0) -> None:
         axis.set_ylabel("y / m", labelpad=6)
         axis.set_zlabel("z / m", labelpad=14)
         return
-    axis.set(xlim=limits[0], ylim=limits[1], xlabel="x / m", ylabel="y / m")
+    if room:  # not as fixed limits: matplotlib reports each one that equal scales move
+        axis.update_datalim(limits.T)
+        axis.autoscale_view()
+    axis.set(xlabel="x / m", ylabel="y / m")
     axis.set_aspect("equal", adjustable="datalim")
     axis.locator_params(nbins=4)
 
