@@ -11,6 +11,8 @@ from problems import ROD
 
 import fembeam as fb
 from contacts import KelvinVoigt
+from fembeam.results import files
+from fembeam.results import html_page as html
 
 
 @pytest.fixture(scope="module")
@@ -172,3 +174,18 @@ def test_drawing_frames_reports_nothing(plane, caplog):
     for figure in (fb.plot.mode_shapes(plane.model), fb.plot.deflected(plane), fb.plot.frame(plane, t=0.3), rig):
         figure.draw_without_rendering()
     assert not caplog.records
+
+
+def test_static_shapes_are_called_so(plane, tmp_path):
+    """Their frequency is that of the reduced model, of no mode of the structure."""
+    model = plane.model.scene.reduce(modes=2, residual=True, elements=12)
+    run = model.simulate(duration=5.0, dt=1e-2)
+    titles = [axis.get_title(loc="left").partition(":")[0] for axis in fb.plot.mode_shapes(model).axes]
+    assert titles == ["mode 1", "mode 2", "static shape"]
+    above = {
+        text.get_text().split(" =")[0].split(":")[0] for text in fb.plot.spectrum(run, omega_max=1e3).axes[0].texts
+    }
+    assert {r"$\omega_{1}$", r"$\omega_{2}$", "static shape"} <= above
+    assert r"$\omega_{3}$" not in above
+    files.write(run, tmp_path)
+    assert "<td>static shape</td>" in html.write_page(tmp_path).read_text(encoding="utf-8")

@@ -17,6 +17,7 @@ from fembeam.cli.messages import BAD_INPUT, FAILED, interrupted, one_line, say, 
 from fembeam.results import files as report
 from fembeam.results import folder as folders
 from fembeam.support import interrupts
+from solvers.problem import counted
 
 if TYPE_CHECKING:
     from fembeam.model import Model, Run
@@ -196,12 +197,22 @@ def _computed(job: Job, name: str) -> Outcome:
     return outcome
 
 
+def _frequencies(model: Model) -> str:
+    """Frequencies of modes, and those of static shapes, which are none of the structure."""
+    named = list(zip(model.names, model.omega.tolist(), strict=True))
+    shapes = [w for name, w in named if name.startswith("static")]
+    modes = [w for name, w in named if not name.startswith("static")]
+    groups = {"mode": modes, "static shape": shapes}
+    told = (f"{counted(len(of), word)}: {', '.join(f'{w:.6g}' for w in of)} rad/s" for word, of in groups.items() if of)
+    return "; ".join(told)
+
+
 def _simulation(job: Job) -> Outcome:
     """The study [simulate]."""
     started, study = time.perf_counter(), job.file.studies["simulate"]
     model = job.model
     if not job.quiet:
-        say(f"{len(model.omega)} modes: " + ", ".join(f"{w:.6g}" for w in model.omega) + " rad/s")
+        say(_frequencies(model))
     with interrupts.deferred():
         try:
             done, code = _simulated(job.file, model, not job.quiet)

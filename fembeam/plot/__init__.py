@@ -22,14 +22,15 @@ from fembeam.plot.peaks import backbone, fold_curve, peak_curve
 from fembeam.plot.random import random_densities, random_spectra
 from fembeam.plot.response import deflected, densities, mode_shapes, time_history
 from fembeam.plot.rig import rig
-from fembeam.plot.run_signals import batches, natural, responses, sampling_of, stationary
+from fembeam.plot.run_signals import batches, coordinates, natural, responses, sampling_of, stationary
 from fembeam.plot.spectra import peaks, segment_for, spectra_of, spectrum
 from fembeam.plot.style import one_legend, styled
 from fembeam.plot.variation import minimum, variation
 
 __all__ = [
-    "animate", "backbone", "basins", "batches", "bifurcation", "branch", "campbell", "contacts", "deflected",
-    "densities", "equivalent", "floor_spectrum", "fold_curve", "forces_in_clearance", "frame", "frequency_response",
+    "animate", "backbone", "basins", "batches", "bifurcation", "branch", "campbell", "contacts", "coordinates",
+    "deflected", "densities", "equivalent", "floor_spectrum", "fold_curve", "forces_in_clearance", "frame",
+    "frequency_response",
     "hysteresis", "identification", "loops", "minimum", "mode_count", "mode_shapes", "natural", "one_legend",
     "orbit", "orbit_in_clearance", "peak", "peak_curve", "peaks", "places", "random_densities", "random_spectra",
     "response_spectrum", "responses", "restitutions", "rig", "sampling_of", "segment_for", "smallest_model",

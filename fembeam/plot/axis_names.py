@@ -61,6 +61,29 @@ def axis_name(path: str, scene: Scene) -> str:
     return f"{name} / {unit}" if unit else name
 
 
+def coordinate_name(name: str) -> str:
+    """A coordinate of a reduced model, one of `Model.names`, in words.
+
+    Examples
+    --------
+    >>> [coordinate_name(name) for name in ("1", "static", "2 of beam 1", "impactor 0")]
+    ['mode 1', 'static shape', 'mode 2 of beam 1', 'impactor 0']
+    """
+    return f"mode {name}" if name[0].isdigit() else name.replace("static", "static shape")
+
+
+def frequency_words(coordinate: str, omega: float) -> str:
+    r"""The frequency of a coordinate given in words: that of a static shape is no natural one.
+
+    Examples
+    --------
+    >>> print(frequency_words("mode 2 of beam 1", 310.2), frequency_words("static shape", 473.1), sep=", ")
+    $\omega_{2}$ of beam 1 = 310, static shape: 473
+    """
+    number, space, of = coordinate.removeprefix("mode ").partition(" ")
+    return rf"$\omega_{{{number}}}${space}{of} = {omega:.0f}" if number.isdigit() else f"{coordinate}: {omega:.0f}"
+
+
 def _owner(scene: Scene, beam: str | None, kind: str, number: int) -> str:
     """What a part is called: its name, else its kind and number."""
     part = _part(scene, beam, kind, number)

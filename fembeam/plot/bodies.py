@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from fembeam.plot.axis_names import coordinate_name
 from fembeam.plot.clearance import Whirl
 from fembeam.plot.figure import heading
 from fembeam.plot.style import BLUE, GREY, RED, round_factor
@@ -111,7 +112,7 @@ def mode_figure(model: Model) -> Figure:
         moved *= SHOWN * size_of(shapes) / np.linalg.norm(moved, axis=1).max()
         draw(axis, shapes, None, GREY, 0.8)
         draw(axis, shapes, moved, BLUE, 1.8)
-        axis.set_title(f"mode {model.names[mode]}: {model.omega[mode]:.5g} rad/s", fontsize=8)
+        axis.set_title(f"{coordinate_name(model.names[mode])}: {model.omega[mode]:.5g} rad/s", fontsize=8)
         finish(axis, shapes)
     heading(axes, "Mode shapes of the linear structure", True)
     return figure

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fembeam.plot.axis_names import coordinate_name
 from fembeam.plot.bodies import SHOWN, displacements, mode_figure
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.style import BLUE, GREY, Vector, verbatim
@@ -36,7 +37,7 @@ def body_mode_shapes(model: Model, axes: Axes | None) -> Figure:
             _deflected(axis, shapes, int(mode), view)
         else:
             _bars(axis, shapes, int(mode))
-        axis.set_title(f"mode {model.names[mode]}: {model.omega[mode]:.4g} rad/s", fontsize=8)
+        axis.set_title(f"{coordinate_name(model.names[mode])}: {model.omega[mode]:.4g} rad/s", fontsize=8)
     for axis in drawn[len(moving) :]:
         axis.set_axis_off()
     heading(drawn, "Mode shapes of the linear structure", axes is None)

@@ -30,6 +30,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fembeam.model import places
+from fembeam.plot.axis_names import coordinate_name
 from fembeam.plot.bodies import deflected_figure
 from fembeam.plot.body_shapes import body_mode_shapes
 from fembeam.plot.figure import heading, sheet
@@ -128,7 +129,7 @@ def mode_shapes(model: Model, axes: Axes | None = None) -> Figure:
     scale = np.abs(shapes).max(axis=0)
     axis.axhline(0.0, color=GREY, linewidth=0.6)
     for i in np.flatnonzero(scale)[:6]:  # other bodies' modes do not move this beam
-        label = f"mode {model.names[i]}: {model.omega[i]:.{0 if model.omega[i] >= 1e3 else 1}f} rad/s"
+        label = f"{coordinate_name(model.names[i])}: {model.omega[i]:.{0 if model.omega[i] >= 1e3 else 1}f} rad/s"
         axis.plot(unit * z, shapes[:, i] / scale[i], label=f"{label}, ζ = {model.zeta[i]:.3g}")
     _mark_features(axis, model, unit)
     axis.set(xlabel=f"z / {name}", ylabel="φ / max |φ|", yticks=[-1.0, -0.5, 0.0, 0.5, 1.0])

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fembeam.model import places
+from fembeam.plot.axis_names import coordinate_name
 from fembeam.plot.style import Vector
 from fembeam.scene import persistent_drive
 from fembeam.scene.places import unsigned
@@ -63,6 +64,13 @@ def place_of(run: Run, stop: int) -> Any:
 def natural(run: Run) -> Vector:
     """Natural frequencies, rad/s."""
     return run.readout.omega
+
+
+def coordinates(run: Run) -> list[str]:
+    """Each coordinate in words, "mode 1", "static shape"; of a run read from a file its number from 1."""
+    if run.model is None:
+        return [f"{i + 1}" for i in range(len(natural(run)))]
+    return [coordinate_name(name) for name in run.model.names]
 
 
 def sampling_of(run: Run) -> float:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fembeam.model import places
+from fembeam.plot.axis_names import frequency_words
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.linear import frequencies
-from fembeam.plot.run_signals import estimated, first_stop, natural, place_of, responses, sampling_of
+from fembeam.plot.run_signals import coordinates, estimated, first_stop, natural, place_of, responses, sampling_of
 from fembeam.plot.style import BLUE, CYCLE, GREEN, GREY, Vector, curve, drawable, fit_levels, styled, verbatim
 from fembeam.response import frame_motion
 from fembeam.scene import signals_of
@@ -54,8 +55,8 @@ def spectrum(
     -----
     Shaded: 95 % confidence, where the run holds at least four independent parts. Under one noise the response of the
     linear scene, |H|² S with all contacts open, is dashed. Dotted lines are the natural frequencies of the linear
-    model, named at the top; numbers are the peaks of the first curve. Of a transient the levels hold for this stretch
-    of time only: see `floor_spectrum`.
+    model and the frequencies of its static shapes, named at the top; numbers are the peaks of the first curve. Of a
+    transient the levels hold for this stretch of time only: see `floor_spectrum`.
     """
     figure, (upper, lower) = sheet(2, 1, (7.0, 5.6), axes, sharex=True)
     spectra, linear = spectra_of(run, discard), _linear(run)
@@ -163,18 +164,19 @@ def _mark_peaks(axis: Axes, line: Spectrum, top: float) -> None:
 
 
 def _mark_frequencies(axes: tuple[Axes, ...], run: Run, top: float) -> None:
-    """Dotted lines at the natural frequencies, their names above the first of the axes."""
-    omega = natural(run)
-    omega = omega[omega < top]
+    """Dotted lines at the frequencies of all coordinates, their names above the first of the axes."""
+    inside = sorted(pair for pair in zip(natural(run).tolist(), coordinates(run), strict=True) if pair[0] < top)
+    omega, names = np.array([w for w, _ in inside]), [frequency_words(name, w) for w, name in inside]
     for axis in axes:
         for value in omega:
             axis.axvline(value, color=GREY, linestyle=":", linewidth=0.8, zorder=0)
     close = len(omega) > 1 and np.diff(omega).min() < NAME_WIDTH * top
+    close = close or any("shape" in name or "of" in name for name in names)  # longer ones have room upright
     every = max(1, int(np.ceil(len(omega) * UPRIGHT)))  # more than the width holds: some
     shown = np.arange(len(omega))[::every]
     along = apart(omega[shown] / top, UPRIGHT) if close else omega[shown] / top
     for i, x in zip(shown, along, strict=True):
-        axes[0].annotate(rf"$\omega_{{{i + 1}}}$ = {omega[i]:.0f}", (omega[i], 1.0), xycoords=("data", "axes fraction"),
+        axes[0].annotate(names[i], (omega[i], 1.0), xycoords=("data", "axes fraction"),
                          xytext=(x, 1.06), textcoords="axes fraction", ha="center", va="bottom", fontsize=8, color=GREY,
                          rotation=90 if close else 0, arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.6,
                                                                   "shrinkA": 0, "shrinkB": 0})  # fmt: skip

@@ -131,6 +131,7 @@ def summary(
         "simulated_seconds": run.reached,
         "discarded_seconds": discard,
         "wall_seconds": run.cost.seconds if seconds is None else seconds,
+        "coordinates": plot.coordinates(run),
         "omega": plot.natural(run).tolist(),
         "zeta": run.readout.zeta.tolist(),
         "moments": _moments(run, discard),

@@ -122,8 +122,8 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
     """Tables of [simulate], in the units of the figures."""
     rotations = found.get("rotations", [])
     rows: list[list[Any]] = [
-        [i, _rounded(w, 5), _rounded(w / math.tau, 5), f"{z:.4g}"]
-        for i, (w, z) in enumerate(zip(found["omega"], found["zeta"], strict=True), start=1)
+        [name, _rounded(w, 5), _rounded(w / math.tau, 5), f"{z:.4g}"]
+        for name, w, z in zip(found["coordinates"], found["omega"], found["zeta"], strict=True)
     ]
     yield "<h2>Model</h2>" + html_table(["coordinate", "ω / rad s⁻¹", "Hz", "ζ"], rows)
     if found["moments"]:
