@@ -90,7 +90,7 @@ def test_refused(plane):
 
 
 def test_rig_of_a_frame():
-    """The arrow of a stop points the way its gap closes, names stand in the figure, the frame is where it is."""
+    """A stop stands ahead the way its gap closes, on the frame; names stand in the figure, the frame is where it is."""
     law = KelvinVoigt(1e6, 50.0)
     scene = fb.Scene(
         portal(), [fb.Clamped("A"), fb.Fixed("D", "x", "y", name="hinge")],
@@ -98,11 +98,12 @@ def test_rig_of_a_frame():
         base={"x": fb.Harmonic(1e-3, 40.0)},
     )  # fmt: skip
     axis = scene.figure().axes[0]
-    body, arrow = axis.lines[1], axis.lines[-1]  # of three members, the beam; supports, mass, stop
+    body, tip, ground = axis.lines[1], *axis.lines[-2:]  # of three members, the beam; supports, mass, stop
     np.testing.assert_allclose(np.transpose(body.get_data()), [[0, 3], [4, 3]], atol=1e-12)
-    (x, tip, *_), (y, low, *_) = arrow.get_data()
-    assert (x, tip) == pytest.approx((0.7, 0.7))
-    assert low < y < 3.0
+    (x, y), (_, low) = tip.get_data(), ground.get_data()
+    assert (x.min() + x.max()) / 2 == pytest.approx(0.7)
+    assert low.min() < y.min() < y.max() < 3.0
+    np.testing.assert_allclose(axis.patches[0].get_path().vertices[: len(x)], np.transpose((x, y)))  # filled
     texts = " ".join(text.get_text().replace("\n", " ") for text in axis.texts)
     for word in ("clamp at A", "hinge", "box, 2 kg", "stop at B- C + 0.7 m, -y, gap 1 mm"):
         assert word.replace("- ", "-") in texts.replace("- ", "-")

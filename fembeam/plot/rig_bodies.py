@@ -33,12 +33,17 @@ Vector = NDArray[np.float64]
 REACH = 0.12  # of the body's size, length of springs and arrows
 BESIDE = 0.5  # of REACH, the distance at which what strikes stands
 RING = 0.4  # of REACH, radius of a circular clearance
-FREE = 0.03  # of the body's size, between a place and the arrow of a stop
+FREE = 0.03  # of the body's size, between a place and a stop or the arrow of a load
 MOST_BESIDE = 40  # places with labels beside them
 BESIDE_LIST = 0.7  # of the width of a figure, left for the axes beside a list
 LISTED = 32  # characters of a line in the list of what stands on a body in space
 SLIMMEST = 0.7  # of its longest side, what a box in space is wide at least, so that its axes can be read
 ZIGZAG = np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]) * 0.12  # of the length of a spring
+TIP = np.vstack([circle(0.15, (0.15, 0.0), (0.5 * np.pi, 1.5 * np.pi)), [[0.2, -0.15], [0.2, 0.15], [0.15, 0.15]]])
+IN_SPACE = 1.5  # times as large there, where bodies are small in their box
+VIEWER = 0.433, -0.75, 0.5  # where matplotlib looks from; symbols are turned there
+STEM = np.array([[0.2, 0.0], [0.36, 0.0]])  # of a stop, behind its tip
+HATCHED = np.array([[x, y - 0.1 * (x > 0.36)] for y in (0.2, 0.1, 0.0, -0.1, -0.2) for x in (0.36, 0.46, 0.36)])
 HEAD = np.array([[0.0, 0.0], [1.0, 0.0], [0.7, 0.12], [1.0, 0.0], [0.7, -0.12]])  # an arrow of length 1
 
 
@@ -151,10 +156,13 @@ class _Panel:
 
     def _numbered(self, axis: Any, numbers: list[str]) -> None:
         """Numbers at the places, in the plane around them while there is room."""
+        from matplotlib.patheffects import withStroke
+
         if not self.space and len(numbers) <= MOST_BESIDE and self._labelled(axis, numbers, 8.0):
             return
         for text, key in zip(numbers, self.words, strict=True):
-            axis.text(*self.places[key][: 3 if self.space else 2], f" {text}", fontsize=8, weight="bold", va="bottom")
+            axis.text(*self.places[key][: 3 if self.space else 2], f" {text}", fontsize=8, weight="bold", va="bottom",
+                      zorder=1e3, path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
 
     def _labelled(self, axis: Any, texts: list[str], points: float = SIZE) -> bool:
         """One text for each place, around it where it covers nothing; whether all have room."""
@@ -204,7 +212,7 @@ class _Panel:
             yield impactor, f"{self._label(impactor)}, {facts}"
 
     def _acting(self, axis: Any, one: Any) -> str:
-        """A stop as an arrow the way its gap closes, an element as a spring; a line to the second place."""
+        """A stop ahead of its place, the way its gap closes, an element as a spring; a line to the second place."""
         to, colour = one.coordinate.to, COLOURS["element" if one.always else "stop"]
         if to is not None and (to[0] or self.number) == self.number:
             self._plot(axis, np.array([self.places[repr(one.z)], self.places[repr(to[1])]]), colour, 1.0, "--")
@@ -213,7 +221,7 @@ class _Panel:
             self._ring(axis, one, colour)
             return f"{self._label(one)}, clearance {length(one.clearance)}{rubs}"
         if not one.always:
-            self._arrow(axis, one, -one.push * np.array(one.coordinate.along), colour)
+            self._stop(axis, one, -one.push * np.array(one.coordinate.along), colour)
             return f"{self._label(one)}, {gap_words(one.gap, one.coordinate.rotation)}{rubs}"
         if to is None:
             self._to_frame(axis, one, colour, ZIGZAG)
@@ -238,7 +246,9 @@ class _Panel:
         at = whole[: 3 if self.space else 2, None]
         axis.plot(*at, marker, color=colour, markersize=8, gid=part.label)
 
-    def _shape(self, axis: Any, part: Any, way: Vector, shape: Vector, start: float, colour: str) -> None:
+    def _shape(
+        self, axis: Any, part: Any, way: Vector, shape: Vector, start: float, colour: str, filled: bool = False
+    ) -> None:
         """A shape (k, 2), along and across a direction; of a rotation out of the plane a circle, else dashed."""
         turns = bool(np.any(way[3:]))
         along = way[3:] if turns else way[:3]
@@ -248,11 +258,24 @@ class _Panel:
             ring = np.column_stack([circle(0.4 * length, turn=(0.0, 1.7 * np.pi)), np.zeros(40)])
             return self._plot(axis, at + ring, colour, 1.2)
         along = flat / np.linalg.norm(flat)
-        across = np.cross(along, (0.0, 0.0, 1.0) if abs(along[2]) < 0.9 else (1.0, 0.0, 0.0))
+        across = np.cross(along, VIEWER if self.space else (0.0, 0.0, 1.0))
+        across = across if np.linalg.norm(across) > 1e-3 else np.cross(along, (0.0, 0.0, 1.0))  # seen from the end
         xi, eta = shape.T[:, :, None]
         points = at + length * (start + xi) * along + length * eta * across / np.linalg.norm(across)
         self._plot(axis, points, colour, 1.2, "--" if turns else "-")
+        if filled and not self.space:
+            axis.fill(*points.T[:2], facecolor=colour)
         return None
+
+    def _stop(self, axis: Any, stop: Any, way: Vector, colour: str) -> None:
+        """A tip on a stem as on beams, on the frame unless another place carries it; of rotation an arrow."""
+        if stop.coordinate.rotation:
+            self._arrow(axis, stop, way, colour)
+            return
+        size = IN_SPACE if self.space else 1.0
+        self._shape(axis, stop, way, size * TIP, FREE / REACH, colour, filled=True)
+        behind = STEM if stop.coordinate.to else np.vstack([STEM, HATCHED])
+        self._shape(axis, stop, way, size * behind, FREE / REACH, colour)
 
     def _arrow(self, axis: Any, part: Any, way: Vector, colour: str) -> None:
         """An arrow along a direction, beginning a little away from the place."""
