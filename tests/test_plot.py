@@ -397,6 +397,13 @@ PATHS = {
     "dashpots[0].rotational": "rotational damping of dashpot 0 / N m s/rad",
     "damping.zeta[0]": "damping ratio ζ",
     "bodies[0].springs[1].foot.omega": "drive frequency ω of beam 1 / rad s⁻¹",
+    "base.std": "base standard deviation / m",
+    "base.x.band[1]": "base band of ω along x / rad s⁻¹",
+    "forces[1].signal.peak": "drive peak / N m",
+    "supports[0].motion.rz.amplitude": "motion amplitude along rz of support 0 / rad",
+    "beam.nodes.B[1]": "y of node B / m",
+    "beam.members[0].section.fibre": "distance of the outer fibre / m",
+    "stops[0].friction.mu": "coefficient of friction of stop 0",
     "stops[0].law.something": "stops[0].law.something",
 }
 

@@ -390,6 +390,18 @@ def test_figures(parameters, samples, panels):
     assert len(found.table()) == len(found) == len(found.plain()["points"])
 
 
+def test_tables_have_the_units_of_the_parameters():
+    """Of arguments of a function none is known."""
+    run = {"quantity": "rms", "duration": 0.1, "dt": 1e-3}
+    found = fb.study.vary(paper_scene(), {"gap": [0.0, 1e-3], "damping.zeta[0]": [0.1]}, **run)
+    assert found.units == ("m", "")
+    assert re.search(r"stops\[0\].gap / m +damping.zeta\[0\] +rms", str(found))
+    least = fb.study.minimise(paper_scene(), {"gap": (0.0, 1e-3)}, tolerance=0.05, most=12, **run)
+    assert "stops[0].gap / m" in str(least)
+    made = fb.study.vary(lambda gap: paper_scene(), {"gap": [0.0]}, **run)
+    assert made.units == ("",)
+
+
 FILE = (
     ROD_FILE
     + """

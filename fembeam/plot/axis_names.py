@@ -7,10 +7,19 @@ from typing import Any
 
 from fembeam.scene import PointMoment, Scene
 
-SIGNALS = {"base": "base", "foot": "foot", "signal": "drive"}
+SIGNALS = {"base": "base", "foot": "foot", "signal": "drive", "motion": "motion"}
+SIZES = {"amplitude": "amplitude", "std": "standard deviation", "mean": "mean", "peak": "peak", "size": "size"}
+TIMES = {"omega0": ("first frequency ω", "rad s⁻¹"), "omega1": ("last frequency ω", "rad s⁻¹"),
+         "band": ("band of ω", "rad s⁻¹"), "phase": ("phase", "rad"), "period": ("period", "s"),
+         "duration": ("duration", "s"), "length": ("length", "s"), "at": ("start", "s"), "rise": ("rise time", "s"),
+         "padding": ("padding", "s")}  # fmt: skip
 LAWS = {"stiffness": ("contact stiffness", "N/m^p"), "exponent": ("exponent of the contact law", ""),
         "damping_factor": ("hysteresis factor", "s/m"), "damping": ("contact damping", "N s/m^p"),
-        "limit": ("limit of slip", "N")}  # fmt: skip
+        "limit": ("limit of slip", "N"), "limits": ("limit of slip", "N"), "yield_force": ("yield force", "N"),
+        "static_limit": ("limit of stick", "N"), "hardening": ("hardening", "N/m"), "knots": ("knee", "m"),
+        "slopes": ("slope of the contact law", "N/m"), "loading": ("stiffness in loading", "N/m"),
+        "unloading": ("stiffness in unloading", "N/m"),
+        "entry_rate_floor": ("floor of entry rates", "m/s")}  # fmt: skip
 PARTS = {
     "gap": ("gap", "m"), "clearance": ("clearance", "m"), "centre": ("centre of the circle", "m"),
     "z": ("place z", "m"), "mass": ("mass", "kg"), "inertia": ("rotary inertia", "kg m²"),
@@ -20,11 +29,20 @@ PARTS = {
     "gravity": ("gravity", "m/s²"), "alpha": ("Rayleigh's α", "1/s"), "beta": ("Rayleigh's β", "s"),
     "axial_force": ("axial force", "N"), "foundation": ("foundation stiffness", "N/m²"),
     "velocity": ("velocity", "m/s"), "offset": ("offset of the centre of mass", "m"), "zeta": ("damping ratio ζ", ""),
-    "on": ("second place", "m"), "to": ("second place", "m"),
+    "on": ("second place", "m"), "to": ("second place", "m"), "fibre": ("distance of the outer fibre", "m"),
+    "spin": ("spin", "rad/s"), "mu": ("coefficient of friction", ""),
 }  # fmt: skip
-TURNED = {"m": "rad", "N": "N m", "N/m^p": "N m/rad^p", "s/m": "s/rad", "N s/m^p": "N m s/rad^p"}  # of rotation
-OWNERS = {"masses": "mass", "springs": "spring", "dashpots": "dashpot", "stops": "stop", "elements": "element",
-          "forces": "force", "bodies": "beam"}  # fmt: skip
+TURNED = {
+    "m": "rad",
+    "N": "N m",
+    "N/m^p": "N m/rad^p",
+    "s/m": "s/rad",
+    "N s/m^p": "N m s/rad^p",
+    "N/m": "N m/rad",
+    "m/s": "rad/s",
+}  # of rotation
+OWNERS = {"supports": "support", "masses": "mass", "springs": "spring", "dashpots": "dashpot", "stops": "stop",
+          "elements": "element", "forces": "force", "bodies": "beam"}  # fmt: skip
 
 
 def axis_name(path: str, scene: Scene) -> str:
@@ -37,28 +55,49 @@ def axis_name(path: str, scene: Scene) -> str:
     >>> axis_name("forces[0].signal.omega", scene), axis_name("stops[1].gap", scene)
     ('drive frequency ω / rad s⁻¹', 'gap of stop 1 / m')
     """
+    name, unit = _named(path, scene)
+    return f"{name} / {unit}" if unit else name or path
+
+
+def parameter_unit(path: str, scene: Scene) -> str:
+    """The unit of a parameter; empty without one, and of a path that is not known.
+
+    Examples
+    --------
+    >>> from fembeam import Beam, Scene, Section
+    >>> scene = Scene(Beam(0.5, Section.circle(2.1e11, 7800.0, 0.01)))
+    >>> parameter_unit("stops[0].gap", scene), parameter_unit("base.std", scene), parameter_unit("damping.zeta", scene)
+    ('m', 'm', '')
+    """
+    return _named(path, scene)[1]
+
+
+def _named(path: str, scene: Scene) -> tuple[str, str]:
+    """Name and unit of a parameter; a name that is not known is empty."""
     owner = re.match(r"(bodies\[(\d+)\]\.)?(\w+)(\[(\d+)\])?", path)
     last = re.sub(r"\[\d+\]$", "", path.rsplit(".", 1)[-1])
     assert owner is not None
     kind, number, beam = owner[3], owner[5], owner[2]
     signal = next((part for part in path.split(".") if part in SIGNALS), "")
     if signal:
-        turns = kind == "forces" and isinstance(_part(scene, beam, kind, int(number)), PointMoment)
-        name, unit = _of_signal(kind, signal, last, turns)
-        along = re.match(r"(?:bodies\[\d+\]\.)?base\.([xyz])\.", path)
-        name += f" along {along[1]}" if name and along else ""
-    elif kind == "dashpots" and last == "rotational":
-        name, unit = f"rotational damping of {_owner(scene, beam, kind, int(number))}", "N m s/rad"
+        name, unit = _of_signal(path, scene, kind, beam, number, signal, last)
+    elif ".nodes." in path:
+        component = path.removesuffix("]").rpartition("[")[2]
+        name, unit = f"{'xyz'[int(component)]} of node {last}", "m"
     else:
-        name, unit = (LAWS if ".law." in path else PARTS).get(last, ("", ""))
-        acts = kind in ("stops", "elements") and last not in ("z", "on", "to")
-        if acts and (part := _part(scene, beam, kind, int(number))) and part.coordinate.rotation:
-            unit = TURNED.get(unit, unit)
-        name += f" of {_owner(scene, beam, kind, int(number or 0))}" if name and kind in OWNERS else ""
-    if not name:
-        return path
-    name += f" of beam {int(beam) + 1}" if beam else ""
-    return f"{name} / {unit}" if unit else name
+        name, unit = _of_part(scene, beam, kind, int(number or 0), last, ".law." in path)
+    return name + (f" of beam {int(beam) + 1}" if name and beam else ""), unit
+
+
+def _of_part(scene: Scene, beam: str | None, kind: str, number: int, last: str, of_law: bool) -> tuple[str, str]:
+    """Name and unit of a number of a part, or of its law."""
+    if kind == "dashpots" and last == "rotational":
+        return f"rotational damping of {_owner(scene, beam, kind, number)}", "N m s/rad"
+    name, unit = (LAWS if of_law else PARTS).get(last, ("", ""))
+    acts = kind in ("stops", "elements") and last not in ("z", "on", "to")
+    if acts and (part := _part(scene, beam, kind, number)) and part.coordinate.rotation:
+        unit = TURNED.get(unit, unit)
+    return name + (f" of {_owner(scene, beam, kind, number)}" if name and kind in OWNERS else ""), unit
 
 
 def coordinate_name(name: str) -> str:
@@ -96,12 +135,20 @@ def _part(scene: Scene, beam: str | None, kind: str, number: int) -> Any:
     return parts[number] if number < len(parts) else None
 
 
-def _of_signal(kind: str, signal: str, last: str, turns: bool) -> tuple[str, str]:
+def _of_signal(
+    path: str, scene: Scene, kind: str, beam: str | None, number: str | None, signal: str, last: str
+) -> tuple[str, str]:
     """Name and unit of a signal's number."""
     if last == "omega":
-        return "drive frequency ω", "rad s⁻¹"
-    if last == "phase":
-        return f"{SIGNALS[signal]} phase", "rad"
-    if last == "amplitude":
-        return f"{SIGNALS[signal]} amplitude", "m" if kind != "forces" else "N m" if turns else "N"
-    return "", ""
+        name, unit = "drive frequency ω", "rad s⁻¹"
+    elif last in SIZES:
+        name, unit = f"{SIGNALS[signal]} {SIZES[last]}", "N" if kind == "forces" else "m"
+    else:
+        words, unit = TIMES.get(last, ("", ""))
+        name = f"{SIGNALS[signal]} {words}" if words else ""
+    along = re.search(r"\b(?:base|motion)\.(r?[xyz])\.", path)
+    moment = kind == "forces" and isinstance(_part(scene, beam, kind, int(number or 0)), PointMoment)
+    if moment or (along and along[1].startswith("r")):
+        unit = TURNED.get(unit, unit)
+    name += f" along {along[1]}" if name and along else ""
+    return name + (f" of {_owner(scene, beam, kind, int(number or 0))}" if name and signal == "motion" else ""), unit

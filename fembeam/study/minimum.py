@@ -90,7 +90,8 @@ class Minimum(Result):
         """What was found, which bounds are active, how many evaluations it took."""
         name = self.tried.quantities[0]
         value = self.value if np.isnan(self.standard_error) else repr(Estimate(self.value, self.standard_error, 2))
-        ends = [(path, x, "at its bound" if path in self.active else "") for path, x in self.at.items()]
+        at = zip(self.tried.heads, self.at.items(), strict=True)
+        ends = [(head, x, "at its bound" if path in self.active else "") for head, (path, x) in at]
         limits = [(one.name, one.value, f"at most {one.bound:g}{', active' * one.active}") for one in self.limits]
         used = f", {counted(self.gradients, 'gradient')}" if self.gradients else ""
         done = "converged" if self.converged else "NOT CONVERGED: allow more evaluations"

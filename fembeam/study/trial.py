@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import solvers
 from fembeam.model import Model, Run
-from fembeam.plot.axis_names import axis_name
+from fembeam.plot.axis_names import axis_name, parameter_unit
 from fembeam.scene import Scene, changes_structure, numbered, path_of, with_value
 from fembeam.study.measure import Plan, runs, values_of
 from fembeam.study.quantities import Quantity, label, named
@@ -113,6 +113,12 @@ class Trial:
         if not isinstance(self.scene, Scene):
             return self.names
         return tuple(axis_name(name, self.scene) for name in self.names)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the parameters, empty where there is none and of arguments of a function."""
+        scene = self.scene
+        return tuple(parameter_unit(name, scene) if isinstance(scene, Scene) else "" for name in self.names)
 
     def words(self, point: Sequence[float]) -> str:
         """A point as text."""

@@ -40,7 +40,7 @@ class Variation(Result):
     standard_error : (n, q) of the values over seeds, or over groups of periods; NaN of single runs.
     axes : (d,) values along each parameter of a grid, the last one running fastest; empty of samples.
     failures : (number of the point, reason) of runs that failed.
-    titles : (d,) names of the parameters for axes, with units.
+    titles : (d,) names of the parameters for axes, with units. units : (d,) these alone, SI, empty where not known.
     """
 
     names: tuple[str, ...]
@@ -51,6 +51,7 @@ class Variation(Result):
     axes: tuple[Vector, ...] = ()
     failures: tuple[tuple[int, str], ...] = ()
     titles: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.points)
@@ -79,8 +80,14 @@ class Variation(Result):
     def _parts(self) -> list[Part]:
         """Every point where they are few, the extremes of each quantity, and of samples their scatter."""
         rows = [(*point, *cells) for point, cells in zip(self.points.tolist(), self._cells(), strict=True)]
-        listed: list[Part] = [((*self.names, *self.quantities), rows)] if len(rows) <= LONGEST else []
-        return [repr(self), *listed, (("", "", "value", *self.names), self._extremes()), *self._scatter()]
+        listed: list[Part] = [((*self.heads, *self.quantities), rows)] if len(rows) <= LONGEST else []
+        return [repr(self), *listed, (("", "", "value", *self.heads), self._extremes()), *self._scatter()]
+
+    @property
+    def heads(self) -> list[str]:
+        """Paths of the parameters with their units, as tables have them."""
+        units = self.units or [""] * len(self.names)
+        return [f"{name} / {unit}" if unit else name for name, unit in zip(self.names, units, strict=True)]
 
     def _cells(self) -> list[list[Any]]:
         """Values with their standard errors, as printed."""
@@ -222,7 +229,7 @@ def collected(
         if (one := kept.values.get(_key(point))) is not None:
             estimate = Estimate.of_mean(one["values"])
             values[i], errors[i] = estimate.value, estimate.standard_error
-    return Variation(trial.called, points, trial.asked.names, values, errors, axes, failures, trial.titles)
+    return Variation(trial.called, points, trial.asked.names, values, errors, axes, failures, trial.titles, trial.units)
 
 
 def _key(point: Vector) -> str:
