@@ -221,6 +221,18 @@ def test_every_natural_frequency_in_view_is_named(run):
         assert not any(text.get_bbox_patch() for text in drawn.axes[0].texts)
 
 
+def test_figures_of_a_part_of_the_run_say_so(run):
+    """The spectrum of the base motion is of that part, too."""
+    shown = (plot.spectrum(run, 0.5), plot.densities(run, 0.5), plot.contacts(run, 0.5))
+    assert all("after 0.5 s" in figure.get_suptitle() for figure in shown)
+    assert "after" not in plot.densities(run).get_suptitle()
+    sweep = fb.SineSweep(1e-3, 20.0, 400.0, 2.0)
+    swept = dataclasses.replace(run.model.scene, base=sweep).reduce(1).simulate(1.9, 1e-3)
+    late = swept.t[swept.t >= 1.0]
+    expected = statistics.psd(sweep(late), 1e-3, plot.segment_for(len(late), 1e-3))
+    np.testing.assert_array_equal(plot.spectra_of(swept, 1.0)["base y"].density, expected.density)
+
+
 def test_contacts_say_what_is_left_out(run):
     count = 9000
     speed = np.geomspace(0.01, 0.5, count)

@@ -50,6 +50,19 @@ def test_tables_have_the_units_of_the_figures_and_few_digits(folder):
     assert float(value) * {"mJ": 1e-3, "µJ": 1e-6, "J": 1.0}[unit] == pytest.approx(found["energy"]["stored"], rel=5e-4)
 
 
+def test_headings_tell_what_is_of_the_whole_run(folder):
+    """Statistics begin after what is discarded; the energy balance and the history do not."""
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    for heading in ("Response after 1 s", "Contacts after 1 s", "Energy of the whole run"):
+        assert f"<h2>{heading}</h2>" in text
+    for name in ("Power spectral densities after 1 s", "Densities after 1 s", "Contacts after 1 s",
+                 "Time history, an excerpt of the whole run"):  # fmt: skip
+        assert f"<figcaption>{name}</figcaption>" in text
+    found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert files.text(found).count("after 1 s") == 2
+    assert "after" not in files.text(found | {"discarded_seconds": 0.0})
+
+
 def test_what_standard_errors_of_one_realisation_are_is_told(folder):
     """In 100 seeds of 60 s they were 3.3 times the scatter in linear motion, 1.5 times with the stop."""
     found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fembeam.plot.figure import heading, sheet
+from fembeam.plot.figure import after, heading, sheet
 from fembeam.plot.style import BLUE, GREEN, RED, Vector, plain_decades, styled
 from fembeam.plot.units import unit_for
 from fembeam.scene import unit_of
@@ -54,7 +54,7 @@ def contacts(run: Run, discard: float = 0.0, axes: Sequence[Axes] | None = None)
         count, stops = int(np.count_nonzero(kept)), len(np.unique(log.stop[kept]))
         of = f" of {stops} stops" if stops > 1 else ""
         rate = count / (run.reached - discard)
-        heading(drawn, f"{counted(count, 'contact')}{of}, {rate:.3g} per second", True, run=run)
+        heading(drawn, f"{counted(count, 'contact')}{of}{after(discard)}, {rate:.3g} per second", True, run=run)
     return figure
 
 

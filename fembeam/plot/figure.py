@@ -62,6 +62,17 @@ def heading(axes: Sequence[Axes], title: str, own: bool, weight: str = "bold", r
         figure.supxlabel(f"PARTIAL RESULT: {run.status}", color=RED, fontsize=8, wrap=True)
 
 
+def after(discard: float) -> str:
+    """What part of a run a figure shows, for its heading; nothing where it is the whole.
+
+    Examples
+    --------
+    >>> f"Contacts{after(5.0)}", f"Contacts{after(0.0)}"
+    ('Contacts after 5 s', 'Contacts')
+    """
+    return f" after {discard:g} s" if discard > 0.0 else ""
+
+
 def legend(axis: Axes, own: bool, loc: str, **options: Any) -> None:
     """A legend beside the axes of a figure of our own, or within axes that were given."""
     figure: Any = axis.figure

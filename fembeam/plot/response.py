@@ -33,7 +33,7 @@ from fembeam.model import places
 from fembeam.plot.axis_names import coordinate_name
 from fembeam.plot.bodies import deflected_figure
 from fembeam.plot.body_shapes import body_mode_shapes
-from fembeam.plot.figure import heading, sheet
+from fembeam.plot.figure import after, heading, sheet
 from fembeam.plot.random import density_panels
 from fembeam.plot.run_signals import between_samples, estimated, first_stop, natural, place_of, sampling_of, stationary
 from fembeam.plot.spectra import segment_for
@@ -109,7 +109,8 @@ def densities(run: Run, discard: float = 0.0, axes: Axes | Sequence[Axes] | None
     figure, drawn = sheet(1, len(signals), (7.0, 3.1), axes)
     density_panels(drawn, signals)
     if axes is None:
-        heading(drawn, "Probability densities against the Gaussian of the same mean and deviation", True, run=run)
+        title = f"Probability densities{after(discard)}, and Gaussians of equal mean and deviation"
+        heading(drawn, title, True, run=run)
     return figure
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from fembeam.model import places
 from fembeam.plot.axis_names import frequency_words
-from fembeam.plot.figure import heading, sheet
+from fembeam.plot.figure import after, heading, sheet
 from fembeam.plot.linear import frequencies
 from fembeam.plot.run_signals import coordinates, estimated, first_stop, natural, place_of, responses, sampling_of
 from fembeam.plot.style import BLUE, CYCLE, GREEN, GREY, Vector, curve, drawable, fit_levels, styled, verbatim
@@ -85,24 +85,26 @@ def _about(run: Run, discard: float, line: Spectrum) -> str:
     seconds = np.count_nonzero(run.t >= discard) * sampling_of(run)
     about = f"{seconds:.4g} s, {line.n_segments} segments, lines {line.omega[1]:.2g} rad/s apart"
     sure = line.estimate is not None and line.estimate.batches > 1
-    return f"Power spectral densities ({about}{', 95 % shaded' if sure else ''})"
+    return f"Power spectral densities{after(discard)} ({about}{', 95 % shaded' if sure else ''})"
 
 
 def spectra_of(run: Run, discard: float = 0.0) -> Mapping[str, Spectrum]:
     """Spectra of the base motion (where the run knows it) and of `responses`, these with their confidence."""
     motions = {} if run.model is None else run.model.scene.motions
-    samples, dt = int(np.count_nonzero(run.t >= discard)), sampling_of(run)
-    found = {name: signal.psd for name, signal in estimated(run, discard, segment_for(samples, dt)).items()}
+    t, dt = run.t[run.t >= discard], sampling_of(run)
+    found = {name: signal.psd for name, signal in estimated(run, discard, segment_for(len(t), dt)).items()}
     for direction, base in motions.items():
         step, rows = base.nodes(float(run.t[-1]), 1e-3) if hasattr(base, "nodes") else (np.inf, None)
         if rows is not None and step < dt:  # a sum of many lines: by FFT on its own grid
-            found[f"base {direction}"] = psd(rows[:, 0], step, segment_for(len(rows), step))
+            kept = rows[int(np.ceil(discard / step - 1e-9)) :, 0]
+            found[f"base {direction}"] = psd(kept, step, segment_for(len(kept), step))
         else:
-            found[f"base {direction}"] = psd(np.asarray(base(run.t)), dt, segment_for(len(run.t), dt))
+            found[f"base {direction}"] = psd(np.asarray(base(t)), dt, segment_for(len(t), dt))
     if run.model is None and run.readout.base is not None:  # of a run read from a file: its samples
         for direction in run.readout.moved:
             along = direction_of(direction, "base")
-            found[f"base {direction}"] = psd(frame_motion(run, 0, along), dt, segment_for(len(run.t), dt))
+            moved = frame_motion(run, 0, along)[run.t >= discard]
+            found[f"base {direction}"] = psd(moved, dt, segment_for(len(t), dt))
     return found
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from fembeam import plot
 from fembeam.model import Run
 from fembeam.model.run_csv import extremes_table, histories
+from fembeam.plot.figure import after
 from fembeam.plot.run_signals import FEWEST_BATCHES, MEMORIES
 from fembeam.scene import unit_of
 from fembeam.statistics import Batches, Estimate, moments
@@ -251,7 +252,8 @@ def text(found: dict[str, Any]) -> str:
     """The tables of a summary: moments and extremes of signals, contacts of stops, outputs asked for."""
     rotations = found.get("rotations", [])
     m, force, speed = unit_of("indentation", [False, *rotations]), *(unit_of(q, rotations) for q in ("force", "speed"))
-    head = ("", f"mean/{m}", f"std/{m}", "skewness", "kurtosis", f"min/{m}", f"max/{m}")
+    part = after(found["discarded_seconds"]).strip()
+    head = (part, f"mean/{m}", f"std/{m}", "skewness", "kurtosis", f"min/{m}", f"max/{m}")
     moments = [[name, *(row[key.partition("/")[0]] for key in head[1:])] for name, row in found["moments"].items()]
     tables = [aligned(head, moments)] if moments else []
     columns = {"mean time/s": "duration", f"mean peak force/{force}": "peak_force",
@@ -260,13 +262,13 @@ def text(found: dict[str, Any]) -> str:
         [row["name"], row["number"], row["rate"]] + [row.get(column, {}).get("mean") for column in columns.values()]
         for row in found["contacts"]
     ]
-    tables += [aligned(("", "contacts", "per second", *columns), rows)] if rows else []
+    tables += [aligned((part, "contacts", "per second", *columns), rows)] if rows else []
     return "\n\n".join(tables + ([_outputs(found)] if found.get("outputs") else []))
 
 
 def _outputs(found: dict[str, Any]) -> str:
     """The table of the outputs asked for."""
-    head = ("output", "mean", "std", "min", "at t/s", "max", "at t/s")
+    head = (f"output{after(found['discarded_seconds'])}", "mean", "std", "min", "at t/s", "max", "at t/s")
     return aligned(head, [[name, *row.values()] for name, row in found["outputs"].items()])
 
 

@@ -14,6 +14,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fembeam.plot.figure import after
 from fembeam.scene import unit_of
 from fembeam.support import html_table, written_whole
 
@@ -48,6 +49,8 @@ MOMENT_ROWS = (
 OUTPUT_COLUMNS = ("mean", "std", "min", "at t / s", "max", "at t / s")
 SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 PREFIXES = ("p", "n", "µ", "m", "", "k", "M", "G", "T")
+OF_PART = ("psd", "densities", "contacts")  # figures of what comes after the discarded seconds
+OF_WHOLE = {"time_history": ", an excerpt of the whole run", "response_spectrum": " of the whole run"}
 ORDER = ("rig", "time_history", "psd", "densities", "response_spectrum", "contacts", "modes")
 
 
@@ -96,7 +99,7 @@ def _sections(files: Sequence[Path], source: Source | None, warnings: Sequence[s
         if path.suffix == ".txt" and not (path.stem == "outputs" and found.get("outputs")):
             yield f"<h2>{escape(_words(path.stem))}</h2>"
             yield from _text(path.read_text(encoding="utf-8"))
-    yield from _figures(files)
+    yield from _figures(files, found.get("discarded_seconds", 0.0))
     yield from _settings(found, source)
 
 
@@ -120,7 +123,7 @@ def _text(content: str) -> Iterator[str]:
 
 def _simulation(found: dict[str, Any]) -> Iterator[str]:
     """Tables of [simulate], in the units of the figures."""
-    rotations = found.get("rotations", [])
+    rotations, part = found.get("rotations", []), after(found["discarded_seconds"])
     rows: list[list[Any]] = [
         [name, _rounded(w, 5), _rounded(w / math.tau, 5), f"{z:.4g}"]
         for name, w, z in zip(found["coordinates"], found["omega"], found["zeta"], strict=True)
@@ -133,7 +136,7 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
             [words.format(length), *(_scaled(row.get(key), unit, words) for row in signals)]
             for words, unit, key in MOMENT_ROWS
         ]
-        yield "<h2>Response</h2>" + html_table(["", *found["moments"]], rows)
+        yield f"<h2>Response{part}</h2>" + html_table(["", *found["moments"]], rows)
         yield f'<p class="note">{escape(found["confidence"])}</p>'
     if found["contacts"]:
         force, speed = (unit_of(of, rotations).replace("/s", " s⁻¹") for of in ("force", "speed"))
@@ -146,15 +149,15 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
             if keys[0] in found["contacts"][0] or keys[0] not in WHERE
         ]
         stops = [row["name"] for row in found["contacts"]]
-        yield "<h2>Contacts</h2>" + html_table(["", *stops], rows)
+        yield f"<h2>Contacts{part}</h2>" + html_table(["", *stops], rows)
     if found.get("outputs"):
         rows = [[name, *map(_number, row.values())] for name, row in found["outputs"].items()]
-        yield "<h2>Outputs</h2>" + html_table(["", *OUTPUT_COLUMNS], rows)
+        yield f"<h2>Outputs{part}</h2>" + html_table(["", *OUTPUT_COLUMNS], rows)
     if found["energy"]:
         ledger = found["energy"]
         rows = [[words, with_prefix(ledger[name], "J")] for name, words in ENERGY.items() if name in ledger]
         residual = ledger["residual_over_input"]
-        yield "<h2>Energy</h2>" + html_table(["", ""], rows)
+        yield f"<h2>Energy{' of the whole run' if part else ''}</h2>" + html_table(["", ""], rows)
         yield f'<p class="note">Missing in this balance, an estimate of the error: {residual:.1e} of the input.</p>'
 
 
@@ -207,16 +210,22 @@ def with_prefix(value: float, unit: str) -> str:
     return f"{_rounded(value / 1e3**power)} {PREFIXES[power + 4]}{unit}"
 
 
-def _figures(files: Sequence[Path]) -> Iterator[str]:
+def _figures(files: Sequence[Path], discard: float) -> Iterator[str]:
     """All figures, embedded."""
     figures = [path for path in files if path.suffix == ".png"]
     paths = sorted(figures, key=lambda p: (ORDER.index(p.stem) if p.stem in ORDER else len(ORDER), p.stem))
     if paths:
         yield "<h2>Figures</h2>"
     for path in paths:
-        data, name = base64.b64encode(path.read_bytes()).decode(), escape(_words(path.stem))
+        data = base64.b64encode(path.read_bytes()).decode()
+        name = escape(_words(path.stem) + _stretch(path.stem, discard))
         image = f'<div class="wide"><img src="data:image/png;base64,{data}" alt="{name}"></div>'
         yield f"<figure><figcaption>{name}</figcaption>{image}</figure>"
+
+
+def _stretch(name: str, discard: float) -> str:
+    """What part of the run a figure shows, where seconds are discarded."""
+    return after(discard) if name in OF_PART else OF_WHOLE.get(name, "") * (discard > 0.0)
 
 
 def _settings(found: dict[str, Any], source: Source | None) -> Iterator[str]:
