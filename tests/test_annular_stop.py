@@ -196,7 +196,7 @@ def test_saved_runs_keep_the_circle(run, tmp_path):
 def test_tables_and_figures(run, tmp_path):
     run.to_csv(tmp_path)
     head = (tmp_path / "histories.csv").read_text().splitlines()[0]
-    assert head.endswith("indentation 0 [m],force 0 x [N],force 0 y [N]")
+    assert head.endswith("indentation stop 0 [m],force stop 0 x [N],force stop 0 y [N]")
     assert "annular stop at 0.4 m" in str(run)
     circle, free, touching = fb.plot.orbit_in_clearance(run, window=(0.05, 0.1)).axes[0].lines
     assert np.nanmax(np.hypot(*circle.get_data())) == pytest.approx(0.2)

@@ -607,7 +607,7 @@ def test_a_run_as_csv(tmp_path, capsys):
     run = fb.load(tmp_path / "run.npz")
     head = (tmp_path / "csv" / "histories.csv").read_text().splitlines()[0].split(",")
     rows = np.loadtxt(tmp_path / "csv" / "histories.csv", delimiter=",", skiprows=1)
-    assert rows[:, head.index("force 0 [N]")] == pytest.approx(run.force()[::10], rel=1e-11)
+    assert rows[:, head.index("force stop 0 [N]")] == pytest.approx(run.force()[::10], rel=1e-11)
     assert rows[:, head.index("displacement tip [m]")] == pytest.approx(run.displacement(0.2599)[::10], rel=1e-11)
     with (tmp_path / "csv" / "contacts.csv").open(newline="", encoding="utf-8") as file:
         log = list(csv.DictReader(file))

@@ -409,7 +409,8 @@ def test_units_in_tables(mixed, tmp_path):
     assert [mixed.key(i) for i in range(3)] == ["stop 0 (rotation)", "stop 1", "element 2 (rotation)"]
     assert [mixed.unit("force", i) for i in range(3)] == ["N m", "N", "N m"]
     histories, log = (path.read_text().splitlines()[0].split(",") for path in mixed.to_csv(tmp_path))
-    assert {"indentation 0 [rad]", "force 0 [N m]", "indentation 1 [m]", "force 2 [N m]"} <= set(histories)
+    expected = {"indentation stop 0 (rotation) [rad]", "indentation stop 1 [m]", "force element 2 (rotation) [N m]"}
+    assert expected <= set(histories)
     assert {"speed_in [m/s or rad/s]", "peak_force [N or N m]", "impulse [N s or N m s]", "t_in [s]"} <= set(log)
     printed = str(mixed)
     assert "indentation, stop of rotation at 0 m, above" in printed
@@ -435,7 +436,8 @@ def test_a_time_history_names_what_acts(mixed):
     """The place is that of the stop of displacement; the element's moment is drawn though it has no contacts."""
     figure = fb.plot.time_history(mixed, window=(0.0, 6.0))
     _, lower = figure.axes
-    assert figure.get_suptitle().startswith("Displacement at mid-beam relative to the frame, contacts of stop 1 shaded")
+    title = figure.get_suptitle()
+    assert title.startswith("Displacement at mid-beam relative to the frame, contacts of stop at 0.5 m, below shaded")
     assert lower.get_ylabel() == "force / N or N m"
     names = {"stop of rotation at 0 m, above", "stop at 0.5 m, below", "element of rotation at 1 m"}
     assert names == {text.get_text() for text in lower.get_legend().get_texts()}

@@ -251,5 +251,5 @@ def test_losses_in_print_csv_and_summary(tmp_path):
         assert [float(x) for x in row] == pytest.approx(taken, rel=1e-3)
         assert summary(one)["losses"]["slip"] == run.losses.slip.tolist()
         lines = one.to_csv(tmp_path, quantities=["work"])[0].read_text(encoding="utf-8").splitlines()
-        assert lines[0] == "t [s],work 0 [J]"
+        assert lines[0] == "t [s],work element 0 [J]"
         assert float(lines[-1].split(",")[1]) == pytest.approx(run.losses.work[0], rel=1e-9)

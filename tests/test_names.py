@@ -130,7 +130,7 @@ def test_names_in_csv(run, tmp_path):
     histories, contacts = run.to_csv(tmp_path, quantities=["force", "work", "reactions"])
     with histories.open(newline="", encoding="utf-8") as file:
         head, *rows = csv.reader(file)
-    assert head[:4] == ["t [s]", "force valve, main [N]", "work valve, main [J]", "force 1 [N]"]
+    assert head[:4] == ["t [s]", "force valve, main [N]", "work valve, main [J]", "force stop 1 [N]"]
     assert head[-2:] == ["reaction force wall [N]", "reaction moment wall [N m]"]
     assert {len(row) for row in rows} == {len(head)}
     assert [float(row[1]) for row in rows] == pytest.approx(run.force(0), rel=1e-11)

@@ -123,7 +123,7 @@ def test_every_quantity_and_extremes_from_python(folder):
     found = histories(run, 1, [0.1], [name for name in UNITS if name != "section forces"])
     assert len(found) == 1 + 10 + 3 + 2
     np.testing.assert_array_equal(found["slope at 0.1 m [rad]"], run.slope(0.1))
-    np.testing.assert_array_equal(found["force 0 [N]"], run.force())
+    np.testing.assert_array_equal(found["force stop 0 [N]"], run.force())
     t = np.linspace(0.0, 1.0, 5)
     rows = extremes_table({"t [s]": t, "x": np.array([9.0, 1.0, -2.0, 4.0, 0.0])}, discard=0.2)
     assert rows["x"] == {"mean": 0.75, "std": pytest.approx(np.sqrt(4.6875)), "min": -2.0, "t_min": 0.5, "max": 4.0,

@@ -118,7 +118,7 @@ def test_shaded_contacts_are_those_of_the_stop_whose_motion_is_drawn(knocked):
     at = np.searchsorted(knocked.t, 0.6)
     z = knocked.stops[stop, 0]
     assert np.interp(knocked.t[at], t, u) == pytest.approx(1e3 * knocked.displacement(z)[at])
-    assert f"contacts of stop {stop} shaded" in texts(figure)
+    assert f"contacts of {knocked.name(stop)} shaded" in texts(figure)
     tops = [segment[1, 1] for lines in lower.collections for segment in lines.get_segments()]
     short = (log.t_out - log.t_in < 10 * 2e-4) & (log.t_in < 1.2)
     assert sorted(tops) == pytest.approx(sorted(log.peak_force[short]))

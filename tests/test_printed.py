@@ -124,7 +124,7 @@ def test_tables_of_pandas_hold_the_numbers(things):
     assert frame.index.name == "t [s]"
     np.testing.assert_array_equal(frame.index, run.t[::10])
     np.testing.assert_array_equal(frame["displacement tip [m]"], run.displacement(0.5)[::10])
-    np.testing.assert_array_equal(frame["force 0 [N]"], run.force(0)[::10])
+    np.testing.assert_array_equal(frame["force stop 0 [N]"], run.force(0)[::10])
     assert list(log.to_dataframe().columns) == list(log.arrays())
     np.testing.assert_array_equal(log.to_dataframe()["impulse"], log.impulse)
     rows = {"branch": len(things["branch"].orbits), "modes": 4, "map": 4, "ensemble": 3, "bifurcation": 6}

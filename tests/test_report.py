@@ -63,6 +63,19 @@ def test_headings_tell_what_is_of_the_whole_run(folder):
     assert "after" not in files.text(found | {"discarded_seconds": 0.0})
 
 
+def test_a_stop_has_one_name_in_tables_and_figures(folder):
+    """Files keep a key that other places leave as it is."""
+    found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    name = found["contacts"][0]["name"]
+    assert found["moments"]["indentation, stop 0"]["label"] == f"indentation, {name}"
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert f"indentation, {name}" in files.text(found)
+    assert f"<th>indentation, {name}</th>" in page
+    assert "stop 0" not in files.text(found) + page
+    run = fb.load(folder / "run.npz")
+    assert f"contacts of {name} shaded" in fb.plot.time_history(run).get_suptitle().replace("\n", " ")
+
+
 def test_what_standard_errors_of_one_realisation_are_is_told(folder):
     """In 100 seeds of 60 s they were 3.3 times the scatter in linear motion, 1.5 times with the stop."""
     found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))

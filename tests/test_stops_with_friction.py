@@ -248,12 +248,12 @@ def test_tables(corner, tube, tmp_path):
     names = [path.name for path in tube.to_csv(tmp_path, quantities=["force", "friction", "friction loss"])]
     assert names == ["histories.csv", "contacts.csv", "friction.csv"]
     head = (tmp_path / "histories.csv").read_text().splitlines()[0]
-    assert head == "t [s],force 0 x [N],force 0 y [N],friction 0 [N],friction loss 0 [J]"
+    assert head == "t [s],force stop 0 x [N],force stop 0 y [N],friction stop 0 [N],friction loss stop 0 [J]"
     first = (tmp_path / "friction.csv").read_text().splitlines()[0]
     assert first.startswith("stop,name,t_in [s],t_out [s],angle_in [rad]")
     corner.to_csv(tmp_path)
     head = (tmp_path / "histories.csv").read_text().splitlines()[0]
-    assert head.endswith("force 0 [N],force 0 along [N]")
+    assert head.endswith("force stop 0 [N],force stop 0 along [N]")
     assert "loss by friction / J" in str(tube)
 
 

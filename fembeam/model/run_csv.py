@@ -144,7 +144,7 @@ def _unit_of_force(name: str) -> str:
 def _of_stop(run: Run, stop: int, asked: Sequence[str]) -> dict[str, Vector]:
     """Indentation and force of a stop, work, friction, as far as asked for."""
     found: dict[str, Vector] = {}
-    key = run.key(stop, alone=True)
+    key = run.key(stop)
     for what in asked:
         if what in ("indentation", "force"):
             found |= _by_components(run, what, stop, key)

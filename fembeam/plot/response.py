@@ -24,6 +24,7 @@ Examples
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -35,7 +36,16 @@ from fembeam.plot.bodies import deflected_figure
 from fembeam.plot.body_shapes import body_mode_shapes
 from fembeam.plot.figure import after, heading, sheet
 from fembeam.plot.random import density_panels
-from fembeam.plot.run_signals import between_samples, estimated, first_stop, natural, place_of, sampling_of, stationary
+from fembeam.plot.run_signals import (
+    between_samples,
+    estimated,
+    first_stop,
+    natural,
+    place_of,
+    sampling_of,
+    signal_name,
+    stationary,
+)
 from fembeam.plot.spectra import segment_for
 from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, own_colour, place_name, styled, verbatim
 from fembeam.plot.units import length_for, unit_for
@@ -49,6 +59,7 @@ if TYPE_CHECKING:
 
     from fembeam.model import Model, Run
 
+TITLE = 88  # characters of a line over a figure
 PERIODS = 8  # of the lowest mode in a time history
 BEFORE = 0.3  # of a transient's window, before the largest force
 FEW = 10  # samples in a contact, below which its peak is drawn instead of its history
@@ -95,7 +106,7 @@ def time_history(
         title += f", contacts of {_listed(stops, run)} shaded" if seen.any() else ""
     beside = 0.0 if window else 0.01 * (hi - lo)  # so that a contact at the first instant is seen
     drawn[-1].set(xlabel=f"time / {second}", xlim=(tick * (lo - beside), tick * (hi + beside)))
-    heading(drawn, title, axes is None, run=run)
+    heading(drawn, textwrap.fill(title, TITLE, break_on_hyphens=False), axes is None, run=run)
     return figure
 
 
@@ -107,7 +118,7 @@ def densities(run: Run, discard: float = 0.0, axes: Axes | Sequence[Axes] | None
     """
     signals = estimated(run, discard, segment_for(int(np.count_nonzero(run.t >= discard)), sampling_of(run)))
     figure, drawn = sheet(1, len(signals), (7.0, 3.1), axes)
-    density_panels(drawn, signals)
+    density_panels(drawn, {signal_name(run, name): one for name, one in signals.items()})
     if axes is None:
         title = f"Probability densities{after(discard)}, and Gaussians of equal mean and deviation"
         heading(drawn, title, True, run=run)
@@ -211,7 +222,7 @@ def _listed(stops: NDArray[np.int64], run: Run) -> str:
     """Stops as words."""
     if len(stops) == np.count_nonzero(~run.always_acting) > 1:
         return "all stops"
-    return " and ".join(verbatim(run.key(stop)) for stop in stops.tolist())
+    return " and ".join(verbatim(run.name(stop)) for stop in stops.tolist())
 
 
 def _name(run: Run, body: int, z: Any) -> str:

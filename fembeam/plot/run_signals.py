@@ -39,6 +39,12 @@ def responses(run: Run, discard: float = 0.0) -> dict[str, Vector]:
     return {name: x[kept] for name, x in {**first, **second}.items() if len(x)}
 
 
+def signal_name(run: Run, name: str) -> str:
+    """One of `responses` as figures call it: δ says of which stop it is where there are several."""
+    stop = first_stop(run)
+    return f"δ of {run.name(stop)}" if name == "δ" and stop is not None and len(run.stops) > 1 else name
+
+
 def first_stop(run: Run) -> int | None:
     """Number of the first stop or element that acts on displacement, not on the slope."""
     found = np.flatnonzero(~run.rotational)

@@ -11,7 +11,16 @@ from fembeam.model import places
 from fembeam.plot.axis_names import frequency_words
 from fembeam.plot.figure import after, heading, sheet
 from fembeam.plot.linear import frequencies
-from fembeam.plot.run_signals import coordinates, estimated, first_stop, natural, place_of, responses, sampling_of
+from fembeam.plot.run_signals import (
+    coordinates,
+    estimated,
+    first_stop,
+    natural,
+    place_of,
+    responses,
+    sampling_of,
+    signal_name,
+)
 from fembeam.plot.style import BLUE, CYCLE, GREEN, GREY, Vector, curve, drawable, fit_levels, styled, verbatim
 from fembeam.response import frame_motion
 from fembeam.scene import signals_of
@@ -67,7 +76,7 @@ def spectrum(
     for axis, names in ((upper, [*bases, main]), (lower, others or [main])):
         behind = [linear[name] for name in names if name in linear]
         for name in names:
-            curve(axis, spectra[name], top, color=colours[name], label=verbatim(name))
+            curve(axis, spectra[name], top, color=colours[name], label=verbatim(signal_name(run, name)))
         for line in behind:  # thin, and in front: where both agree both are seen
             curve(axis, line, top, color="black", linestyle="--", linewidth=0.7, label="linear, no contact")
         axis.set_ylabel("PSD / m² s rad⁻¹")

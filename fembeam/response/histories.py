@@ -290,16 +290,16 @@ class Histories:
         """What tables call a stop or element: its given name, else a made one such as "stop at 3 m, below"."""
         return self.names[self._stop(stop)]
 
-    def key(self, stop: int, alone: bool = False) -> str:
-        """A name that other places and gaps leave as it is: the given one, else "stop 0", "element 2 (rotation)".
+    def key(self, stop: int) -> str:
+        """What files call a stop or element, which other places and gaps leave as it is.
 
-        ``alone``: the number alone where none was given, as in columns that say what they hold.
+        The given name, else "stop 0", "element 2 (rotation)".
         """
         stop = self._stop(stop) % len(self.stops)
         if self.name_given[stop]:
             return self.names[stop]
         kind = "element" if self.always_acting[stop] else "stop"
-        return str(stop) if alone else f"{kind} {stop}" + " (rotation)" * bool(self.rotational[stop])
+        return f"{kind} {stop}" + " (rotation)" * bool(self.rotational[stop])
 
     def number(self, stop: int | str) -> int:
         """The number of a stop or element, from 0, that is given by its name or number; ValueError if there is none."""

@@ -150,14 +150,18 @@ def summary(
     }
 
 
-def _moments(run: Run, discard: float) -> dict[str, dict[str, float]]:
-    """Moments of the displacements at the usual places and of every stop's indentation, m or rad."""
+def _moments(run: Run, discard: float) -> dict[str, dict[str, Any]]:
+    """Moments of the displacements at the usual places and of every stop's indentation, m or rad, with its label."""
     kept = run.t >= discard
     if np.count_nonzero(kept) < 2:
         return {}
     signals = {f"displacement, {name}": run.displacement(z)[kept] for name, z in plot.places(run.shapes).items()}
     signals |= {f"indentation, {run.key(i)}": run.indentation(i)[kept] for i in range(len(run.stops))}
-    extremes = {name: {"min": float(x.min()), "max": float(x.max())} for name, x in signals.items()}
+    named = {f"indentation, {run.key(i)}": f"indentation, {run.name(i)}" for i in range(len(run.stops))}
+    extremes = {
+        name: {"min": float(x.min()), "max": float(x.max()), "label": named.get(name, name)}
+        for name, x in signals.items()
+    }
     error = partial(_error_of_std, parts=plot.batches(run, discard))
     return {name: asdict(moments(x)) | {"std_error": error(x)} | extremes[name] for name, x in signals.items()}
 
@@ -254,7 +258,7 @@ def text(found: dict[str, Any]) -> str:
     m, force, speed = unit_of("indentation", [False, *rotations]), *(unit_of(q, rotations) for q in ("force", "speed"))
     part = after(found["discarded_seconds"]).strip()
     head = (part, f"mean/{m}", f"std/{m}", "skewness", "kurtosis", f"min/{m}", f"max/{m}")
-    moments = [[name, *(row[key.partition("/")[0]] for key in head[1:])] for name, row in found["moments"].items()]
+    moments = [[row["label"], *(row[key.partition("/")[0]] for key in head[1:])] for row in found["moments"].values()]
     tables = [aligned(head, moments)] if moments else []
     columns = {"mean time/s": "duration", f"mean peak force/{force}": "peak_force",
                f"mean entry speed/({speed})": "entry_speed"}  # fmt: skip

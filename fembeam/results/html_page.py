@@ -136,7 +136,7 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
             [words.format(length), *(_scaled(row.get(key), unit, words) for row in signals)]
             for words, unit, key in MOMENT_ROWS
         ]
-        yield f"<h2>Response{part}</h2>" + html_table(["", *found["moments"]], rows)
+        yield f"<h2>Response{part}</h2>" + html_table(["", *(row["label"] for row in signals)], rows)
         yield f'<p class="note">{escape(found["confidence"])}</p>'
     if found["contacts"]:
         force, speed = (unit_of(of, rotations).replace("/s", " s⁻¹") for of in ("force", "speed"))

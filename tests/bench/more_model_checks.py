@@ -203,8 +203,8 @@ def tables(run: fb.Run) -> Check:
     expected = [("absolute velocity", run.velocity(z, absolute=True))]
     expected += [(name, getattr(run, name)(z)) for name in ("displacement", "acceleration", "slope", "moment")]
     expected += [(f"reaction force {i} ", one.force) for i, one in enumerate(run.reactions())]
-    expected += [(f"{name} {i} ", getattr(run, name)(i)) for i in stops for name in ("indentation", "force")]
-    expected += [(f"work {i} ", run.losses.history[:, i]) for i in stops]
+    expected += [(f"{name} {run.key(i)} ", getattr(run, name)(i)) for i in stops for name in ("indentation", "force")]
+    expected += [(f"work {run.key(i)} ", run.losses.history[:, i]) for i in stops]
     for name, values in expected:
         column = [x for head, x in table.items() if head.startswith(name)]
         yield f"csv: {name}", off(column[0], values) if len(column) == 1 else math.inf, 1e-11
