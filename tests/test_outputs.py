@@ -99,7 +99,7 @@ def test_without_a_choice_nothing_is_added(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ("simulate.places=[0.3]", r"scene.toml:18: \[simulate\]: z must lie on the beam, 0 to 0.26 m, got \[0.3\]"),
+        ("simulate.places=[0.3]", r"\[simulate\] with --set simulate.places=\[0.3\]: z must lie on the beam"),
         ("simulate.places=0.1", "places must be a list of numbers, got 0.1"),
         ("simulate.quantities=['strain']", "quantities must be a list of 'displacement', .*got \\['strain'\\]"),
         ("beam.section={E=2e11,rho=7800,A=4e-5,I=1e-11}", "stress needs the outer fibre of sections; give fibre in m"),

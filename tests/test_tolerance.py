@@ -1,10 +1,14 @@
 """What `rtol` promises: errors within rtol times the factor by which a start's contacts multiply any; what it costs."""
 
+import math
+
 import numpy as np
 import pytest
 from bench.tolerance import STOPS, amplification, end, errors, normalised, scene, slope
+from problems import HertzBounce
 
-from solvers import DormandPrince, Exponential
+from contacts import Hertz, KelvinVoigt
+from solvers import Contact, DormandPrince, Exponential, System, integrate
 
 RTOLS = 1e-4, 1e-6, 1e-8
 
@@ -52,3 +56,32 @@ def test_tail_and_cost_of_jittered_starts(stop, n, steps, calls):
     assert normalised(found, amplification(STOPS[stop], n, 12), RTOLS).max() < 1.0
     assert 0.6 < slope(RTOLS, np.median(found, axis=0)) < 1.4
     assert np.all(work <= 1.1 * np.transpose([steps, calls]))
+
+
+@pytest.mark.parametrize("rtol", [1e-7, 1e-9, 1e-11, 1e-12])
+def test_samples_and_ends_inside_a_contact(rtol):
+    """There, too, δ̇ is right to rtol: by the energy ½ v² + K δ^{5/2}/2.5 on a Hertz law, which nothing takes.
+
+    By the polynomials of the force, δ̇ inside a step would be off by 7 rtol at 1e-11 and 109 rtol at 1e-12.
+    """
+    stop = Contact([-1.0], Hertz(1e8))
+    system, start = System.modal([0.0], 0.0, [stop]), ([-1e-5], [1.0])
+    lasts = HertzBounce(1e8, 1.0, 1.0).duration
+
+    def imbalance(solution):
+        depth = np.maximum(solution.q, 0.0)
+        return np.abs(0.5 * solution.q_dot**2 + 1e8 * depth**2.5 / 2.5 - 0.5).max()
+
+    sampled = integrate(system, *start, 1.2 * lasts, lasts / 500, Exponential(rtol))
+    ends = [integrate(system, *start, share * lasts, method=Exponential(rtol)) for share in np.linspace(0.05, 0.95, 60)]
+    assert max(map(imbalance, (sampled, *ends))) < 2.0 * rtol
+
+
+@pytest.mark.parametrize("rtol", [1e-8, 1e-10, 1e-12])
+def test_samples_inside_a_contact_with_a_strong_dashpot(rtol):
+    """δ̇ = v (λ₂ e^{-λ₂t} - λ₁ e^{-λ₁t})/(λ₂ - λ₁) of m = 1, k = 1e6, c = 6e4; by polynomials 17 rtol off at 1e-12."""
+    fast, slow = (3e4 + sign * math.sqrt(9e8 - 1e6) for sign in (1.0, -1.0))
+    system = System.modal([0.0], 0.0, [Contact([-1.0], KelvinVoigt(1e6, 6e4))])
+    found = integrate(system, [0.0], [1.0], 3e-3, 2e-6, Exponential(rtol))
+    rate = (fast * np.exp(-fast * found.t) - slow * np.exp(-slow * found.t)) / (fast - slow)
+    assert np.abs(found.q_dot[:, 0] - rate).max() < 4.0 * rtol

@@ -202,7 +202,7 @@ def _move_column(run, node_set, level, y, part):
     if part < np.inf:
         for u in range(scratch.force.shape[0]):
             copy(derivatives.force[u], scratch.force[u], S)
-        state_within(problem, tables, past, scratch, node_set, tables.contact_step[level], 0.0, part, y, False)
+        state_within(problem, tables, past, scratch, node_set, tables.contact_step[level], 0.0, part, y, False, False)
         return
     propagate_blocks(problem, tables.contact_propagator[level, 0], tables.contact_propagator[level, 1], y)
     if uses_blocks(tables):
@@ -247,7 +247,9 @@ def linearise_step(run, row, modes):
         end = scratch.x_new
         if part < np.inf:
             copy(past.x, end, past.x.size)
-            state_within(problem, tables, past, scratch, node_set, tables.contact_step[level], 0.0, part, end, False)
+            state_within(
+                problem, tables, past, scratch, node_set, tables.contact_step[level], 0.0, part, end, False, False
+            )
         else:
             end_state(problem, tables, past, scratch, node_set, level)
         rhs(problem, row[ENDED], end, past.segment, past.entry_rate, derivatives.rate[1], derivatives.batch)

@@ -173,6 +173,14 @@ def unresolved_part(coefficients, largest, power):
 
 
 @inlined
+def next_coefficient(coefficients):
+    """Estimate of the coefficient behind the last four, A₁ √(A₁/A₂) with A₁ and A₂ as in `unresolved_part`."""
+    before = max(abs(coefficients[0]), abs(coefficients[1]))
+    last = max(abs(coefficients[2]), abs(coefficients[3]))
+    return last * math.sqrt(min(last / before, 1.0)) if before > 0.0 else last
+
+
+@inlined
 def error_of_work(problem, state, scratch, s, unresolved, largest, slopes):
     """Part of a force that a step leaves out, N, in units of its tolerance for the work of an element.
 

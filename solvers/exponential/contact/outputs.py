@@ -27,13 +27,14 @@ from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.peaks import state_peaks, step_peaks
 from solvers.exponential.contact.slider_margins import peak_of_friction
 from solvers.exponential.contact.step_integrals import resolves_rates, weights_of, work_by_places, work_by_rates
-from solvers.exponential.energy.quadrature import state_within
+from solvers.exponential.energy.quadrature import hides_motion, state_within
 
 
 @merged
 def sample_step(problem, tables, energy_tables, state, scratch, node_set, level):
     """Write the samples inside the converged step, and the state at the end of the run, if inside, for `end_run`."""
     t, h, begin, row, t_end = state.now[T], tables.contact_step[level], 0.0, state.x, state.now[T_END]
+    ledger, by_laws = energy_tables.active > 0.0, hides_motion(problem, tables, state, scratch, h)
     while True:
         due = state.due[state.count[SAMPLED]]
         sampled = due <= min(t + h, t_end)
@@ -42,7 +43,7 @@ def sample_step(problem, tables, energy_tables, state, scratch, node_set, level)
         span = due - t if sampled else t_end - t
         following = state.out[state.count[SAMPLED]] if sampled else scratch.stages[START]
         copy(row, following, state.x.size)
-        state_within(problem, tables, state, scratch, node_set, h, begin, span, following, energy_tables.active > 0.0)
+        state_within(problem, tables, state, scratch, node_set, h, begin, span, following, ledger, by_laws)
         if not sampled:
             return
         state.count[SAMPLED] += 1

@@ -32,7 +32,7 @@ def account_contact(problem, tables, energy_tables, state, scratch, node_set, le
         return
     x, size = scratch.stages[WITHIN], 2 * problem.k.size
     copy(state.x, x, state.x.size)
-    state_within(problem, tables, state, scratch, node_set, h, 0.0, h, x, energy_tables.active > 0.0)
+    state_within(problem, tables, state, scratch, node_set, h, 0.0, h, x, energy_tables.active > 0.0, False)
     copy(x[size:], state.x[size:], 2)
 
 
