@@ -105,7 +105,7 @@ class PiecewiseLinear(Law):
 
 @dataclass(frozen=True)
 class Tabulated(Law):
-    """Elastic force through measured points, by the monotone cubics of Fritsch and Carlson.
+    """Elastic force through measured points, by the monotone cubics of Fritsch and Butland (PCHIP).
 
         F = F_j + x (c_1j + x (c_2j + x c_3j)),  x = δ - δ_j    for δ_j < δ <= δ_j+1
 
@@ -125,7 +125,7 @@ class Tabulated(Law):
 
     References
     ----------
-    F.N. Fritsch, R.E. Carlson, SIAM J. Numer. Anal. 17 (1980) 238.
+    F.N. Fritsch, J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300.
 
     Examples
     --------

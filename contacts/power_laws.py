@@ -119,7 +119,7 @@ class Hysteretic(Law):
     @classmethod
     def herbert_mcwhannell(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:
         """Factor 6(1 - e)/((2e - 1)² + 3), e in [0, 1], valid near 1: R.G. Herbert, D.C. McWhannell, J. Eng. Ind. 99
-        (1977) 606.
+        (1977) 513.
         """
         return cls._of(
             *(stiffness, restitution, "herbert_mcwhannell"),
@@ -159,7 +159,7 @@ class Hysteretic(Law):
 
     @classmethod
     def hu_guo(cls, stiffness: float, restitution: float, **options: Any) -> Hysteretic:
-        """Factor 3(1 - e)/(2e), e in (0, 1], for all of it: S. Hu, X. Guo, Multibody Syst. Dyn. 35 (2015) 193."""
+        """Factor 3(1 - e)/(2e), e in (0, 1], for all of it: S. Hu, X. Guo, Multibody Syst. Dyn. 35 (2015) 131."""
         return cls._of(stiffness, restitution, "hu_guo", lambda e: 1.5 * (1.0 - e) / e, options, True)
 
     @classmethod

@@ -307,15 +307,16 @@ class Model(Printed, ModalEquations):
     def rub(self, spin: float | None = None, near: float | None = None, entry_rate: float | None = None) -> Rub:
         """The synchronous rub of an unbalanced round rotor in one `AnnularStop`: an equilibrium of the turning frame.
 
-        It whirls with the spin Ω, in full contact, and slips all the way; N by the law at rest, F_t = σμN. Of one disk
+        It whirls with the spin Ω in full contact and slips throughout; N by the law at rest, F_t = σμN, σ the sign of
+        the sliding speed. For one disk with damping c_d in a clearance c
 
-            |(k - mΩ² + N/r) + i (cΩ + σμ (c/r) N/r)| r = m e Ω²
+            |(k - mΩ² + N/r) + i (c_d Ω + σμ (c/r) N/r)| r = m e Ω²
 
         Parameters
         ----------
         spin : Ω, rad/s, not 0; None: that of the shaft. Of a structure without a spin that of its turning loads.
         near : m, which of several radii; None: the largest.
-        entry_rate : m/s, speed of entry of the contact since it began; for laws whose damping goes by it.
+        entry_rate : m/s, at which the contact began; needed by laws that depend on it.
 
         Returns
         -------

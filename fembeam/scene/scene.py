@@ -199,7 +199,7 @@ class Scene:
             are kept as they are.
         elements : of the mesh; None: as few as make every kept frequency right to 1e-6.
         omega_max : instead of `modes`: all of them up to this frequency, rad/s.
-        mass_share : instead of `modes`: as many as carry this share of the mass that a base motion moves, in (0, 1).
+        mass_share : instead of `modes`: as many as carry this share of the mass that a base motion moves, in (0, 1].
             Of several bodies the one that needs most says how many, of omega_max too.
         residual : add the residual static shape of every stop, element, force, moment, moving foot and dashpot (its
             rotation, too), of friction at a radius the twist, between two places that of opposite loads; the model is

@@ -86,7 +86,7 @@ def psd(x: ArrayLike, dt: float, segment: int | None = None, overlap: float = 0.
     dt : float
         Sampling step in s, > 0.
     segment : int, optional
-        Samples per segment, 8 to n; the resolution is 2π/(segment dt) rad/s. Left out: n/32, at least 256.
+        Samples per segment, 8 to n; the resolution is 2π/(segment dt) rad/s. Left out: n/32, at least 256, at most n.
     overlap : float
         Fraction of a segment shared with the next, in [0, 1).
 

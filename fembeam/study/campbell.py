@@ -108,7 +108,7 @@ def campbell(scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | Non
     >>> scene = fb.Scene(shaft, [fb.Clamped("A")], masses=[fb.Disk("B", 12.0, diametral=0.04, polar=0.075)])
     >>> found = campbell(scene, [0.0, 300.0], modes=2)
     >>> found.signed[1].round(1).tolist(), found.critical.round(1).tolist()
-    ([-208.8, 223.9], [-211.1, 221.9])
+    ([-208.8, 223.9], [-211.0, 222.0])
     """
     speeds = vector("spins", spins, WHERE, "give rad/s, such as np.linspace(0, 600)",
                     "must be finite and ascending, (k,)",

@@ -160,7 +160,8 @@ def stationary(
 
     Parameters
     ----------
-    duration : s the statistics use, transient and lead-ins not counted; the most when `until` is given.
+    duration : s the statistics use, transient and lead-ins not counted; the most when `until` is given. Without
+        `discard` at least 32 correlation times of the structure.
     dt : output sampling in s; ten samples to the shortest period that matters.
     watch : name -> function of a `Run` that returns samples (k,), or (samples, rates): then crossings between two
         samples are counted too, those of the cubics through them. None: δ of every stop (the tip when there is

@@ -30,12 +30,12 @@ class Friction:
 
         stick: F_t = k_t (ξ - s) while |F_t| < μN;    slip: F_t = ±μN while the slider moves that way, ±(ξ̇ ∓ μṄ/k_t) > 0
 
-    The loss is ∫F_t ξ̇ dt - F_t²/2k_t. A contact begins in stick where N jumps at entry or grows quicker than the spring
-    is drawn, k_t |ξ̇| <= μṄ; else in slip, as laws of exponent above 1 always do. One under way as a run begins is
-    undrawn. In a circle of radius c the spring must stay within half a turn, |F_t| < k_t π c; other runs are refused.
-    Where a law pulls, N < 0, or is cut, N = 0, the slider is free as in an open contact: it follows without force, and
-    its way is no slip; where N grows again it begins as at an entry. Where N jumps up on a knot of the
-    law a slip ends: F_t stays.
+    The loss is ∫F_t ξ̇ dt - F_t²/2k_t. A contact begins in stick where N jumps at entry or where its limit grows faster
+    than the spring's force, k_t |ξ̇| <= μṄ; else in slip, as always with laws of exponent above 1. If a run begins in
+    contact, the spring is unloaded then. In a circle of radius c the spring must stay within half a turn,
+    |F_t| < k_t π c; other runs are refused. Where a law pulls, N < 0, or is cut, N = 0, the slider is free as in an
+    open contact: it follows without force, and its path is no slip; where N grows again the contact begins as at an
+    entry. Where N jumps up on a knot of the law a slip ends: F_t stays.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ class Contact:
     """One stop: ``delta = -direction @ q - gap``; it pushes with ``+direction * force`` while ``delta > 0``, or always.
 
     With ``map="annulus"`` the stop is a circular clearance of radius c, the gap. A place d = direction @ q - centre of
-    two coordinates moves in it, r = |d|, and is pushed along the line to the centre, without friction:
+    two coordinates moves in it, r = |d|, and is pushed along the line to the centre:
 
         δ = r - c,  δ̇ = d·ḋ/r,  force on the place -N(δ, δ̇) d/r;    outer: δ = c - r, the force +N d/r
 
