@@ -172,7 +172,7 @@ class FrictionLog(Columns):
     contact : index of the contact. name : what it is called. t_in, t_out : s.
     angle_in, angle_out : rad, of the place in its circular clearance; NaN of an oblique stop.
     speed_in, speed_out : m/s, ξ̇ of the surface. peak_friction : N, the largest |F_t|. impulse : N s, ∫F_t dt.
-    slip : m, the way of the slider in slip, while N > 0. energy_loss : J, lost by friction.
+    slip : m, the path of the slider in slip, while N > 0. energy_loss : J, lost by friction.
     """
 
     contact: Any
