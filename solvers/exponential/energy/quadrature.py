@@ -35,7 +35,7 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.parts import WITHIN_STEP, part
 from solvers.compiled.simd import WIDTH, load8, splat8, store8, sum8
-from solvers.compiled.state import acts
+from solvers.compiled.state import CALLS, acts
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import work_within_circle
 from solvers.exponential.circles.friction import work_within_rubbing
@@ -284,6 +284,7 @@ def _follow_laws(problem, state, scratch):
         for q in range(S):
             scratch.trial[q] = off_knots(problem, s, state.segment[s], scratch.trial[q] - problem.gap[r])
         contact_forces(problem, s, scratch.trial, scratch.clipped, state.entry_rate[s], scratch.numbers)
+        state.count[CALLS] += S
         store8(scratch.between[PACE + 1 + r], 0, load8(scratch.numbers, 0) * load8(scratch.between[PACE], 0))
 
 
