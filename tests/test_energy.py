@@ -474,3 +474,14 @@ def test_tables_of_contact_steps_are_their_quadrature(power, lead, k, c):
     squares += np.concatenate((entering, start)) @ table[SQUARES:, :S] @ entering
     np.testing.assert_allclose(sums[:S], exact[1:], rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(squares, exact[0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("dt", [0.01, None])
+@pytest.mark.parametrize(("stiffness", "gap"), [(1e4, 1e-3), (1e2, -3e-4), (1e4, 0.1)])
+def test_rounding_at_rest_is_not_refused(stiffness, gap, dt):
+    """A bar on a hinge lies where the spring of an element is free: all energies are roundings, 1e-33 J."""
+    bar = fb.Section.rectangle(2.1e11, 7850.0, 0.02, 0.01)
+    spring = fb.Element(0.8, KelvinVoigt(stiffness, 0.0), gap=gap)
+    model = fb.Scene(fb.Beam(0.8, bar), [fb.Pinned(0.0)], elements=[spring], damping=fb.ModalDamping(0.02)).reduce(3)
+    run = model.simulate(0.2, dt, start=model.equilibrium())
+    assert run.status == "finished"

@@ -3,7 +3,8 @@
 The energy handled is the initial energy, the input, the energy dissipated and stored, and for every contact the peak
 force times the peak indentation. A run with an energy balance is refused if the residual exceeds (`MULTIPLE` rtol +
 `ROUNDING`) times the energy handled. Of coupled blocks what cancels in their energies is tolerated too, up to
-`CANCELLED` of that; and `LOADS` roundings of the energy that each load would give alone, as loads may cancel.
+`CANCELLED` of that; and `ROUNDINGS` roundings of the energy that each load would give alone, as loads may cancel, and of
+that of each contact's peak force over the distances whose difference δ is: at rest nothing else is handled.
 
 Without a balance, let E be the energy of the motion minus the steady response to tones. At the end it is at most that
 at the start plus the work of the contacts,
@@ -28,11 +29,12 @@ import numpy as np
 from solvers.compiled.kernels import inner, merged, row_of, rubs, slider_of
 from solvers.compiled.state import PEAK_FORCE, T
 from solvers.problem import Array, Record, System, dense
+from solvers.problem import event_list as at
 from solvers.problem.friction import ARM, MU, SPIN, may_pull
 
 MULTIPLE, ROUNDING = 20.0, 1e-9  # see the module; relative to the energy handled
 CANCELLED = 1e-6  # the most that may cancel in the energies of coupled blocks, relative to the energy handled
-LOADS = 100.0  # roundings tolerated of the energy of loads that cancel
+ROUNDINGS = 100.0  # tolerated of the energy of loads that cancel, and of distances that make δ
 FACTOR = 4.0  # margin of the check without a balance
 _SAMPLES = 64  # samples whose balance is checked, the last one among them
 _MEAN = np.full(_SAMPLES, 1.0 / _SAMPLES)
@@ -149,7 +151,8 @@ def unbalanced(record: Record, rtol: float) -> bool:
         cancels = np.finfo(float).eps * _told(system, motion) / max(stored.max(), begun)
         allowed += handled * min(float(cancels), CANCELLED)
     if residual > allowed:
-        allowed += LOADS * np.finfo(float).eps * _energy_of_loads(system, record.t[rows])
+        told = _energy_of_loads(system, record.t[rows]) + _energy_over_distances(record, motion)
+        allowed += ROUNDINGS * np.finfo(float).eps * told
     return not residual <= allowed
 
 
@@ -173,6 +176,13 @@ def _energy_of_loads(system: System, t: Array) -> float:
         size = np.linalg.norm(np.hypot(rate[n:], np.sqrt(k) * rate[:n]) * lasts)
         root += float(np.abs([signal(float(at)) for at in t]).max() * size)
     return 0.5 * root**2
+
+
+def _energy_over_distances(record: Record, motion: Array) -> float:
+    """Σ F (|g| + |w|·|q|), J, with the peak force of each contact: rounding of δ = ±w·q - g is a share of the sum."""
+    ends, largest = at.ends_of(record.rows), np.abs(motion[:, : record.system.size]).max(axis=0)
+    distances = np.array([abs(one.gap) + np.abs(one.rows).max(axis=0) @ largest for one in record.system.contacts])
+    return float(np.abs(ends[:, at.LARGEST]) @ distances[ends[:, at.ELEMENT].astype(int)]) if len(ends) else 0.0
 
 
 def _told(system: System, motion: Array) -> float:
