@@ -40,6 +40,6 @@ def main() -> None:
 
 if __name__ == "__main__":
     if find_spec("distributed") is None:
-        print("skipped: the package 'distributed' is not installed; pip install 'fembeam[cluster]'")
+        print("skipped: the package 'distributed' is not installed; pip install -e '.[cluster]'")
     else:
         main()

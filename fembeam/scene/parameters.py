@@ -45,9 +45,9 @@ def scalars(scene: Scene, within: str = "") -> dict[str, float]:
 def _shared_omega(scene: Scene) -> float | None:
     """The frequency of a base motion in several directions, if all of them have the same one."""
     base = scene.base if isinstance(scene.base, dict) else {}
-    found = {getattr(signal, "omega", None) for signal in base.values()}
-    omega = found.pop() if len(found) == 1 and len(base) > 1 else None
-    return omega if isinstance(omega, float) else None
+    found = [getattr(signal, "omega", None) for signal in base.values()]
+    shared = len(found) > 1 and all(isinstance(omega, float) and omega == found[0] for omega in found)
+    return found[0] if shared else None
 
 
 def _numbers(path: str, item: Any) -> dict[str, float]:

@@ -151,7 +151,8 @@ def sentences(structure: Structure) -> Iterator[str]:
     if structure.massless:
         some = ", ".join(_of(label) for label in structure.massless[:ENTRIES])
         more = f" and {len(structure.massless) - ENTRIES} more" if len(structure.massless) > ENTRIES else ""
-        yield f"{len(structure.massless)} dofs have no mass and follow the others statically (Guyan): {some}{more}"
+        have = "dofs have no mass and follow" if len(structure.massless) > 1 else "dof has no mass and follows"
+        yield f"{len(structure.massless)} {have} the others statically (Guyan): {some}{more}"
     yield from _rigid(structure)
     yield from _mass(structure)
     yield from _units(structure)

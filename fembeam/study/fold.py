@@ -22,6 +22,7 @@ from fembeam.scene import called, path_of, value_of
 from fembeam.study.result import Result
 from fembeam.support import Part, by_rows, is_finite, is_whole, require
 from solvers.branches import fold_curve
+from solvers.problem import counted
 
 Vector = NDArray[np.float64]
 WHERE = "study.fold"
@@ -59,8 +60,8 @@ class Fold(Result):
         return [i for i, one in enumerate(self.orbits) if one.mark == "cusp"]
 
     def __repr__(self) -> str:
-        low, high = self.values.min(), self.values.max()
-        return f"<folds along {self.parameter} over {self.over}, {low:.6g} to {high:.6g}, {len(self.cusps)} cusps>"
+        span = f"{self.values.min():.6g} to {self.values.max():.6g}"
+        return f"<folds along {self.parameter} over {self.over}, {span}, {counted(len(self.cusps), 'cusp')}>"
 
     def table(self) -> list[dict[str, Any]]:
         """A row for each point, in SI units."""

@@ -3,8 +3,8 @@
 The energy handled is the initial energy, the input, the energy dissipated and stored, and for every contact the peak
 force times the peak indentation. A run with an energy balance is refused if the residual exceeds (`MULTIPLE` rtol +
 `ROUNDING`) times the energy handled. Of coupled blocks what cancels in their energies is tolerated too, up to
-`CANCELLED` of that; and `ROUNDINGS` roundings of the energy that each load would give alone, as loads may cancel, and of
-that of each contact's peak force over the distances whose difference δ is: at rest nothing else is handled.
+`CANCELLED` of that; and `ROUNDINGS` roundings of the energy that each load would give alone, as loads may cancel, and
+of that of each contact's peak force over the distances whose difference δ is: at rest nothing else is handled.
 
 Without a balance, let E be the energy of the motion minus the steady response to tones. At the end it is at most that
 at the start plus the work of the contacts,
