@@ -529,3 +529,13 @@ def test_what_is_no_such_thing():
         found["rms"]
     with pytest.raises(ValueError, match="the mean over a grid is none of a distribution"):
         found.estimate("peak_force")
+
+
+def test_noise_along_two_axes_is_no_obstacle():
+    """Signals of a base were compared as keys of a set, which noise is not."""
+    noises = {axis: fb.BandNoise(1e-3, (1.0, 50.0), seed=seed) for seed, axis in enumerate("xy")}
+    member = fb.Member("A", "B", fb.Section.rectangle(2.1e11, 7850.0, 0.02, 0.01))
+    frame = fb.Frame({"A": (0.0, 0.0), "B": (0.0, 1.0)}, [member])
+    scene = fb.Scene(frame, [fb.Clamped("A")], base=noises, damping=fb.ModalDamping(0.02))
+    found = fb.study.vary(scene, {"beam.nodes.B[1]": [1.0, 1.1]}, "rms", duration=0.2, dt=1e-3, modes=2)
+    assert len(found.values) == 2
