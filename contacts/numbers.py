@@ -91,7 +91,7 @@ def check_restitution(value: Any, who: str, low_open: bool, why: str = "") -> fl
     least = 1.0 / LARGEST_PARAMETER if low_open else 0.0
     if not least <= result <= 1.0:
         span = "(0, 1]" if low_open and not 0.0 < result < least else f"[{least:g}, 1]"
-        reason = f"; {why}" if why and low_open and not result > 0.0 else ""
+        reason = f"; {why}" if why and low_open else ""
         raise ValueError(f"restitution of {who} must lie in {span}, got {value!r}{reason}")
     return result
 
