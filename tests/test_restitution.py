@@ -44,7 +44,9 @@ def test_restitution_out_of_range_is_refused(bad):
     ):
         Hysteretic.achieving(1e8, bad)
     if bad != 0.0:
-        with pytest.raises(ValueError, match=r"restitution of lankarani_nikravesh must lie in \[0, 1\], got [-0-9a-z.]*$"):
+        with pytest.raises(
+            ValueError, match=r"restitution of lankarani_nikravesh must lie in \[0, 1\], got [-0-9a-z.]*$"
+        ):
             Hysteretic.lankarani_nikravesh(1e8, bad)
 
 
