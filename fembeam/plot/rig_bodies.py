@@ -161,8 +161,11 @@ class _Panel:
         if not self.space and len(numbers) <= MOST_BESIDE and self._labelled(axis, numbers, 8.0):
             return
         for text, key in zip(numbers, self.words, strict=True):
-            axis.text(*self.places[key][: 3 if self.space else 2], f" {text}", fontsize=8, weight="bold", va="bottom",
-                      zorder=1e3, path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
+            # stops of bodies in space stand above or to the right more often than to the left and below
+            words, sides = (f"{text}  ", ("right", "top")) if self.space else (f" {text}", ("left", "bottom"))
+            axis.text(*self.places[key][: 3 if self.space else 2], words, fontsize=8, weight="bold", ha=sides[0],
+                      va=sides[1], zorder=1e3,
+                      path_effects=[withStroke(linewidth=2.0, foreground="white")])  # fmt: skip
 
     def _labelled(self, axis: Any, texts: list[str], points: float = SIZE) -> bool:
         """One text for each place, around it where it covers nothing; whether all have room."""
