@@ -8,7 +8,7 @@ from bench.tolerance import STOPS, amplification, end, errors, normalised, scene
 from problems import HertzBounce
 
 from contacts import Hertz, KelvinVoigt
-from solvers import Contact, DormandPrince, Exponential, System, integrate
+from solvers import Contact, DormandPrince, Exponential, Friction, System, integrate
 
 RTOLS = 1e-4, 1e-6, 1e-8
 
@@ -85,3 +85,26 @@ def test_samples_inside_a_contact_with_a_strong_dashpot(rtol):
     found = integrate(system, [0.0], [1.0], 3e-3, 2e-6, Exponential(rtol))
     rate = (fast * np.exp(-fast * found.t) - slow * np.exp(-slow * found.t)) / (fast - slow)
     assert np.abs(found.q_dot[:, 0] - rate).max() < 4.0 * rtol
+
+
+@pytest.mark.parametrize("rtol", [1e-8, 1e-10, 1e-12])
+@pytest.mark.parametrize("friction", [None, Friction(0.3, 2e5)])
+def test_samples_inside_a_contact_in_the_plane(friction, rtol):
+    """The energy of the motion towards a wall that rubs; in a circle energy and moment of momentum.
+
+    By the polynomials of the components of the force they would be off by 16 rtol at 1e-10 and 80 at 1e-12.
+    """
+    law, start = Hertz(1e6), ([0.9, 0.0], [1.0, 0.8])
+    if friction:
+        stop = Contact([-1.0, 0.0], law, 1.0, map="oblique", tangent=[0.0, 1.0], friction=friction)
+    else:
+        stop = Contact(np.eye(2), law, 1.0, map="annulus")
+    system = System(np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), [stop])
+    found = integrate(system, *start, 0.4, 1e-4, Exponential(rtol))
+    (x, y), (v_x, v_y) = found.q.T, found.q_dot.T
+    depth = np.maximum((x if friction else np.hypot(x, y)) - 1.0, 0.0)
+    energy = 0.5 * (v_x**2 + (0.0 if friction else v_y**2)) + 1e6 * depth**2.5 / 2.5
+    assert len(found.contacts) > 0
+    assert np.ptp(energy) < 2.0 * rtol
+    if not friction:
+        assert np.ptp(x * v_y - y * v_x) < 2.0 * rtol

@@ -140,6 +140,7 @@ class Scratch(NamedTuple):
     along: Annotated[Any, "2*N, S"]  # p and v of the blocks at a panel's points, as the next two of any number of stops
     moves: Annotated[Any, "N, 5, S"]  # see `energy.quadrature`
     between: Annotated[Any, "S+1+R+L, S"]
+    kept: Annotated[Any, "17, S"]  # what an element in a plane has at the nodes, see `energy.quadrature`
 
 
 @merged

@@ -26,6 +26,7 @@ from solvers.compiled.kernels import (
     is_circle,
     merged,
     off_knots,
+    place_of,
     push_of,
     raised,
     reordered,
@@ -35,10 +36,10 @@ from solvers.compiled.kernels import (
 )
 from solvers.compiled.parts import WITHIN_STEP, part
 from solvers.compiled.simd import WIDTH, load8, splat8, store8, sum8
-from solvers.compiled.state import CALLS, acts
+from solvers.compiled.state import CALLS, T, acts
 from solvers.compiled.sums import combine
-from solvers.exponential.circles.contact import work_within_circle
-from solvers.exponential.circles.friction import work_within_rubbing
+from solvers.exponential.circles.contact import radial_forces, work_within_circle
+from solvers.exponential.circles.friction import rubbing_forces, work_within_rubbing
 from solvers.exponential.contact.node_response import LANDED, RTOL, next_coefficient
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.step_integrals import is_weighted
@@ -252,12 +253,6 @@ def exchanged_over(problem, tables, scratch):
     return sum8(gain), sum8(loss)
 
 
-@inlined
-def _by_law(problem, scratch, s):
-    """Whether the force of an element follows from δ and δ̇ of one row, without a strong dashpot."""
-    return scratch.viscous[s] == 0.0 and not is_circle(problem, s) and not rubs(problem, s)
-
-
 @merged
 def hides_motion(problem, tables, state, scratch, h):
     """Whether polynomials of the forces may miss an indentation rate inside the step by more than its tolerance."""
@@ -272,20 +267,74 @@ def hides_motion(problem, tables, state, scratch, h):
 
 
 @merged
-def _follow_laws(problem, state, scratch):
+def _motion_at_points(problem, scratch, r, out):
+    """Displacements and rates of a row at the points of the panel, from the motion in ``scratch.along``."""
+    combine(scratch.along, problem.read[r], 2 * problem.k.size, None, out[0])
+    combine(scratch.along, problem.read_rate[r], 2 * problem.k.size, None, out[1])
+    store8(out[0], 0, load8(out[0], 0) - splat8(problem.gap[r]))
+
+
+@merged
+def _follow_laws(problem, tables, state, scratch, node_set, h, begin, width):
     """Forces at the points of the panel times dt by their laws, for the motion that is in ``scratch.along``."""
-    size = 2 * problem.k.size
+    points = scratch.local_motion[:2]
     for s in range(problem.law.size):
-        if state.segment[s] == 0 or not _by_law(problem, scratch, s):
+        if state.segment[s] == 0 or scratch.viscous[s] > 0.0:
             continue
         r = row_of(problem, s)
-        combine(scratch.along, problem.read[r], size, None, scratch.trial)
-        combine(scratch.along, problem.read_rate[r], size, None, scratch.clipped)
+        if is_circle(problem, s) or rubs(problem, s):
+            _follow_in_plane(problem, tables, state, scratch, node_set, h, begin, width, s)
+            continue
+        _motion_at_points(problem, scratch, r, points)
         for q in range(S):
-            scratch.trial[q] = off_knots(problem, s, state.segment[s], scratch.trial[q] - problem.gap[r])
+            scratch.trial[q] = off_knots(problem, s, state.segment[s], points[0, q])
+        copy(points[1], scratch.clipped, S)
         contact_forces(problem, s, scratch.trial, scratch.clipped, state.entry_rate[s], scratch.numbers)
         state.count[CALLS] += S
         store8(scratch.between[PACE + 1 + r], 0, load8(scratch.numbers, 0) * load8(scratch.between[PACE], 0))
+
+
+@merged
+def _follow_in_plane(problem, tables, state, scratch, node_set, h, begin, width, s):
+    """The same of an element in a plane: its forces are those at the nodes of a step that has the points as nodes."""
+    first, beyond = row_of(problem, s), row_of(problem, s + 1)
+    _exchange(problem, scratch, s, True)
+    for r in range(first, beyond):
+        _motion_at_points(problem, scratch, r, scratch.motion[r])
+    if rubs(problem, s):
+        for q in range(S):
+            sigma = begin + width * tables.gauss[0, q]
+            scratch.node_time[q] = state.now[T] + h * raised(sigma, tables.time_exponent[node_set])
+        rubbing_forces(problem, tables, state, scratch, s)
+    else:
+        radial_forces(problem, tables, state, scratch, s)
+    for r in range(first, beyond):
+        store8(scratch.between[PACE + 1 + r], 0, load8(scratch.law_force[r], 0) * load8(scratch.between[PACE], 0))
+    _exchange(problem, scratch, s, False)
+
+
+@merged
+def _exchange(problem, scratch, s, keep):
+    """Keep what `Scratch` has of an element at the nodes in ``scratch.kept``, or bring it back."""
+    row = 0
+    for r in range(row_of(problem, s), row_of(problem, s + 1) + 1):
+        at = r if r < row_of(problem, s + 1) else place_of(problem, s)
+        for values in (scratch.motion[at, 0], scratch.motion[at, 1], scratch.law_force[at]):
+            row = _move_row(scratch, values, row, keep)
+    if rubs(problem, s):
+        for i in range(4):
+            row = _move_row(scratch, scratch.slid[s, i], row, keep)
+        _move_row(scratch, scratch.node_time, row, keep)
+
+
+@inlined
+def _move_row(scratch, values, row, keep):
+    """Copy eight numbers into a row of ``scratch.kept``, or out of it; returns the next row."""
+    if keep:
+        copy(values, scratch.kept[row], S)
+    else:
+        copy(scratch.kept[row], values, S)
+    return row + 1
 
 
 @part(WITHIN_STEP, types.void, types.int64, *[REAL] * 3, VECTOR, types.boolean, types.boolean)
@@ -310,7 +359,7 @@ def state_within(problem, tables, state, scratch, node_set, h, begin, end, row, 
             copy(row, begun, size)
         _move_blocks(problem, tables, state, scratch, row)
         if by_laws:
-            _follow_laws(problem, state, scratch)
+            _follow_laws(problem, tables, state, scratch, node_set, h, sigma, width)
             copy(begun, row, size)
             _move_blocks(problem, tables, state, scratch, row)
         _add_works(problem, tables, state, scratch, row)
