@@ -258,11 +258,12 @@ def _is_known(value: Any) -> bool:
 
 def or_say_where(compile_it: Callable[[], Any], function: Function, kind: str) -> Any:
     """Compile, or say which line of the user's function cannot be."""
-    from numba.core.errors import NumbaError, UnsupportedBytecodeError
+    from numba.core import errors
 
+    refusals = errors.NumbaError, getattr(errors, "UnsupportedBytecodeError", errors.NumbaError)  # not in numba 0.60
     try:
         return compile_it()
-    except (NumbaError, UnsupportedBytecodeError) as error:
+    except refusals as error:
         file = inspect.getsourcefile(function)
         line = _line_of(error, function)
         raise TypeError(
