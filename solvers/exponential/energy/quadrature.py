@@ -47,7 +47,7 @@ from solvers.exponential.contact.step_integrals import is_weighted
 _PANEL_RADIANS = 3.0  # up to which the energy of a damped block is off by 5e-11 ζ of its own, and its motion by less
 _TERMS, _REACH = 14, 0.4  # of Taylor's series, and its radians of the fastest block: exact to 3e-17
 _INSIDE = 0.02  # largest integral of the next polynomial inside a step
-_RESOLVED = 0.1  # error of a rate inside a step, in units of its tolerance, up to which polynomials of forces do
+_RESOLVED = 0.5  # error of a rate inside a step, in units of its tolerance, up to which polynomials of forces do
 _INTEGRALS = 2  # first row of `Tables.gauss` with a_qr, one per r
 PACE = S  # row of `Scratch.between` with dt of the panel's points, behind polynomials, before forces
 
