@@ -255,7 +255,7 @@ def exchanged_over(problem, tables, scratch):
 
 @merged
 def hides_motion(problem, tables, state, scratch, h):
-    """Whether polynomials of the forces may miss an indentation rate inside the step by more than its tolerance."""
+    """Whether polynomials of the forces may miss an indentation rate inside the step by half its tolerance."""
     worst = 0.0
     for u in range(problem.gap.size):
         if acts(problem, state, u):
@@ -277,7 +277,7 @@ def _motion_at_points(problem, scratch, r, out):
 @merged
 def _follow_laws(problem, tables, state, scratch, node_set, h, begin, width):
     """Forces at the points of the panel times dt by their laws, for the motion that is in ``scratch.along``."""
-    points = scratch.local_motion[:2]
+    points = scratch.local_motion[:2]  # peaks, which need it, are looked for later
     for s in range(problem.law.size):
         if state.segment[s] == 0 or scratch.viscous[s] > 0.0:
             continue
@@ -346,7 +346,7 @@ def state_within(problem, tables, state, scratch, node_set, h, begin, end, row, 
     """
     time_exponent = tables.time_exponent[node_set]
     sigma, last = (begin / h) ** (1.0 / time_exponent), (end / h) ** (1.0 / time_exponent)
-    begun = scratch.stages[LANDED]
+    begun = scratch.stages[LANDED]  # no landing is under way
     panels, size = 1 + int(time_exponent * tables.fastest * (end - begin) / _PANEL_RADIANS), 2 * problem.k.size
     width = (last - sigma) / panels
     for i in range(panels):
