@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from differences import end_of
 from problems import TIP, paper_scene
 
 import fembeam as fb
@@ -16,6 +17,7 @@ from fembeam.cli import commands as cli
 from fembeam.model import extremes_of
 from fembeam.model.equations import common_period
 from fembeam.scene import parameters
+from solvers.orbits import delayed
 
 
 @pytest.fixture(scope="module")
@@ -42,13 +44,22 @@ def test_subharmonics_from_nothing_and_their_names(model):
     half = driven.orbit(period=2)
     assert half.period == 2
     assert half.stable
-    told = r"^12 starts settled to period 2 with 1 impact, none to period 1; "
+    told = r"^12 starts settled to period 2 with 1 impact, none to period 3; "
     with pytest.raises(solvers.OrbitError, match=told) as error:
-        driven.orbit()
+        driven.orbit(period=3)
     assert len(str(error.value)) < 250
     assert "3 shot(s)" in str(error.value.__cause__)
     with pytest.raises(solvers.OrbitError, match="Newton's method went to one of period 1"):
         model.orbit(period=2, start=model.orbit())
+
+
+def test_an_unstable_orbit_beside_a_stable_subharmonic_from_nothing():
+    """It closes for another integrator."""
+    orbit = paper_scene(fb.Harmonic(1e-3, 430.0)).reduce(1).orbit()
+    assert not orbit.stable
+    assert orbit.found.period == pytest.approx(2.0 * math.pi / 430.0)
+    later, method = delayed(orbit.found.system, orbit.found.phase), solvers.DormandPrince(rtol=1e-12, atol=1e-18)
+    np.testing.assert_allclose(end_of(later, orbit.found.period, method)(orbit.state), orbit.state, rtol=1e-7)
 
 
 def test_branch_marks_the_flip_and_its_copy_from_a_file_is_the_same(model, tmp_path):

@@ -14,6 +14,7 @@ from scipy.special import ellipj, ellipk
 
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, Exponential, HenonRK2, OrbitError, System, integrate, orbit
+from solvers.orbits import orbit_by_damping
 from solvers.orbits.open_times import latches, open_intervals
 from solvers.problem import ContactLog
 
@@ -226,6 +227,30 @@ def test_start_from_nothing_finds_what_a_given_start_finds():
     kept = start.copy()
     orbit(system, period, start)
     np.testing.assert_array_equal(start, kept)
+
+
+def closes(problem, found):
+    """Whether an orbit is one of the closed pieces, with the multipliers of these."""
+    x, monodromy, _ = problem.orbit(found.state)
+    np.testing.assert_allclose(found.state, x, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(np.poly(found.monodromy), np.poly(monodromy), rtol=0.0, atol=1e-7)
+
+
+@pytest.mark.parametrize("omega", [3.0, 3.4, 3.8])
+def test_an_unstable_orbit_is_found_from_rest_where_motion_is_chaotic(omega):
+    problem = Bilinear(omega, stiffness=100.0)
+    found = orbit(problem.system(), problem.period)
+    assert found.phase == 0.0
+    assert not found.stable
+    closes(problem, found)
+
+
+def test_an_orbit_with_more_damping_is_followed_until_this_is_gone():
+    problem = Bilinear(3.4, stiffness=100.0)
+    found = orbit_by_damping(problem.system(), problem.period, Exponential(1e-11), None)
+    assert not found.stable
+    assert pytest.approx(problem.system().C, rel=0.0) == found.system.C
+    closes(problem, found)
 
 
 def test_orbit_at_rest_from_a_start_that_is_not():

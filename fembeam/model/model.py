@@ -289,7 +289,8 @@ class Model(Printed, ModalEquations):
         Parameters
         ----------
         period : in periods of the load; 2 is a 1/2 subharmonic.
-        start : (2n,) state at t = 0 or an orbit near it; None tries what a run from rest settles to, then other starts.
+        start : (2n,) state at t = 0 or an orbit near it; None tries what a run from rest settles to, then other starts,
+            then, for period 1, an orbit with more damping, followed until the damping is the model's.
         shots : per period; None takes as many as it needs.
 
         Returns

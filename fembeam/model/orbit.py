@@ -7,6 +7,7 @@ k = 2 is a 1/2 subharmonic.
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from textwrap import shorten
@@ -22,7 +23,15 @@ from fembeam.model.extremes import extremes_of
 from fembeam.response import PlacedLog
 from fembeam.scene import with_signals
 from fembeam.support import Part, Printed, is_whole, require
-from solvers.orbits import at_zero, delayed, periods_of_decay, settled, state_after, with_initial_memory
+from solvers.orbits import (
+    at_zero,
+    delayed,
+    orbit_by_damping,
+    periods_of_decay,
+    settled,
+    state_after,
+    with_initial_memory,
+)
 from solvers.orbits import run as run_from
 from solvers.problem import counted
 from solvers.problem.whole_runs import whole_runs
@@ -211,7 +220,7 @@ def _periods_to_repeat(orbit: Orbit, T: float) -> int:
 
 
 def _from_rest(model: Model, count: int, T: float, shots: int | None) -> Orbit:
-    """What a run from rest settles to, else the first of many attractors with that period."""
+    """What a run from rest settles to, else the first of many attractors with that period, else one by more damping."""
     try:
         start = settled(model.system, count * T, solvers.Exponential(1e-8))
         return orbit(model, count, start, shots)
@@ -221,6 +230,9 @@ def _from_rest(model: Model, count: int, T: float, shots: int | None) -> Orbit:
     for attractor in found:
         if attractor.orbit is not None and attractor.period == count:
             return attractor.orbit
+    if count == 1:
+        with suppress(solvers.OrbitError):
+            return Orbit(model, orbit_by_damping(model.system, T, solvers.Exponential(1e-11), shots), count)
     names = ", ".join(sorted({a.name for a in found}))
     raise solvers.OrbitError(
         f"{STARTS} starts settled to {names}, none to period {count}; shooting after a run from rest: "

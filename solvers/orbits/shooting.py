@@ -18,6 +18,7 @@ that is not renewed within the period makes 1 - Φ' singular: it is held constan
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -39,6 +40,8 @@ _SETTLING = 2.0  # periods from a start without latched numbers, in which laws w
 _FRICTION = 20  # least periods of a run from rest with such laws, which may be the only damping
 _LONGEST = 400  # most periods of a run from rest
 _MOST_SETTLINGS = 4  # starts tried along a run from rest, a hundred periods apart
+_MORE_DAMPING = 0.03, 0.1, 0.3, 1.0  # μ, in turn, where none of these finds an orbit
+_LEAST_STEP = 2e-3  # change of μ, in units of the first, down to which the orbit is followed
 
 
 def orbit(
@@ -50,8 +53,9 @@ def orbit(
     ----------
     system : its loads must have the ``period``.
     period : s, > 0; a multiple of the loads' period for subharmonics.
-    start : (2n,) [q, q̇] at t = 0; None: what a run from rest has settled to. With laws with memory also (2n + l,)
-        with what is latched then, as `Orbit.whole` has it; without, they begin anew and latch over two periods.
+    start : (2n,) [q, q̇] at t = 0; None: what a run from rest has settled to, or else an orbit with more damping,
+        followed until the damping is the system's. With laws with memory also (2n + l,) with what is latched then, as
+        `Orbit.whole` has it; without, they begin anew and latch over two periods.
     method : an `Exponential`; None takes one with rtol 1e-11.
     shots : per period; None: one, then more if one fails.
 
@@ -70,16 +74,62 @@ def orbit(
     (True, True)
     """
     method = checked(system, period, method, shots)
-    problem = constant(system, period, method)
     if start is not None:
-        return _near(problem, checked_start(system, start, period, method), shots)
-    x = settled(system, period, method)
+        x = checked_start(system, start, period, method)
+        return _near(constant(system, period, method), x, shots)
+    try:
+        return _from_rest(system, period, method, shots)
+    except OrbitError as error:
+        if not system.loads:
+            raise
+        refused = error
+    try:
+        return orbit_by_damping(system, period, method, shots)
+    except OrbitError as error:
+        raise OrbitError(f"{refused}; {error}") from None
+
+
+def _from_rest(system: System, period: float, method: Any, shots: int | None) -> Orbit:
+    """The orbit near what a run from rest has settled to, or near a later state of the run; raises OrbitError."""
+    problem, x = constant(system, period, method), settled(system, period, method)
     for _ in range(_MOST_SETTLINGS - 1):
         try:
             return _near(problem, x, shots)
         except OrbitError:
             x = state_after(system, x, 100.0 * period, replace(method, rtol=max(method.rtol, 1e-8)))
     return _near(problem, x, shots)
+
+
+def orbit_by_damping(system: System, period: float, method: Any, shots: int | None) -> Orbit:
+    """An orbit of the system with more damping, C + μ (2π/T) M, followed to μ = 0; raises OrbitError.
+
+    With it motion from rest that is chaotic, or decays slowly, settles within some periods.
+    """
+
+    def damped(mu: float) -> System:
+        return replace(system, C=system.C + mu * (2.0 * math.pi / period) * system.M)
+
+    for mu in _MORE_DAMPING:
+        try:
+            return _followed(damped, mu, _from_rest(damped(mu), period, method, shots), shots)
+        except OrbitError:
+            continue
+    raise OrbitError(f"nor with damping of up to {_MORE_DAMPING[-1]:g} (2 pi/T) M more that is then taken away")
+
+
+def _followed(damped: Callable[[float], System], mu: float, found: Orbit, shots: int | None) -> Orbit:
+    """The orbit of damped(0) in the vicinity of those in between; raises OrbitError."""
+    step, least = 0.5 * mu, _LEAST_STEP * mu
+    while mu > 0.0:
+        less = mu - step if step < mu else 0.0
+        problem = constant(damped(less), found.period, found.method)
+        try:
+            found, mu, step = _near(problem, at_zero(found), shots), less, 2.0 * step
+        except OrbitError:
+            step *= 0.3
+            if step < least:
+                raise
+    return found
 
 
 def _near(problem: PeriodicProblem, x: Array, shots: int | None) -> Orbit:
