@@ -86,6 +86,16 @@ def test_stops_and_parameters_go_by_the_names_they_were_given():
             fb.study.vary(frame(), {"stops[1].gap": [1e-4]}, PeakForce(stop), **runs)
 
 
+def test_whole_numbers_of_a_scene_are_parameters_too():
+    stop, mass = fb.Stop(0.5, Hertz(10_000_000), gap=0), fb.LumpedMass(0.5, mass=1, inertia=0)
+    scene = rod(masses=[mass], stops=[stop], base=fb.Harmonic(1e-3, 100), gravity=9)
+    values = {"stops[0].gap": 1e-4, "masses[0].mass": 2.0, "stops[0].law.stiffness": 2e7, "gravity": 8.0}
+    found = fb.study.vary(scene, [values], "peak_force", 0.1, modes=1, elements=4)
+    changed = replace(scene, masses=[replace(mass, mass=2)], stops=[replace(stop, law=Hertz(2e7), gap=1e-4)], gravity=8)
+    run = changed.reduce(modes=1, elements=4).simulate(0.1)
+    assert found["peak_force"][0] == run.contacts.peak_force.max() > 0.0
+
+
 def test_axes_of_a_base_motion_name_its_direction_and_have_few_numbers():
     values = {"base.x.amplitude": [1.25e-4, 2.5e-4, 3.75e-4], "base.y.amplitude": [1e-3, 2e-3]}
     axis = fb.study.vary(frame(), values, "amplitude", duration=0.1, dt=1e-2, modes=1).figure().axes[0]

@@ -11,12 +11,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from copy import copy
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import Field, fields, is_dataclass, replace
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 from fembeam.scene.signals import is_of_signal, support_motion
-from fembeam.support import require
+from fembeam.support import is_whole, require
 
 if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
@@ -31,7 +31,7 @@ def scalars(scene: Scene, within: str = "") -> dict[str, float]:
     for part in fields(scene):
         value = getattr(scene, part.name)
         items = [(f"{part.name}[{i}]", item) for i, item in enumerate(value)] if part.name in LISTS else []
-        for path, item in items or [(part.name, value)]:
+        for path, item in items or [(part.name, _as_declared(part, value))]:
             found.update(_numbers(f"{within}{path}", item))
     for i, support in enumerate(scene.supports):
         found.update(_numbers(f"{within}supports[{i}].motion", support_motion(support)))
@@ -66,8 +66,13 @@ def _numbers(path: str, item: Any) -> dict[str, float]:
     varied = getattr(item, "varied", None)
     for part in fields(item):
         if part.init and part.repr and (varied is None or part.name in varied):
-            found.update(_numbers(f"{path}.{part.name}", getattr(item, part.name)))
+            found.update(_numbers(f"{path}.{part.name}", _as_declared(part, getattr(item, part.name))))
     return found | {f"{path}.{name}": value for name, value in _bound(item).items()}
+
+
+def _as_declared(part: Field[Any], value: Any) -> Any:
+    """A value as its field declares it: a whole number where there may be another one is a number to vary."""
+    return float(value) if is_whole(value) and "float" in str(part.type) else value
 
 
 def _bound(item: Any) -> dict[str, float]:
