@@ -101,6 +101,20 @@ def test_brute_force_reduces_as_the_model_was(model):
     assert found.peaks[0, 0] == pytest.approx(np.abs(run.displacement(TIP)).max(), rel=1e-5)
 
 
+def test_peaks_under_a_slow_and_a_fast_tone():
+    """Both are sampled as often as the fast one asks for: of a linear beam the peak is that of its response."""
+    tones = fb.Multisine([0.01, 50.0], [2.0, 3000.0])
+    beam = fb.Beam(0.26, fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12))
+    scene = fb.Scene(beam, [fb.Clamped(0.0)], forces=[fb.PointForce(0.26, tones)], damping=fb.ModalDamping(0.05))
+    model = scene.reduce(modes=1)
+    (at,), (omega,), (phi,) = tones.tones()[0][None], model.omega, model.phi(0.26)
+    response = phi**2 * tones.tones()[1] / (omega**2 - at**2 + 0.1j * omega * at)
+    u = (response @ np.exp(1j * np.outer(at, np.linspace(0.0, np.pi, 1_000_001)))).real
+    assert model.orbit().extremes(0.26) == pytest.approx((u.min(), u.max()), rel=1e-4)
+    found = fb.study.bifurcation(model, "damping.zeta[0]", [0.05], settle=5, keep=1)
+    assert found.peaks[0, 0] == pytest.approx(np.abs(u).max(), rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("name", "value"), [("gap", 1e-4), ("stiffness", 1e8), ("masses[0].mass", 0.02), ("zeta[0]", 0.03)]
 )

@@ -21,7 +21,7 @@ from fembeam.excitation import Harmonic, Multisine
 from fembeam.model.equations import load_period
 from fembeam.model.extremes import extremes_of
 from fembeam.response import PlacedLog
-from fembeam.scene import with_signals
+from fembeam.scene import signals_of, with_signals
 from fembeam.support import Part, Printed, is_whole, require
 from solvers.orbits import (
     at_zero,
@@ -105,8 +105,9 @@ class Orbit(Printed):
         """One period as a run, finely sampled; its times count from ``found.phase``."""
         from fembeam.model.run import Run
 
-        cycles = self.found.period * max(float(self.model.omega.max()), 1.0 / self.found.period) / (2.0 * math.pi)
         model = self.model
+        tones = [float(np.max(signal.tones()[0], initial=0.0)) for signal in signals_of(model.scene).values()]
+        cycles = self.found.period * max(float(model.omega.max()), 1.0 / self.found.period, *tones) / (2.0 * math.pi)
         if self.found.phase:  # what is read off a run takes loads and motions of supports at its own times
             model = model.under(with_signals(model.scene, partial(_later, by=self.found.phase)))
         return Run.of(model, self.found.samples(max(400, math.ceil(24.0 * cycles))))

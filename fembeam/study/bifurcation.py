@@ -19,11 +19,11 @@ from fembeam import plot
 from fembeam.model import Model, extremes_of, load_period, observed
 from fembeam.scene import Place, changes_structure, path_of, with_value
 from fembeam.study.execution.executors import spread
+from fembeam.study.measure import samples_per_period
 from fembeam.study.result import Result
 from fembeam.support import Part, is_whole, require
 
 Vector = NDArray[np.float64]
-LOOKS = 128  # samples per period for the peaks
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,9 +123,10 @@ def _settled(
     T, n = load_period(scene), len(model.omega)
     method = solvers.Exponential(1e-8, ledger=False)
     # settling needs no samples; but it is one run: a restart would forget the entry rate of a contact under way
-    looks = np.linspace(settle * T, (settle + keep) * T, keep * LOOKS + 1)
-    run = solvers.integrate(system, start[:n], start[n:], (settle + keep) * T, looks, method)
-    states = np.concatenate((run.q, run.q_dot), axis=1)[:-1:LOOKS]
+    looks = samples_per_period(scene, model.omega, T)
+    times = np.linspace(settle * T, (settle + keep) * T, keep * looks + 1)
+    run = solvers.integrate(system, start[:n], start[n:], (settle + keep) * T, times, method)
+    states = np.concatenate((run.q, run.q_dot), axis=1)[:-1:looks]
     u, v = run.q @ model.phi(z), run.q_dot @ model.phi(z)
-    periods = [slice(i, i + LOOKS + 1) for i in range(0, keep * LOOKS, LOOKS)]
+    periods = [slice(i, i + looks + 1) for i in range(0, keep * looks, looks)]
     return states, np.array([np.abs(extremes_of(run.t[one], u[one], v[one])).max() for one in periods])

@@ -206,7 +206,8 @@ def runs(model: Model, plan: Plan, quantity: Quantity, solver: Any) -> list[Run]
 def periodic(model: Model, plan: Plan, start: Any, solver: Any, sampled: bool) -> list[Run]:
     """Groups of drive periods of the settled response; a simulation rather than shooting, as it may be chaotic."""
     period = load_period(model.scene)
-    before, per = settling_periods(model, period, plan.discard), samples_per_period(model, period, plan.dt)
+    before = settling_periods(model, period, plan.discard)
+    per = samples_per_period(model.scene, model.omega, period, plan.dt)
     times = np.arange(before * per, (before + GROUPS * GROUP) * per + 1) / per * period
     run = model.simulate((before + GROUPS * GROUP) * period, times if sampled else None, start, solver)
     borders = (before + GROUP * np.arange(GROUPS + 1)) * period
@@ -231,12 +232,12 @@ def settling_periods(model: Model, period: float, discard: float) -> int:
     return max(asked, min(lasts, LONGEST))
 
 
-def samples_per_period(model: Model, period: float, dt: float | None) -> int:
+def samples_per_period(scene: Scene, omega: Vector, period: float, dt: float | None = None) -> int:
     """Samples of a drive period: as asked for, or enough for its tones and the lowest mode that swings."""
     if dt is not None:
         return max(1, math.ceil(period / dt - 1e-9))
-    tones = [float(np.max(signal.tones()[0], initial=0.0)) for signal in signals_of(model.scene).values()]
-    swings = model.omega[model.omega > 1e-6 * float(model.omega.max())]
+    tones = [float(np.max(signal.tones()[0], initial=0.0)) for signal in signals_of(scene).values()]
+    swings = omega[omega > 1e-6 * float(omega.max())]
     slow = min(FEWEST * float(swings.min(initial=math.inf)), MOST * 2.0 * math.pi / period) if len(swings) else 0.0
     return max(SAMPLES, math.ceil(max(FEWEST * max(tones), slow) * period / (2.0 * math.pi) - 1e-9))
 
