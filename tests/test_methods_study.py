@@ -242,6 +242,10 @@ def test_map_scales_the_limit_of_the_second_step():
     [
         ({"steps": [0.0]}, "steps must be positive"),
         ({"steps": [np.nan]}, "steps must be positive"),
+        ({"steps": []}, "steps must be positive"),
+        ({"modes": []}, "modes must hold one"),
+        ({"stiffness": [], "modes": 1}, "stiffness must hold one"),
+        ({"scene": paper_scene(fb.Harmonic(0.0, 195.0)), "modes": 1}, "δ of the first stop must move, got 0.0"),
         ({"tolerance": 2.0}, "tolerance must lie in"),
         ({"stiffness": [1e8]}, "modes must be one count"),
         ({"stiffness": [1e8], "modes": 1, "scene": paper_scene(law=PiecewiseLinear([1e5]))}, "must have a stiffness"),

@@ -145,6 +145,8 @@ def test_bad_input(model):
         paper_scene(fb.BandNoise(1e-4, (0.0, 100.0), seed=1)).reduce(1).orbit()
     with pytest.raises(ValueError, match="no common period"):
         paper_scene(fb.Multisine([1e-4, 1e-4], [2.0, 2.0 * math.pi])).reduce(1).orbit()
+    with pytest.raises(ValueError, match=re.escape("start must have shape (2,), [q, q_dot], got (3,) in bifurcation")):
+        fb.study.bifurcation(model, "omega", [200.0], start=[0.0, 0.0, 0.0])
 
 
 def test_the_table_branch(tmp_path, capsys):

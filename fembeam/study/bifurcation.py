@@ -105,6 +105,8 @@ def bifurcation(
                 "bifurcation", "give a whole number")  # fmt: skip
     place = observed(model) if z is None else z
     state = model.rest() if start is None else np.asarray(start, dtype=float)
+    require(state.shape == model.rest().shape, f"start must have shape {model.rest().shape}, [q, q_dot]", state.shape,
+            "bifurcation", "use model.state(displacement, velocity)")  # fmt: skip
     task = partial(_settled, model, path, place, settle, keep, state)
     results = spread(task, list(values), executor, "bifurcation")
     return Bifurcation(path, place, values, np.array([r[0] for r in results]), np.array([r[1] for r in results]))

@@ -16,7 +16,7 @@ from fembeam.model import Model
 from fembeam.scene import Scene
 from fembeam.study.result import Result
 from fembeam.study.speed_accuracy import method_name
-from fembeam.support import Part, require
+from fembeam.support import Part, require, vector
 from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
@@ -113,7 +113,7 @@ def stability_map(
 
     Raises
     ------
-    ValueError for bad input, before computing.
+    ValueError for bad input, before computing; for a first stop at which nothing moves.
 
     Examples
     --------
@@ -127,13 +127,13 @@ def stability_map(
     >>> (found.verdict[:, 1] == Verdict.UNSTABLE).tolist()
     [False, True]
     """
-    steps = np.atleast_1d(np.asarray(steps, dtype=float))
     where = "stability_map"
-    require(bool(np.all(np.isfinite(steps) & (steps > 0.0))), "steps must be positive (s)", steps.tolist(), where,
-            "e.g. [1e-5, 1e-4]")  # fmt: skip
+    steps = vector("steps", steps, where, "e.g. [1e-5, 1e-4]", "must be positive (s)",
+                   lambda x: np.isfinite(x) & (x > 0.0))  # fmt: skip
     require(len(scene.acting) > 0, "the scene must have a stop or element", 0, where, "add one")
     require(0.0 < tolerance < 1.0, "tolerance must lie in (0, 1)", tolerance, where, "e.g. 0.01")
     models, axis, rows = _models(scene, modes, stiffness)
+    require(bool(models), f"{axis} must hold one", rows, where, "e.g. modes=[1, 2]")
     cells = [[_cell(model, method, dt, duration, tolerance, start) for dt in steps] for model in models]
     limits = [_limits(model, method, steps, duration) for model in models]
     flight, contact = np.array(limits).T
@@ -196,7 +196,10 @@ def _cell(model: Model, method: Any, dt: float, duration: float, tolerance: floa
 
 
 def _truth(model: Model, duration: float, start: Any) -> Any:
-    """The reference, once per model."""
+    """The reference, once per model; ValueError where nothing moves, to which errors could be relative."""
     key = "truth of a stability map", duration, None if start is None else tuple(np.asarray(start))
     best = solvers.Exponential(1e-11, ledger=False)
-    return model.system.kept.get(key, lambda: model.simulate(duration, duration / SAMPLES, start, best))
+    found = model.system.kept.get(key, lambda: model.simulate(duration, duration / SAMPLES, start, best))
+    moved = float(np.ptp(found.indentation()))
+    require(moved > 0.0, "δ of the first stop must move", moved, "stability_map", "give the scene loads, or start=")
+    return found
