@@ -338,6 +338,7 @@ def test_the_users_settings_are_left_alone(run):
 def test_segments_resolve_two_rad_per_second_on_long_runs():
     assert 2 * np.pi / (plot.segment_for(600_000, 1e-3) * 1e-3) <= 2.0
     assert plot.segment_for(800, 1e-3) == 100
+    assert plot.segment_for(10_000, 1.0) == 64  # slow motion: two rad/s would be four samples
 
 
 def test_random_figures_have_units_bands_and_confidence():

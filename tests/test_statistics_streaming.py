@@ -449,6 +449,19 @@ def test_a_run_too_short_for_errors_says_so():
         found = stationary(model, 5.0, 2e-3, solver=QUICK)
     assert math.isnan(found["tip u"].variance.standard_error)
     assert all(np.isnan(found["tip u"].kurtosis.interval()))
+    with pytest.warns(UserWarning, match="simulate at least 75.* s, or give a shorter segment= of the spectrum"):
+        stationary(model, 5.0, 2e-3, solver=QUICK, segment=12_500)
+
+
+def test_a_slow_structure_has_a_spectrum_too():
+    """At 0.02 rad/s, sampled ten times a period, two rad/s are half a sample."""
+    slow = fb.Section.circle(2.1e3, 7800.0, 0.01)
+    scene = fb.Scene(fb.Beam(0.5, slow), [fb.Clamped(0.0)], damping=fb.ModalDamping(0.05))
+    model = replace(scene, base=fb.BandNoise(1e-4, (0.0, 0.1))).reduce(modes=1)
+    omega = float(model.omega[0])
+    found = stationary(model, 64.0 * 20.0 / omega, 0.6 / omega, solver=QUICK)["tip u"].psd
+    assert found.omega[1] < 0.2 * omega
+    assert found.omega[np.argmax(found.density)] == pytest.approx(omega, rel=0.2)
 
 
 @pytest.mark.drawn

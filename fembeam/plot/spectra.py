@@ -25,7 +25,7 @@ from fembeam.plot.style import BLUE, CYCLE, GREEN, GREY, Vector, curve, drawable
 from fembeam.response import frame_motion
 from fembeam.scene import signals_of
 from fembeam.statistics import Spectrum, psd
-from fembeam.statistics.spectra import FINEST_RESOLUTION
+from fembeam.statistics.spectra import FEWEST_OF_SLOW, FINEST_RESOLUTION
 from fembeam.structures import COMPONENTS, direction_of
 
 if TYPE_CHECKING:
@@ -43,8 +43,8 @@ BASE_COLOURS = GREY, *(colour for colour in CYCLE if colour not in (BLUE, GREEN)
 
 
 def segment_for(samples: int, dt: float) -> int:
-    """Welch segment: an eighth of a short signal, `FINEST_RESOLUTION` on a long one."""
-    return max(8, min(samples // 8, int(np.ceil(2 * np.pi / (FINEST_RESOLUTION * dt)))))
+    """Welch segment: an eighth of a short signal, `FINEST_RESOLUTION` on a long one, finer where motion is slow."""
+    return max(8, min(samples // 8, max(FEWEST_OF_SLOW, int(np.ceil(2 * np.pi / (FINEST_RESOLUTION * dt))))))
 
 
 @styled

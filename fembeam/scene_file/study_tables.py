@@ -183,7 +183,7 @@ class EnsembleTable:
     duration : s of each that the statistics use. dt : output sampling in s.
     until : relative standard error of every mean at which to stop; None: compute all.
     discard : s left out of each; None: until the transient has died out.
-    segment : samples of a Welch segment; None: 2 rad/s of resolution.
+    segment : samples of a Welch segment; None: 2 rad/s of resolution, at least 64.
     workers : processes to share the work.
     solver : a method of `solvers`; None is the library's best. In a file { kind = "…", … }.
     """

@@ -195,3 +195,4 @@ class Welch:
 
 
 FINEST_RESOLUTION = 2.0  # rad/s per line of a spectrum; finer only makes it noisier
+FEWEST_OF_SLOW = 64  # samples per segment, however slow the motion: with ten to its period, a period has six lines

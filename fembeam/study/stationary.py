@@ -31,11 +31,11 @@ from fembeam.model import Model, Run, places
 from fembeam.scene import signals_of
 from fembeam.statistics import Batches, Estimate, Impacts, Signal
 from fembeam.statistics.initial_transient import Settling, settling
-from fembeam.statistics.spectra import FINEST_RESOLUTION
+from fembeam.statistics.spectra import FEWEST_OF_SLOW, FINEST_RESOLUTION
 from fembeam.study.execution.checkpoint import Checkpoint, model_identity
 from fembeam.study.execution.fingerprint import fingerprint
 from fembeam.study.result import Result
-from fembeam.study.segments import FEWEST_SAMPLES, Segment, Segments
+from fembeam.study.segments import FEWEST_SAMPLES, SHORTEST, Segment, Segments
 from fembeam.support import Part, bar, is_whole, note, number, numbers, require
 
 if TYPE_CHECKING:
@@ -169,7 +169,7 @@ def stationary(
     until : stop when the relative standard error falls below it, in (0, 1).
     of : function of the `Response` giving the `Estimate`, or several, that `until` is about; None: every variance.
     discard : s to leave out at the start; None: until the transient has died out, at least ten correlation times.
-    segment : samples of a Welch segment; None: 2 rad/s of resolution.
+    segment : samples of a Welch segment; None: 2 rad/s of resolution, at least 64.
     bins, levels : name -> edges of the histogram, level of the crossings (0 unless given).
     start : (2n,) as for `Model.simulate`.
     solver : None is ``solvers.Exponential(1e-8, ledger=False)``.
@@ -347,8 +347,9 @@ def _warn_of_a_short_run(plan: Segments, settled: Settling | None) -> None:
         warnings.warn(f"the transient has not died out: its halves differ by {settled.drift:.1f} standard errors; "
                       "simulate longer, or give discard=", UserWarning, stacklevel=3)  # fmt: skip
     if plan.taken < 2:
+        finer = ", or give a shorter segment= of the spectrum" * (plan.shortest > SHORTEST * plan.correlation_time)
         warnings.warn(f"{plan.kept:.4g} s hold one realisation of the noise, which tells no standard error; "
-                      f"simulate at least {2 * plan.shortest:.3g} s", UserWarning, stacklevel=3)  # fmt: skip
+                      f"simulate at least {2 * plan.shortest:.3g} s{finer}", UserWarning, stacklevel=3)  # fmt: skip
 
 
 def _looked(name: str, look: Watch, run: Run) -> tuple[Vector, Vector | None]:
@@ -384,10 +385,11 @@ def _check_options(watch: Any, segment: Any, bins: Any, levels: Any, of: Any) ->
 
 
 def default_segment(dt: float) -> int:
-    """Samples of a Welch segment that resolves 2 rad/s."""
+    """Samples of a Welch segment that resolves 2 rad/s, at least 64."""
     from scipy.fft import next_fast_len
 
-    return int(next_fast_len(math.ceil(2 * math.pi / (FINEST_RESOLUTION * dt)), real=True))
+    samples = max(FEWEST_OF_SLOW, math.ceil(2 * math.pi / (FINEST_RESOLUTION * dt)))
+    return int(next_fast_len(samples, real=True))
 
 
 def _enough(response: Response, of: Callable[[Response], Any] | None, until: float) -> bool:
