@@ -94,6 +94,8 @@ def test_whole_numbers_of_a_scene_are_parameters_too():
     changed = replace(scene, masses=[replace(mass, mass=2)], stops=[replace(stop, law=Hertz(2e7), gap=1e-4)], gravity=8)
     run = changed.reduce(modes=1, elements=4).simulate(0.1)
     assert found["peak_force"][0] == run.contacts.peak_force.max() > 0.0
+    lever = replace(frame(), masses=[fb.LumpedMass("B", 1, inertia=0, offset=(0, 0.05))])
+    assert with_value(lever, "masses[0].offset[0]", 0.01).masses[0].offset == (0.01, 0.05, 0.0)
 
 
 def test_axes_of_a_base_motion_name_its_direction_and_have_few_numbers():

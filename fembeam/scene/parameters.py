@@ -16,7 +16,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 from fembeam.scene.signals import is_of_signal, support_motion
-from fembeam.support import is_whole, require
+from fembeam.support import is_number, is_whole, require
 
 if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
@@ -71,8 +71,11 @@ def _numbers(path: str, item: Any) -> dict[str, float]:
 
 
 def _as_declared(part: Field[Any], value: Any) -> Any:
-    """A value as its field declares it: a whole number where there may be another one is a number to vary."""
-    return float(value) if is_whole(value) and "float" in str(part.type) else value
+    """A value as its field declares it: whole numbers where there may be others are numbers to vary."""
+    kind = str(part.type)
+    if isinstance(value, tuple) and "[float" in kind and all(map(is_number, value)):
+        return tuple(map(float, value))
+    return float(value) if is_whole(value) and "float" in kind else value
 
 
 def _bound(item: Any) -> dict[str, float]:
