@@ -153,13 +153,20 @@ def test_intervals_of_the_rate_of_events_that_come_in_clusters_cover_more():
     assert held[RATE] > 900 > held[LINEAR]
 
 
-def test_a_run_without_contact_does_not_tell_how_rare_they_are():
+def test_a_run_without_contact_or_crossing_does_not_tell_how_rare_they_are():
     """Its rate was 0 ± 0, from 0 to 0, and known well enough for any `until`."""
+    signal = Signal(np.zeros(2), 1.0, 8, level=1.0)
     none = solvers.ContactLog(np.zeros(0, int), *np.zeros((8, 0)), np.zeros(0, bool))
     impacts = Impacts()
     for i in range(16):
         impacts.add(none, 0, float(i), i + 1.0)
-    for found in (impacts.rate, impacts.probability):
+        signal.add(np.sin(np.arange(16.0)))
+    one = solvers.ContactLog(np.zeros(1, int), *np.zeros((8, 1)), np.zeros(1, bool))
+    pressed = Impacts()  # all the time: that does not tell how rarely the stop opens
+    for i in range(16):
+        pressed.add(replace(one, t_out=np.full(1, np.nan)), 0, float(i), i + 1.0)
+    assert pressed.probability.value == 1.0
+    for found in (impacts.rate, impacts.probability, signal.crossing_rate, pressed.rate):
         assert found.value == 0.0
         assert found.relative == math.inf
         assert np.isnan(found.interval()).all()

@@ -140,6 +140,10 @@ class Estimate:
         lo, hi = (np.where(np.isfinite(error), b, p)[()] for b, p in zip(bounds, plain, strict=True))
         return lo, hi
 
+    def if_met(self, met: bool) -> Estimate:
+        """Itself where what it counts was met; a run that meets none does not tell how rare it is: then no error."""
+        return self if met else replace(self, standard_error=math.nan, without=None)
+
     def _scaled(self) -> tuple[Any, Any]:
         """The estimate on its scale, its bias taken off, and its standard error there."""
         parts = self.scale.forth(self.without)

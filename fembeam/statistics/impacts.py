@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,10 +87,8 @@ class Impacts:
         return self._share(TOUCHING)
 
     def _share(self, place: int) -> Estimate:
-        """A sum by time. A run that meets no contact does not tell how rare they are: then its error is not known."""
-        found = self.batches.estimate(lambda s: s[place] / s[TIME], RATE)
-        met = self.batches.total[TOUCHING] > 0.0
-        return found if met else replace(found, standard_error=math.nan, without=None)
+        """A sum by time; its error is not known where it is 0."""
+        return self.batches.estimate(lambda s: s[place] / s[TIME], RATE).if_met(self.batches.total[place] > 0.0)
 
     def mean(self, quantity: str) -> Estimate:
         """Mean per contact of duration (s), peak_force (N), entry_speed (m/s) or energy_loss (J)."""

@@ -130,8 +130,8 @@ class Signal:
 
     @property
     def crossing_rate(self) -> Estimate:
-        """Up-crossings of `level` per second."""
-        return self._of(lambda s: s[CROSSINGS] / s[TIME], RATE)
+        """Up-crossings of `level` per second; its error is not known without one."""
+        return self._of(lambda s: s[CROSSINGS] / s[TIME], RATE).if_met(self.batches.total[CROSSINGS] > 0.0)
 
     @property
     def outside(self) -> float:
