@@ -195,6 +195,13 @@ def test_a_response_is_linear_in_its_unbalance():
         np.testing.assert_allclose(found.displacement("B", way), expected, atol=1e-6 * np.abs(expected).max())
 
 
+def test_the_static_share_of_an_unbalance_is_that_of_a_force_along_each_axis():
+    beside = [fb.PointForce("B", fb.Harmonic(1.0, 9.0), direction=way) for way in ("x", "y")]
+    shares = rotor(forces=[fb.Unbalance("B", 1e-3), *beside]).reduce(4).static_share
+    assert shares[:2].tolist() == shares[2:].tolist()
+    assert 0.9 < shares[0] < 1.0
+
+
 def test_a_signal_made_of_that_of_an_unbalance_stays():
     """As that of an orbit from a later time on, whose phase alone differs."""
     scene = rotor(forces=[fb.Unbalance("B", 1e-4, phase=0.3)])

@@ -79,11 +79,6 @@ class Element(ScenePart):
             return found
         return replace(found, direction=direction_of(self.direction, self.where))
 
-    @property
-    def coordinates(self) -> tuple[LocalCoordinate, ...]:
-        """All that it acts on: the one."""
-        return (self.coordinate,)
-
     def _made(self, at: str) -> str:
         of, to = " of rotation" * (self.direction is None and self.coordinate.rotation), self.coordinate.to_words
         return f"{self.word}{of} " + (f"from {at} to {to}" if to else f"at {at}")

@@ -6,6 +6,7 @@ Annotations are evaluated here: the classes derived from this one stand in files
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from fembeam.scene.local_coordinate import LocalCoordinate
 from fembeam.scene.places import Place, directed_words, place_words, quoted
 from fembeam.structures import Six, direction_of
 from fembeam.support import is_whole, require, require_place
@@ -46,6 +47,12 @@ class ScenePart:
         """Its direction on the six components; None without one, as on a beam."""
         direction: Any = getattr(self, "direction", None)
         return None if direction is None else direction_of(direction, self.where)
+
+    @property
+    def coordinates(self) -> tuple[LocalCoordinate, ...]:
+        """All that a stop, an element or a load acts on: the one `coordinate`, unless it has more."""
+        part: Any = self
+        return (part.coordinate,)
 
     @property
     def where(self) -> str:

@@ -367,11 +367,6 @@ class _Load(ScenePart):
         """What it acts on."""
         return LocalCoordinate(self.z, self.derivative, None, self.along)
 
-    @property
-    def coordinates(self) -> tuple[LocalCoordinate, ...]:
-        """All that it acts on: the one."""
-        return (self.coordinate,)
-
 
 @dataclass(frozen=True, repr=False)
 class PointForce(_Load):
