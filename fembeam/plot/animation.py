@@ -262,10 +262,6 @@ class _Stage:
 
         return self.beam_axis.transData + ScaledTranslation(0, side * points / 72, self.figure.dpi_scale_trans)
 
-    def _ball(self, impactor: int) -> Vector:
-        """Height (frames,) of an impactor."""
-        return self.impactor_places[impactor, 1] + self.run.impactor_displacement(impactor)[self.samples]
-
     def _fixed(self, axis: Axes) -> None:
         """Supports and stops on the frame."""
         for z, body in self.run.readout.supports:
@@ -286,8 +282,9 @@ class _Stage:
         """Move everything to one frame."""
         for curve, (z, line) in zip(self.curves, self.lines, strict=True):
             curve.set_data(self.along * z, self.across * line[number])
-        for i, (ball, (place, _)) in enumerate(zip(self.balls, self.impactor_places, strict=True)):
-            ball.set_data([self.along * place], [self.across * self._ball(i)[number]])
+        for i, (ball, (place, height)) in enumerate(zip(self.balls, self.impactor_places, strict=True)):
+            moved = height + self.run.impactor_displacement(i)[self.samples[number]]
+            ball.set_data([self.along * place], [self.across * moved])
         self._point(number)
         now = float(self.run.t[self.samples[number]])
         self.cursor.set_xdata([self.tick * now, self.tick * now])

@@ -319,7 +319,8 @@ class _View:
                 for i, item in enumerate(lane.of_side(side)):
                     if item.link is not None:
                         path = np.array(self._way(lanes, lane, side, i))
-                        axis.plot(self.z(path[:, 0]), path[:, 1], color=_colour(item), linewidth=1.4, zorder=1.5,
+                        colour = COLOURS["stop" if item.kind[0] == "Stop" else "element"]
+                        axis.plot(self.z(path[:, 0]), path[:, 1], color=colour, linewidth=1.4, zorder=1.5,
                                   gid=item.name, solid_joinstyle="round")  # fmt: skip
 
     def _way(self, lanes: list[Lane], lane: Lane, side: int, number: int) -> list[tuple[float, float]]:
@@ -355,11 +356,6 @@ class _View:
             axis.text(self.z(x + 0.12), top - HEAD + 0.19, words, fontsize=SIZE + 0.5, va="center", gid=pen.name,
                       parse_math=False)  # fmt: skip
             x += 0.45 + extent(words, SIZE + 0.5)[0]
-
-
-def _colour(item: Item) -> str:
-    """Colour of the line from a stop or an element."""
-    return COLOURS["stop" if item.kind[:1] == ("Stop",) else "element"]
 
 
 def _gaps(scene: Scene) -> list[float]:

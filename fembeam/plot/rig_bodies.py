@@ -140,19 +140,14 @@ class _Panel:
             wrapped = [line for text in texts for line in _wrapped(text, LISTED)]
             lines += [f"{number if i == 0 else '':<2} {line}" for i, line in enumerate(wrapped)]
         size = min(7.0, 230.0 / max(len(lines), 1))  # points: what the height of a panel takes
-        if not self.space:
-            self._make_room(axis)
+        engine = axis.figure.get_layout_engine()
+        if not self.space and engine is not None and "rect" in engine.get():  # a figure of our own: room for the list
+            engine.set(rect=(0.0, 0.0, BESIDE_LIST, 1.0))
         self._numbered(axis, [str(number) for number in range(1, 1 + len(self.words))])
         write, x = (axis.text2D, 1.1) if self.space else (axis.text, 1.02)
         listed = write(x, 0.95, "\n".join(lines), transform=axis.transAxes, fontsize=size, va="top", parse_math=False,
                        family="monospace")  # fmt: skip
         listed.set_in_layout(self.space)  # of a plane it would press the axes flat
-
-    def _make_room(self, axis: Any) -> None:
-        """Axes of a figure of our own make room for a list."""
-        engine = axis.figure.get_layout_engine()
-        if engine is not None and "rect" in engine.get():
-            engine.set(rect=(0.0, 0.0, BESIDE_LIST, 1.0))
 
     def _numbered(self, axis: Any, numbers: list[str]) -> None:
         """Numbers at the places, in the plane around them while there is room."""

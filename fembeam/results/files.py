@@ -140,7 +140,7 @@ def summary(
         "contacts": _contacts(run, discard),
         **({"outputs": extremes_table(histories(run, **outputs), discard)} if outputs else {}),
         "energy": _energy(run),
-        "losses": _losses(run),
+        "losses": {name: np.asarray(x, dtype=float).tolist() for name, x in run.losses.arrays().items()},
         "cost": asdict(run.cost),
         "dt": float(run.t[1] - run.t[0]) if len(run.t) > 1 else None,
         "scene": run.scene,
@@ -245,11 +245,6 @@ def _energy(run: Run) -> dict[str, float]:
     scale = max(abs(end["input"]), abs(end.get("spin", 0.0)), abs(float(ledger.initial)))
     end["residual_over_input"] = abs(end["residual"]) / scale if scale > 0 else 0.0
     return end
-
-
-def _losses(run: Run) -> dict[str, list[float]]:
-    """What each stop and element took, J, with friction and the work of spins where there is friction."""
-    return {name: np.asarray(values, dtype=float).tolist() for name, values in run.losses.arrays().items()}
 
 
 def text(found: dict[str, Any]) -> str:

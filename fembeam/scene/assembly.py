@@ -265,7 +265,8 @@ def _one_beam(scene: Scene, elements: int | None, modes: int | None, probes: Seq
     borders = borders_of(scene, probes)
     if elements is None:
         modes = MESHED_MODES if modes is None else int(modes)
-        _check_modes(modes)
+        require(modes <= MOST_MODES, f"modes must be at most {MOST_MODES}", modes, "Scene.matrices",
+                "keep the modes up to a few times the highest frequency of interest")  # fmt: skip
         return _on_nodes(scene, _resolving(scene, borders, modes), modes)
     return _on_nodes(scene, spread(scene.beam, borders, elements), None)
 
@@ -348,12 +349,6 @@ def check_counts(elements: int | None, modes: int | None) -> None:
     few = elements is None or elements <= MOST_ELEMENTS
     require(few, f"elements must be at most {MOST_ELEMENTS}, where rounding takes over", elements, "Scene.matrices",
             "leave them out: as few as the modes need are made")  # fmt: skip
-
-
-def _check_modes(modes: int) -> None:
-    """Raise ValueError for more modes than are computed within a minute or so."""
-    require(modes <= MOST_MODES, f"modes must be at most {MOST_MODES}", modes, "Scene.matrices",
-            "keep the modes up to a few times the highest frequency of interest")  # fmt: skip
 
 
 def _resolving(scene: Scene, borders: Vector, modes: int) -> Vector:

@@ -97,19 +97,15 @@ def one_sided(law: Any) -> Iterator[str]:
     pushed, pulled, later = (
         law.batch(entry_rate)(sign * np.repeat(TRIED, 2), rate) for sign, entry_rate in ((1, 1.0), (-1, 1.0), (-1, 2.0))
     )
+    cut = getattr(law, "bend", None) or (getattr(law, "memory", ()) and law.one_sided)
     if not np.isfinite(pulled).all():
         yield "its force at d < 0 is not a number"
     elif any(hasattr(part, "indentation") for part in getattr(law, "parts", (law,))):
         yield "a table of measured forces begins at d = 0"
     elif np.any(pulled != later):
         yield "its force depends on the rate of entry, and nothing enters"
-    elif getattr(law, "bend", None) or _yields(law) or (np.any(pushed) and not np.any(pulled)):
+    elif cut or (np.any(pushed) and not np.any(pulled)):
         yield "its force is cut at zero"
-
-
-def _yields(law: Any) -> bool:
-    """Whether a law has a memory and is for δ > 0 only."""
-    return bool(getattr(law, "memory", ())) and law.one_sided
 
 
 def force_both_ways(law: Any, d: Any, rate: Any = 0.0) -> NDArray[np.float64]:

@@ -94,16 +94,11 @@ def require_number(at: Any, parts: Mapping[str, Any], where: str) -> None:
 
 def placed_parts(scene: Scene, names: Sequence[str]) -> Iterator[tuple[str, tuple[Any, ...]]]:
     """Each list of parts of a scene, with places for the names of parts."""
-    each = [(_parts_of(one, names), one.beam) for one in (scene, *scene.bodies)]
+    each = [(one.part_places, one.beam) for one in (scene, *scene.bodies)]
     for name in names:
         parts = enumerate(getattr(scene, name))
         yield name, tuple(_placed(part, each, f"{name}[{i}] ({part.titled}) of Scene") for i, part in parts)
     yield "joints", tuple(_placed_joint(one, each, f"joints[{i}] of Scene") for i, one in enumerate(scene.joints))
-
-
-def _parts_of(scene: Scene, names: Sequence[str]) -> dict[str, Any]:
-    """{name: place} of a scene's own parts."""
-    return part_places(scene.beam, [part for name in names for part in getattr(scene, name)])
 
 
 def _placed(part: Any, each: Sequence[tuple[Mapping[str, Any], Any]], where: str) -> Any:

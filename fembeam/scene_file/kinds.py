@@ -97,11 +97,6 @@ class Nested:
     by_name: bool = False  # plain text is the name
 
 
-def _methods() -> Constructors:
-    """Methods by name; made when asked for, as they are slow to import."""
-    return {name: getattr(solvers, method) for name, method in SOLVERS.items() if method in solvers.__all__}
-
-
 MAKERS: Mapping[Any, Callable[..., Any]] = {Fixed: fixed}  # parts that a file makes otherwise
 SECTION = Nested(lambda: SHAPES, "shape", "general")
 SIGNAL = Nested(lambda: SIGNALS)
@@ -110,7 +105,9 @@ KEYS = {
     "law": Nested(lambda: LAWS),
     "laws": Nested(lambda: LAWS, listed=True),
     **{key: SIGNAL for key in PLACES.values()},
-    "solver": Nested(_methods),
+    "solver": Nested(  # made when asked for: methods are slow to import
+        lambda: {name: getattr(solvers, method) for name, method in SOLVERS.items() if method in solvers.__all__}
+    ),
     "quantity": Nested(lambda: QUANTITIES, by_name=True),
     "friction": Nested(lambda: {"coulomb": Friction}, default="coulomb"),
 }

@@ -50,7 +50,7 @@ def frame_of(
     names = {node: named.get(node, f"n{node}") for node in ends}
     flat = not np.any(points[np.unique(lines), 2]) and not options.get("bending_only") if plane is None else plane
     members = [
-        Member(names[chain[0]], names[chain[-1]], table[group], _up_of(up, group), name)
+        Member(names[chain[0]], names[chain[-1]], table[group], up.get(group) if isinstance(up, Mapping) else up, name)
         for (chain, group), name in zip(chains, _numbered([group for _, group in chains]), strict=True)
     ]
     nodes = {name: tuple(float(x) for x in points[node, : 2 if flat else 3]) for node, name in names.items()}
@@ -97,11 +97,6 @@ def _in_order(
     ]
     middle = {id(one): place[one[0][0]] + place[one[0][-1]] for one in turned}
     return sorted(turned, key=lambda one: middle[id(one)]), sorted(ends, key=lambda node: float(place[node]))
-
-
-def _up_of(up: Any, group: str) -> Any:
-    """The direction ``up`` of one group."""
-    return up.get(group) if isinstance(up, Mapping) else up
 
 
 def _names(mesh: Any) -> dict[int, str]:

@@ -235,17 +235,14 @@ class Search:
     def answer(self) -> SmallestModel:
         """Candidates from small to large; the first that holds in every respect."""
         rejected: set[Choice] = set()
-        for rung in self._rungs():
-            self._measured([Choice(n, kind, TIGHT) for kind in self.kinds for n in rung])
+        for rung in RUNGS:
+            counts = [n for n in rung if n <= max(2 * self.most, 2)]
+            self._measured([Choice(n, kind, TIGHT) for kind in self.kinds for n in counts])
             while (found := self._candidate(rejected)) is not None:
                 if (result := self._settled(found)) is not None:
                     return result
                 rejected.add(found)
         raise NotMetError(self._failure(rejected))
-
-    def _rungs(self) -> list[list[int]]:
-        """Counts to be tried, in batches, up to twice `most`."""
-        return [batch for rung in RUNGS if (batch := [n for n in rung if n <= max(2 * self.most, 2)])]
 
     def _measured(self, choices: Sequence[Choice]) -> list[Measured]:
         """Every model measured, the new ones spread over the executor."""
