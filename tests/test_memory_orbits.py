@@ -272,13 +272,14 @@ def test_a_yielded_stop_after_shakedown_is_one_of_a_family():
     assert abs(np.sort_complex(found.transverse) - np.sort_complex(same.multipliers)).max() < 1e-7
 
 
+def hardly_slipping(omega):
+    """The slider under a load by which it slips around resonance alone."""
+    return oscillator(JENKINS, omega, force=0.3)
+
+
 def test_branch_against_runs():
     """Amplitudes of a slider's branch over the frequency are what runs settle to; its ends stick."""
-
-    def family(omega):
-        return oscillator(JENKINS, omega, force=0.3)
-
-    found = branch(family, (1.3, 3.0), orbit(*family(2.2)), at=2.2).run()
+    found = branch(hardly_slipping, (1.3, 3.0), orbit(*hardly_slipping(2.2)), at=2.2).run()
     assert [status.name for status in found.status] == ["END", "END"]
     assert {len(one.transitions) for one in found.orbits} >= {0, 4}
     assert [one.mark for one in found.special].count("stick") >= 2
@@ -296,14 +297,10 @@ def test_a_branch_goes_on_where_a_stuck_slider_begins_to_slip():
 
     Where the slider slips the motion forgets where it began.
     """
-
-    def family(omega):
-        return oscillator(JENKINS, omega, force=0.3)
-
     at = 1.3
-    first = orbit(*family(at)).whole
+    first = orbit(*hardly_slipping(at)).whole
     first[-1] += 0.02
-    found = branch(family, (at - 0.05, 1.8), orbit(*family(at), first), at=at).run()
+    found = branch(hardly_slipping, (at - 0.05, 1.8), orbit(*hardly_slipping(at), first), at=at).run()
     assert (found.orbits[0].parameter, found.orbits[-1].parameter) == (at - 0.05, 1.8)
     assert found.endings == ("reached the end of the span",) * 2
     last = found.orbits[-1]
@@ -314,11 +311,7 @@ def test_a_branch_goes_on_where_a_stuck_slider_begins_to_slip():
 
 def test_a_branch_says_where_it_turned_round_or_was_lost():
     """In words, with the parameter of the last orbit and what may be why."""
-
-    def family(omega):
-        return oscillator(JENKINS, omega, force=0.3)
-
-    found = branch(family, (1.2, 3.0), orbit(*family(2.2)), at=2.2)
+    found = branch(hardly_slipping, (1.2, 3.0), orbit(*hardly_slipping(2.2)), at=2.2)
     walk, status = found.walks[1], type(found.status[1])
     walk.status = status.LOST
     assert found.endings[1].startswith("lost: no orbit was found")

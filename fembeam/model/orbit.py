@@ -137,8 +137,7 @@ class Orbit(Printed):
 
     def extremes(self, z: float) -> tuple[float, float]:
         """Lowest and highest displacement (m, relative to the frame) at z over the period."""
-        lowest, highest = extremes_of(self.run.t, self.run.displacement(z), self.run.velocity(z))
-        return lowest, highest
+        return extremes_of(self.run.t, self.run.displacement(z), self.run.velocity(z))
 
     def _parts(self) -> list[Part]:
         """What kind of orbit, its multipliers, its contacts."""

@@ -6,7 +6,7 @@ M q'' + Ω G q' + K q = 0 on real modes at standstill; stops, elements, damping 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,9 +18,6 @@ from fembeam.scene import Scene
 from fembeam.structures import COMPONENTS, Frame
 from fembeam.study.result import Result
 from fembeam.support import Part, is_whole, require, vector
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Vector = NDArray[np.float64]
 WHERE = "campbell"
@@ -68,9 +65,7 @@ class Campbell(Result):
             for spin, row in zip(self.spins, self.signed, strict=True)
         ]
 
-    def figure(self) -> Figure:
-        """Frequencies over spin, forward and backward; see `plot.campbell`."""
-        return plot.campbell(self)
+    figure = plot.campbell
 
     def _parts(self) -> list[Part]:
         found = ", ".join(f"{abs(w):.6g} rad/s ({SENSES[int(np.sign(w))]})" for w in self.critical)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,9 +22,6 @@ from contacts.path import walk
 from fembeam import plot
 from fembeam.study.result import Result
 from fembeam.support import Part, by_rows, number, require, vector
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Vector = NDArray[np.float64]
 WHERE = "study.equivalent"
@@ -78,9 +75,7 @@ class Equivalent(Result):
         names = "amplitude", "energy", "stiffness", "loss_stiffness", "loss_factor"
         return by_rows({name: getattr(self, name) for name in names})
 
-    def figure(self) -> Figure:
-        """Energy per cycle, stiffness and loss factor over the amplitude; see `plot.equivalent`."""
-        return plot.equivalent(self)
+    figure = plot.equivalent
 
     def _parts(self) -> list[Part]:
         head = ("amplitude / m", "energy per cycle / J", "stiffness / N/m", "ω c / N/m", "loss factor")

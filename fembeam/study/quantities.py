@@ -226,26 +226,22 @@ class Power:
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
-        require(len(run.t) > 1, "the run must have samples", len(run.t), "Power", "give dt")
-        number = run.number(self.stop)
-        work = run.losses.history[:, number] + run.friction_loss[:, number]
+        require(len(run.t) > 1, "the run must have samples", len(run.t), type(self).__name__, "give dt")
+        work = self.work(run, run.number(self.stop))
         return float((work[-1] - work[0]) / (run.t[-1] - run.t[0]))
 
+    def work(self, run: Run, number: int) -> Vector:
+        """Up to each sample, J."""
+        return np.asarray(run.losses.history[:, number] + run.friction_loss[:, number])
 
-@dataclass(frozen=True)
-class WearPower:
+
+class WearPower(Power):
     """Mean work rate by friction of one stop, W: μN|v| of its slip over the time of the samples, which wear goes by."""
 
-    stop: int | str = 0
-    sampled: ClassVar[bool] = True
-
-    def __call__(self, run: Run) -> float:
-        """Value of a run."""
-        require(len(run.t) > 1, "the run must have samples", len(run.t), "WearPower", "give dt")
-        number = run.number(self.stop)
+    def work(self, run: Run, number: int) -> Vector:
+        """Up to each sample, J."""
         require(run.rubs[number, 1] > 0.0, "the stop must have friction", self.stop, "WearPower", "give it a Friction")
-        lost = run.friction_loss[:, number]
-        return float((lost[-1] - lost[0]) / (run.t[-1] - run.t[0]))
+        return np.asarray(run.friction_loss[:, number])
 
 
 QUANTITIES: dict[str, Callable[..., Quantity]] = {

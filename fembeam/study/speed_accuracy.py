@@ -118,15 +118,13 @@ class SpeedAccuracy(Result):
         """The points, medians over their starts with quartiles."""
         fronts = {id(point) for modes in self.reduction for point in self.front(modes)}
         return [
-            {
-                **{"method": p.method, "setting": p.setting, "modes": p.modes, "starts": len(p.errors)},
-                **{"seconds": p.time, "seconds_q1": p.spread(p.seconds)[0], "seconds_q3": p.spread(p.seconds)[1]},
-                **{"error": p.error, "error_q1": p.spread(p.errors)[0], "error_q3": p.spread(p.errors)[1]},
-                **{"total_error": p.total, "law_calls": p.law_calls, "steps": p.steps},
-                **{"front": id(p) in fronts, "failure": p.failure},
-            }
+            {"method": p.method, "setting": p.setting, "modes": p.modes, "starts": len(p.errors),
+             "seconds": p.time, "seconds_q1": p.spread(p.seconds)[0], "seconds_q3": p.spread(p.seconds)[1],
+             "error": p.error, "error_q1": p.spread(p.errors)[0], "error_q3": p.spread(p.errors)[1],
+             "total_error": p.total, "law_calls": p.law_calls, "steps": p.steps,
+             "front": id(p) in fronts, "failure": p.failure}
             for p in self.points
-        ]
+        ]  # fmt: skip
 
     def __repr__(self) -> str:
         return f"<speed against accuracy of {len(self.points)} points, {self.quantity}>"

@@ -34,8 +34,9 @@ def read_matrix_market(path: Path) -> Given:
     count = sizes[2] if layout == "coordinate" else _kept(sizes[0], sizes[1], symmetry)
     if len(values) != count:
         raise wrong(path, f"line {data[-1][0]}", f"the last of {count} entries", f"the last of {len(values)}")
-    made = _of_entries if layout == "coordinate" else _of_columns
-    return Given(path, ((path.stem, made(path, values, sizes, symmetry, data)),))
+    if layout == "array":
+        return Given(path, ((path.stem, _of_columns(values, sizes, symmetry)),))
+    return Given(path, ((path.stem, _of_entries(path, values, sizes, symmetry, data)),))
 
 
 def _sizes(path: Path, data: list[tuple[int, str]], layout: str, last: int) -> list[int]:
@@ -66,7 +67,7 @@ def _of_entries(path: Path, values: Any, sizes: list[int], symmetry: str, data: 
     return sparse.csr_matrix((values[:, 2], (rows, columns)), shape=sizes[:2])
 
 
-def _of_columns(path: Path, values: Any, sizes: list[int], symmetry: str, data: list[tuple[int, str]]) -> Any:
+def _of_columns(values: Any, sizes: list[int], symmetry: str) -> Any:
     """The matrix of the layout array, whose columns follow each other."""
     if symmetry == "general":
         return sparse.csr_matrix(values.reshape(sizes[1], sizes[0]).T)
