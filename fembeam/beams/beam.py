@@ -60,6 +60,7 @@ class Beam:
     foundation: float = 0.0
     axial_force: float = 0.0
     places: tuple[tuple[str, float], ...] = ()
+    meshed = True  # elements are chosen, or asked for
 
     def __post_init__(self) -> None:
         require_positive("length", self.length, "Beam", "give the length in m")

@@ -293,7 +293,7 @@ def _chosen(
             require(bool(own) or interface, f"modes must name one that every body has ({has})", modes, "Scene.reduce",
                     "add 0")  # fmt: skip
         return matrices, asked, chosen
-    meshed = any(getattr(part.beam, "meshed", True) for part in (scene, *scene.bodies))
+    meshed = any(part.beam.meshed for part in (scene, *scene.bodies))
     given = elements is not None or not meshed
     require(modes == "all" and given, "modes must be a count, a list, or 'all' with elements given",
             modes, "Scene.reduce", "say how many elements the mesh shall have")  # fmt: skip

@@ -167,10 +167,10 @@ def placed_shapes(
     """
     extra = [*parts.values(), *(at.z for at in loaded)]
     extra += [at.to[1] for at in loaded if at.to is not None and at.to[0] == 0]
-    joined = list(getattr(body.beam, "edges", ()))
+    joined = list(body.beam.edges)
     drawn = [place for pair in joined for place in pair]
     extra += _mesh_nodes(body.assembled)
-    names = list(dict.fromkeys([*_places(body), *(tuple(z) if isinstance(z, list) else z for z in extra), *drawn]))
+    names = list(dict.fromkeys([*body.beam.places(), *(tuple(z) if isinstance(z, list) else z for z in extra), *drawn]))
     number = {name: i for i, name in enumerate(names)}
     n, full = vectors.shape[1], np.hstack([body.spread @ vectors, carried])
     shape = (len(names), len(body.beam.components), full.shape[1])
@@ -201,14 +201,6 @@ def _mesh_nodes(made: Any) -> list[Any]:
     return [(number, at) if number else at for number, one in enumerate(each) for at in _mesh_nodes(one)]
 
 
-def _places(body: BodyMatrices) -> list[Any]:
-    """Names of a body: those it offers, else the owners of its dofs that are places."""
-    offered = getattr(body.beam, "places", None)
-    if offered is not None:
-        return list(offered() if callable(offered) else offered)
-    return list(dict.fromkeys(node for node, _ in body.assembled.labels))
-
-
 def _usual(body: BodyMatrices, loaded: Sequence[LocalCoordinate]) -> dict[str, At]:
     """Where something acts, then displacements of named points, a few."""
     single = [(at, sum(map(bool, at.along)) == 1) for at in loaded]
@@ -217,8 +209,7 @@ def _usual(body: BodyMatrices, loaded: Sequence[LocalCoordinate]) -> dict[str, A
         for at, one in single
         if one or any(at.along[:3])
     ]  # a rotation about a vector has no name
-    ask = getattr(body.beam, "components_at", lambda place: body.beam.components)
-    points = getattr(body.beam, "points", {}) or _places(body)[-1:]
+    ask, points = body.beam.components_at, body.beam.points or body.beam.places()[-1:]
     found += [(place, c) for place in points for c in ask(place) if c in COMPONENTS[:3]]
     moved = [at for at in found if not turns(direction_of(at[1], "a place"))]  # figures of them are in m
     return {directed_words(at): at for at in dict.fromkeys(moved or found or [(p, c) for p in points for c in ask(p)])}

@@ -239,7 +239,7 @@ class Matrices:
 def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequence[float]) -> Matrices:
     """Matrices of the scene; `Scene.matrices` explains the arguments."""
     check_counts(elements, modes)
-    meshed = any(getattr(part.beam, "meshed", True) for part in (scene, *scene.bodies))
+    meshed = any(part.beam.meshed for part in (scene, *scene.bodies))
     require(elements is None or meshed, "elements must be left out: a structure has its own matrices", elements,
             "Scene.matrices", "ask for modes, or modes='all'")  # fmt: skip
     own = _one_beam(scene, elements, modes, scene.at(list(probes), "probes of Scene.matrices"))

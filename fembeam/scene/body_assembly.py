@@ -32,6 +32,7 @@ from fembeam.structures import (
     following,
     named,
     rows_along,
+    translations_of,
 )
 from fembeam.support import require
 
@@ -184,9 +185,8 @@ def _warn_of_massless(scene: Scene, matrices: BodyMatrices) -> None:
 
 def _made(scene: Scene, elements: int | None, modes: int | None, places: tuple[Any, ...]) -> Assembled:
     """The body's matrices, of a frame on a mesh for the frequencies that it has with all that is on it."""
-    meshed = getattr(scene.beam, "meshed", True)
-    if not meshed or not hasattr(scene.beam, "coarse"):
-        return scene.beam.assembled(elements if meshed else None, modes, places)
+    if not scene.beam.meshed:
+        return scene.beam.assembled(None, modes, places)
     count = MESHED_MODES if modes is None else int(modes)
     coarse = scene.beam.coarse(count, places)
     check_buckling(scene.beam, lambda body: _free_stiffness(scene, body.coarse(count, places)))
@@ -228,9 +228,8 @@ def _of(scene: Scene, assembled: Assembled, modes: int | None, held: Any, conden
     T = following(M[free][:, free], K[free][:, free], labels, "Scene") if condense else None
     S = sparse.eye(M.shape[0], format="csr")[:, free]
     S = S if T is None else (S @ T).tocsr()
-    directions = [c for c in COMPONENTS[:3] if c in getattr(scene.beam, "base_directions", scene.beam.components)]
     loads = assembled.base_loads + (M - assembled.M) @ assembled.translations
-    moved = {c: S.T @ load for c, load in zip(directions, loads.T, strict=True)}
+    moved = {c: S.T @ load for c, load in zip(translations_of(scene.beam), loads.T, strict=True)}
     G = gyroscopic(scene, assembled)
     M, K, C = ((S.T @ A @ S).tocsr() for A in (M, K, C))
     return BodyMatrices(

@@ -20,7 +20,8 @@ DIRECTED = ("springs", "dashpots", "stops", "elements", "forces", "impactors")
 
 def is_body(value: Any) -> bool:
     """Whether a value can stand where a Beam does: it gives matrices and knows places by name."""
-    return all(callable(getattr(value, name, None)) for name in ("assembled", "check_place", "position", "lines"))
+    offered = "assembled", "check_place", "components_at", "places", "position", "lines"
+    return all(callable(getattr(value, name, None)) for name in offered)
 
 
 def choice(scene: Scene) -> str:
@@ -28,16 +29,10 @@ def choice(scene: Scene) -> str:
     return f"1 to {len(scene.bodies)}" if scene.bodies else "and there is none"
 
 
-def components_at(body: Any, place: Any) -> tuple[str, ...]:
-    """The components that a place of a body has."""
-    ask = getattr(body, "components_at", None)
-    return tuple(ask(place)) if ask else tuple(body.components)
-
-
 def check_feature(body: Any, feature: Any, name: str, where: str) -> None:
     """Raise ValueError unless a part of a scene has a place on the body and says along what it acts."""
     body.check_place(feature.z, where)
-    have, what = components_at(body, feature.z), f"the place {quoted(feature.z)}"
+    have, what = body.components_at(feature.z), f"the place {quoted(feature.z)}"
     if name == "supports":
         _check_support(feature, have, where)
     if isinstance(feature, AnnularStop):
@@ -96,7 +91,7 @@ def check_end(body: Any, place: Any, along: Any, key: str, where: str) -> None:
     """Raise ValueError unless a second place exists on a body and moves along a direction."""
     if is_body(body):
         body.check_place(place, f"{key} of {where}")
-        require_components(along, components_at(body, place), f"the place {quoted(place)} of {key}", where)
+        require_components(along, body.components_at(place), f"the place {quoted(place)} of {key}", where)
         return
     inside = is_finite(place) and 0 <= place <= body.length
     require(inside, f"z of {key} must lie on the beam, 0 to {body.length} m", place, where, "move it")
@@ -108,7 +103,7 @@ def check_conflicts(scene: Scene) -> None:
     held: dict[Any, int] = {}
     for index, support in enumerate(scene.supports):
         for dof in support.dofs:
-            if dof not in components_at(scene.beam, support.z):
+            if dof not in scene.beam.components_at(support.z):
                 continue
             key = (scene.beam.node(support.z) if hasattr(scene.beam, "node") else support.z), dof
             require(key not in held, f"supports must not hold one dof twice ({dof} at {quoted(support.z)})",

@@ -21,7 +21,6 @@ from scipy import sparse
 
 from fembeam.excitation import Harmonic
 from fembeam.scene.annular_stop import AnnularStop
-from fembeam.scene.body_checks import components_at
 from fembeam.scene.element import force_both_ways
 from fembeam.scene.local_coordinate import LocalCoordinate
 from fembeam.scene.moving_loads import loads_of_dof
@@ -157,11 +156,11 @@ def _circle(stop: AnnularStop, matrices: Matrices, beam: Any, body: int, on: tup
     rows = [place.row(matrices, body) for place in stop.coordinates]
     rub: dict[str, Any] = {"friction": stop.friction}
     if stop.radius is not None:
-        turning = turning_row(stop, components_at(beam, stop.z))
+        turning = turning_row(stop, beam.components_at(stop.z))
         rows.append(0.0 * rows[0] if turning is None else turning.row(matrices, body))
         rub |= {"radius": float(stop.radius), "spin": spin_of(beam, stop)}
     circle = -stop.clearance if stop.outer else stop.clearance, *stop.centre
-    numbered = not getattr(matrices.beams[body].beam, "meshed", True)  # a number is a node, not m
+    numbered = not matrices.beams[body].beam.meshed  # a number is a node, not m
     kind = False, False, stop.label_on(body, numbered), stop.name is not None, stop.directions, circle
     all_rows = sparse.vstack(rows, format="csr")
     return ContactRow(all_rows, stop.law, stop.clearance, stop.push, body, stop.z, on, *kind, **rub)
@@ -253,7 +252,7 @@ def loaded(scene: Scene, body: int) -> list[LocalCoordinate]:
     part = (scene, *scene.bodies)[body]
     places = [own for one in part.acting for place in one.coordinates for own in place.on_body(body, body)]
     round_ones = [one for one in part.stops if isinstance(one, AnnularStop)]
-    turning = [turning_row(one, components_at(part.beam, one.z)) for one in round_ones]
+    turning = [turning_row(one, part.beam.components_at(one.z)) for one in round_ones]
     places += [place for place in turning if place is not None]
     places += [force.coordinate for force in part.forces]
     feet = (spring for spring in part.springs if spring.foot is not None)

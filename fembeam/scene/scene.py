@@ -34,7 +34,7 @@ from fembeam.scene.rigid_motions import drifting, rigid_body_modes
 from fembeam.scene.rotors import Disk, Unbalance, driven
 from fembeam.scene.signal_checks import require_motion
 from fembeam.scene.signals import support_motion
-from fembeam.structures import COMPONENTS, Joint
+from fembeam.structures import COMPONENTS, Joint, translations_of
 from fembeam.support import in_mm, is_finite, require, require_finite, require_non_negative, require_positive
 
 if TYPE_CHECKING:
@@ -371,7 +371,7 @@ class Scene:
         if self.base is None:
             return
         if self.named:
-            known = [c for c in COMPONENTS[:3] if c in getattr(self.beam, "base_directions", self.beam.components)]
+            known = translations_of(self.beam)
             write = f"write base={{{known[0]!r}: signal}}" if known else "leave it out"
             require(isinstance(self.base, dict), "base must name its directions", self.base, "Scene", write)
             for direction in self.base:
@@ -401,7 +401,7 @@ class Scene:
     def _ways_to_fall(self) -> list[str]:
         """Which of x, y and z frames and structures move along; none where there is but a `Beam`."""
         bodies = [part.beam for part in (self, *self.bodies) if part.named] if self.named else []
-        known = {c for one in bodies for c in getattr(one, "base_directions", one.components)}
+        known = {c for one in bodies for c in translations_of(one)}
         return [c for c in COMPONENTS[:3] if c in known]
 
     def _check_conflicts(self) -> None:

@@ -27,7 +27,7 @@ from fembeam.beams import on_beam
 from fembeam.model import Branch, Orbit
 from fembeam.model.run_csv import SECTIONS, Output
 from fembeam.response import checked_damping, checked_oscillators
-from fembeam.scene import Place, components_at, is_directed, path_of, quoted, value_of
+from fembeam.scene import Place, is_directed, path_of, quoted, value_of
 from fembeam.scene_file.keys import Constructors, parameters
 from fembeam.structures import direction_of, require_components
 from fembeam.study import (
@@ -282,7 +282,7 @@ def check_named(body: Any, places: Sequence[Any] | None, quantities: Sequence[st
         body.check_place(at, "places")
     for place, way in filter(is_directed, places or ()):
         along = direction_of(way, f"places, {quoted(place)}")
-        require_components(along, components_at(body, place), f"the place {quoted(place)}", "places")
+        require_components(along, body.components_at(place), f"the place {quoted(place)}", "places")
     require("slope" not in quantities, "slope is of a Beam", quantities, "simulate",
             "ask for displacement at a place with direction rx, ry or rz")  # fmt: skip
     sections = [name for name in quantities if name in SECTIONS]

@@ -23,7 +23,7 @@ from fembeam.structures.frame_checks import arm_matrix
 from fembeam.structures.frame_forces import FORCES, FrameForces
 from fembeam.structures.frame_mesh import FrameMatrices, FrameMesh, points_of
 from fembeam.structures.joined_bodies import JoinedBodies, JoinedForces, has_place, located_among
-from fembeam.structures.joints import Joint, joining
+from fembeam.structures.joints import Joint, joining, translations_of
 from fembeam.structures.massless import following
 from fembeam.structures.members import Member
 from fembeam.structures.modes_given import GivenModes

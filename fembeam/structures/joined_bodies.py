@@ -131,7 +131,7 @@ class JoinedBodies:
     @property
     def meshed(self) -> bool:
         """Whether elements can be chosen in any of them."""
-        return any(getattr(body, "meshed", True) for body in self.bodies)
+        return any(body.meshed for body in self.bodies)
 
     @cached_property
     def components(self) -> tuple[str, ...]:
@@ -172,7 +172,7 @@ class JoinedBodies:
     @property
     def points(self) -> list[Any]:
         """Named points, likewise, without the second places of joints; of a body without any its last place."""
-        named = [(n, getattr(body, "points", None) or body.places()[-1:]) for n, body in enumerate(self.bodies)]
+        named = [(n, body.points or body.places()[-1:]) for n, body in enumerate(self.bodies)]
         ends = {self._end(joint) for joint in self.joints}
         each = [(number, place) for number, points in named for place in points]
         return [self._numbered(n, place) for n, place in each if (n, _node(self.bodies[n], place)) not in ends]
@@ -195,8 +195,8 @@ class JoinedBodies:
     @property
     def edges(self) -> list[tuple[Any, Any]]:
         """Pairs of places that figures join."""
-        each = [(number, getattr(body, "edges", ())) for number, body in enumerate(self.bodies)]
-        return [(self._numbered(number, a), self._numbered(number, b)) for number, edges in each for a, b in edges]
+        each = enumerate(self.bodies)
+        return [(self._numbered(n, a), self._numbered(n, b)) for n, body in each for a, b in body.edges]
 
     def check(self) -> list[str]:
         """What the bodies given by matrices say."""
@@ -227,7 +227,7 @@ class JoinedBodies:
         """M, K and the like of all bodies on the unknowns that joints leave; arguments as for each body."""
         made = []
         for body, own in zip(self.bodies, self._places_of_each(places), strict=True):
-            count = elements if getattr(body, "meshed", True) else None
+            count = elements if body.meshed else None
             frequency = {"omega": omega} if hasattr(body, "coarse") else {}
             made.append(body.assembled(count, modes, own, **frequency))
         return self.joined(made)

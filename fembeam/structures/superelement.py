@@ -51,7 +51,7 @@ def reduced(body: Any, made: Assembled, nodes: Sequence[Any], modes: int, where:
     C = None if made.C is None else T.T @ (made.C @ T)
     at = {node: body.position(node) for node in listed}
     known = {node: place for node, place in at.items() if place is not None}
-    points = {name: node for name, node in getattr(body, "points", {}).items() if hasattr(body, "node") and node in at}
+    points = {name: node for name, node in body.points.items() if hasattr(body, "node") and node in at}
     lines = [pair for pair in _lines(body) if set(pair) <= set(known)]
     found = Structure(K, (M + M.T) / 2, C, labels, known, points, lines)
     along = [translations_of(body).index(c) for c in translations_of(found)]
@@ -106,5 +106,4 @@ def _stiffness(made: Assembled, T: Vector, count: int) -> tuple[Vector, sparse.c
 
 def _lines(body: Any) -> list[tuple[Any, Any]]:
     """Pairs of nodes that figures may join: of a frame the ends of its members."""
-    members = getattr(body, "members", None)
-    return list(getattr(body, "edges", ())) if members is None else [(one.a, one.b) for one in members]
+    return [(one.a, one.b) for one in body.members] if hasattr(body, "members") else list(body.edges)
