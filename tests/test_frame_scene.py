@@ -156,7 +156,7 @@ def test_inertia_tensor():
 
     made = scene(np.eye(3), J.tolist()).matrices(8)
     bare = fb.Scene(space_l(), [fb.Clamped("A")]).matrices(8)
-    at = made.rows_at("C").toarray()
+    at = (made.assembled.rows("C") @ made.spread).toarray()
     lever = -m * skew(arm)
     expected = np.block([[m * np.eye(3), lever], [lever.T, J - m * skew(arm) @ skew(arm)]])
     assert np.allclose(at @ (made.M - bare.M) @ at.T, expected, atol=1e-14)

@@ -106,12 +106,8 @@ class PlacedShapes:
         first = (one[0] if is_pair(one) else one for one in own)
         return tuple(dict.fromkeys(name for name in first if isinstance(name, str)))
 
-    def motion(self, place: Any) -> Vector:
-        """All components (c, n) of a place; ValueError for one that does not exist."""
-        return self.motion_with_supports(place)[:, : self.values.shape[2]]
-
     def motion_with_supports(self, place: Any) -> Vector:
-        """The same (c, n + k), with what supports that move carry."""
+        """All components (c, n + k) of a place, with what supports that move carry; ValueError for no place."""
         place = tuple(place) if isinstance(place, list) else place.item() if isinstance(place, np.generic) else place
         if place in self.known:
             return np.asarray(self.whole[self.known.index(place)])
@@ -128,13 +124,8 @@ class PlacedShapes:
     def __call__(self, at: Any, derivative: int = 0) -> Vector:
         """φ at (place, direction): (n,), or (k, n) for a list of such pairs."""
         require(derivative == 0, "slopes are of a Beam", derivative, "phi", "ask for a rotation, (place, 'rz')")
-        if isinstance(at, list):
-            return np.array([self.row(one) for one in at]).reshape(len(at), self.values.shape[2])
-        return self.row(at)
-
-    def row(self, at: Any) -> Vector:
-        """(n,) of one (place, direction)."""
-        return self.rows_with_supports([at])[0, : self.values.shape[2]]
+        rows = self.rows_with_supports(at if isinstance(at, list) else [at])[:, : self.values.shape[2]]
+        return rows if isinstance(at, list) else rows[0]
 
     def rows_with_supports(self, at: list[Any]) -> Vector:
         """(j, n + k) of such pairs, with what supports that move carry."""

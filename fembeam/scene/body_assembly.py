@@ -68,10 +68,6 @@ class BodyMatrices(Matrices):
         """The motion (1, N) of a place along a direction, on the body's own free dofs."""
         return (rows_along(self.beam, self.assembled, place, along) @ self.spread).tocsr()
 
-    def rows_at(self, place: Any) -> sparse.csr_matrix:
-        """All components (c, N) of a place, on the body's own free dofs."""
-        return (self.assembled.rows(place) @ self.spread).tocsr()
-
     def _row_on_all(self, place: Any, along: Six) -> sparse.csr_matrix:
         """Row (1, N_all) of a place along a direction, supported dofs included."""
         return rows_along(self.beam, self.assembled, place, along)
