@@ -20,8 +20,8 @@ FORMAT = re.compile(r"\(\s*(?:\d+P\s*,?)?\s*(\d*)\s*[IEDFG](\d+)(?:\.\d+)?(?:E\d
 NAMES = {"UX": "x", "UY": "y", "UZ": "z", "ROTX": "rx", "ROTY": "ry", "ROTZ": "rz"}
 
 
-def read_harwell_boeing(path: Path, mapping: Path | None = None) -> Given:
-    """The matrix of an ASCII Harwell–Boeing file, labelled if its .mapping lies beside it or is given."""
+def read_harwell_boeing(path: Path) -> Given:
+    """The matrix of an ASCII Harwell–Boeing file, labelled if its .mapping lies beside it."""
     lines = path.read_text(encoding="latin-1").splitlines()
     if len(lines) < 4:
         raise wrong(path, f"line {len(lines)}", "a head of four lines", "the end")
@@ -43,9 +43,8 @@ def read_harwell_boeing(path: Path, mapping: Path | None = None) -> Given:
     if entries and (rows.min() < 1 or rows.max() > size):
         raise wrong(path, "its rows", f"1 to {size}", f"{rows.min()} to {rows.max()}")
     columns = np.repeat(np.arange(size), np.diff(pointers))
-    beside = mapping or next((one for one in (path.with_suffix(".mapping"), path.with_suffix(".MAPPING"))
-                              if one.exists()), None)  # fmt: skip
-    labels = read_mapping(beside, size) if beside else None
+    beside = [one for one in (path.with_suffix(".mapping"), path.with_suffix(".MAPPING")) if one.exists()]
+    labels = read_mapping(beside[0], size) if beside else None
     return Given(path, ((path.stem, assembled(rows - 1, columns, values, size, kind == "RSA")),), labels)
 
 
