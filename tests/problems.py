@@ -16,7 +16,7 @@ from scipy.special import beta
 
 import fembeam as fb
 import solvers
-from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Sum, Tabulated, Viscoelastic
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Sum, Tabulated, Viscoelastic, law
 
 PAPER_LAW = Hysteretic.lankarani_nikravesh(2.1e8, restitution=0.5)
 PAPER_OMEGA = 109.1299120547, 790.6100943811, 2303.729838331
@@ -32,6 +32,11 @@ z = 0
 STEEL = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12)
 PAPER_BEAM = fb.Beam(0.2599, STEEL)
 ROD = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+
+
+@law
+def cubic(delta, delta_dot, entry_rate, stiffness):
+    return stiffness * delta**3
 
 
 def as_sparse(system):

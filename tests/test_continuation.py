@@ -9,21 +9,16 @@ from functools import cache
 import numpy as np
 import pytest
 from oscillators import Bilinear, Duffing, Tone, over, state_at_zero, status_names
+from problems import cubic
 from refusals import refused_by
 
 import solvers.branches.count_changes
 import solvers.branches.walk
-from contacts import law
 from solvers import Contact, Exponential, OrbitError, System, branch, orbit
 from solvers.branches import recorded, restarted
 
 DAMPED = Bilinear(1.1, zeta=0.05)  # doubles its period between 0.83 and 0.93 rad/s
 GAPPED = Bilinear(0.8, zeta=0.05, gap=2.0)
-
-
-@law
-def cubic(delta, delta_dot, entry_rate, stiffness):
-    return stiffness * delta**3
 
 
 @cache

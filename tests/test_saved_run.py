@@ -7,21 +7,16 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from problems import STEEL
+from problems import STEEL, cubic
 
 import fembeam as fb
-from contacts import Hertz, Jenkins, law
+from contacts import Hertz, Jenkins
 from fembeam.results.files import summary
 
 SQUARE = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.01)
 THIN = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.005)
 L = 0.4
 HDF5 = pytest.param(".h5", marks=pytest.mark.skipif(not find_spec("h5py"), reason="the extra hdf5 is not installed"))
-
-
-@law
-def cubic(delta, delta_dot, entry_rate, stiffness):
-    return stiffness * delta**3
 
 
 def rig(**more):

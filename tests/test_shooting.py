@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from differences import end_of, jacobian
 from oscillators import Bilinear, Duffing, Tone, from_phase, random_family
-from problems import reference
+from problems import cubic, reference
 from refusals import refused_by
 from scipy.special import ellipj, ellipk
 
@@ -28,11 +28,6 @@ ELASTIC = PiecewiseLinear([1e5, 4e5], knots=[2e-5])
 HYSTERETIC = Hysteretic(2.1e8, damping_factor=0.5625)
 STABLE = Bilinear(1.3, zeta=0.1)
 UNSTABLE = Bilinear(0.89, zeta=0.05)  # between two period doublings
-
-
-@law
-def cubic(delta, delta_dot, entry_rate, stiffness):
-    return stiffness * delta**3
 
 
 def beam(law, omega=195.0, n=2, amplitude=40.0, zeta=5.0, phase=0.0, gap=0.0, opposite=None):
