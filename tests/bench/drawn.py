@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from drawn_slow import draw_slow
+from drawn_slow import Table, draw_slow
 from drawn_starts import on_a_border
 from scipy.optimize import brentq
 
@@ -24,19 +24,6 @@ SAMPLED_FROM, RESTING_FROM, SLOW_FROM = 100_000, 200_000_000, 300_000_000
 def softening(delta, delta_dot, entry_rate, stiffness, loss, scale):
     """A user's law: Hertz with a loss, softening with depth."""
     return stiffness * delta * math.sqrt(delta) * (1.0 + loss * delta_dot / entry_rate) / (1.0 + delta / scale)
-
-
-class Table:
-    """A load that is a node table."""
-
-    def __init__(self, dt: float, rows: Any) -> None:
-        self.dt, self.rows = dt, rows
-
-    def __call__(self, t: Any) -> Any:
-        raise NotImplementedError
-
-    def nodes(self, duration: float, rtol: float) -> tuple[float, Any]:
-        return self.dt, self.rows
 
 
 @dataclass
