@@ -316,6 +316,14 @@ def shaken(tmp_path, studies=STUDIES):
     return path
 
 
+def test_the_page_of_kept_studies_still_warns(tmp_path, capsys):
+    path, out = shaken(tmp_path, "[orbit]\n"), tmp_path / "out"
+    path.write_text(re.sub(r"\[simulate\](?:.|\n)*?(?=\n\[)", "", path.read_text(encoding="utf-8")), encoding="utf-8")
+    for more in ([], ["--resume"]):
+        printed(capsys, "run", path, "--out", out, "--quiet", *more)
+        assert "excite modes above the 2 kept" in (out / "report.html").read_text(encoding="utf-8")
+
+
 def test_every_study_is_run_and_kept(tmp_path, capsys):
     path, out = shaken(tmp_path), tmp_path / "out"
     found = json.loads(printed(capsys, "run", path, "--out", out, "--quiet", "--json"))

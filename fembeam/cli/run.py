@@ -108,17 +108,17 @@ def _report(job: Job, files: list[Path]) -> int:
     try:
         with interrupts.deferred():
             rig = report.write_figure(job.folder / "rig.png", job.file.scene.figure())
-            html.write_page(job.folder, job.file.source, _warnings(job, files), [rig, *files])
+            html.write_page(job.folder, job.file.source, _warnings(job), [rig, *files])
     except OSError as error:
         return _unwritten(error).code
     return 0
 
 
-def _warnings(job: Job, files: list[Path]) -> list[str]:
-    """What this command warned of, and the simulation that was kept."""
-    summary = job.folder / "summary.json"
-    before = json.loads(summary.read_text(encoding="utf-8")).get("warnings", []) if summary in files else []
-    return list(dict.fromkeys([*before, *warned]))
+def _warnings(job: Job) -> list[str]:
+    """What this command warned of, and what was when the studies that it kept were computed."""
+    done = folders.finished(job.folder)
+    kept = [name for name in job.file.studies if folders.kept(job.folder, name, folders.digest(job.file, name))]
+    return list(dict.fromkeys([*(said for name in kept for said in done[name]["warnings"]), *warned]))
 
 
 def _study_outcome(job: Job, name: str) -> Outcome:
@@ -135,7 +135,7 @@ def _study_outcome(job: Job, name: str) -> Outcome:
         outcome = _simulation(job) if name == "simulate" else _computed(job, name)
         with interrupts.deferred():
             if not outcome.code:
-                folders.record(job.folder, job.file, name, outcome.files)
+                folders.record(job.folder, job.file, name, outcome.files, warned)
     except OSError as error:
         return _unwritten(error)
     except KeyboardInterrupt:

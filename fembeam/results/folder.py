@@ -48,9 +48,9 @@ def changed(folder: Path, file: SceneFile, study: str) -> str:
 
 
 def finished(folder: Path) -> dict[str, dict[str, Any]]:
-    """{study: {"scene": digest, "files": names, "tables": of the scene}} of a folder; ValueError when it is damaged.
+    """{study: {"scene": digest, "files": names, "tables": of the scene, "warnings": said}} of a folder.
 
-    A study that was begun has no files yet.
+    A study that was begun has no files yet. ValueError when the record is damaged.
     """
     path = folder / RECORD
     if not path.exists():
@@ -58,7 +58,8 @@ def finished(folder: Path) -> dict[str, dict[str, Any]]:
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
         return {
-            name: {"scene": str(one["scene"]), "files": [str(f) for f in one["files"]], "tables": str(one["tables"])}
+            name: {"scene": str(one["scene"]), "tables": str(one["tables"])}
+            | {kind: [str(each) for each in one.get(kind, [])] for kind in ("files", "warnings")}
             for name, one in found.items()
         }
     except (ValueError, TypeError, KeyError, AttributeError) as error:
@@ -72,8 +73,11 @@ def kept(folder: Path, study: str, scene: str) -> list[Path]:
     return files if one["scene"] == scene and all(path.is_file() for path in files) else []
 
 
-def record(folder: Path, file: SceneFile, study: str, files: Sequence[Path] = ()) -> None:
-    """Note that a study is finished, with its files, or begun; a checkpoint stays with the scene that began it."""
+def record(folder: Path, file: SceneFile, study: str, files: Sequence[Path] = (), warnings: Sequence[str] = ()) -> None:
+    """Note that a study is finished, with its files and what it warned of, or begun.
+
+    A checkpoint stays with the scene that began it.
+    """
     found = finished(folder)
     begun = found.get(study, {}).get("tables") if not files and (folder / f"{study}.npz").exists() else None
     tables = {name: table for name, table in _tables(file, study).items() if name != study}
@@ -81,5 +85,6 @@ def record(folder: Path, file: SceneFile, study: str, files: Sequence[Path] = ()
         "scene": digest(file, study),
         "files": [path.name for path in files],
         "tables": begun or repr(tables),
+        "warnings": list(warnings),
     }
     write_json(folder / RECORD, found)
