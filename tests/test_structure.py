@@ -69,6 +69,7 @@ BAD = [
     (lambda: fb.Structure(K, [[1.0, 2.0], [2.0, 1.0]]), "M must be positive semidefinite; its least pivot"),
     (lambda: fb.Structure(K, [[0.0, 1.0], [1.0, 1.0]]), "no mass of its own but coupling"),
     (lambda: fb.Structure(K, M, labels=[(1, "x")]), "labels must be 2, one for each dof of K, got 1"),
+    (lambda: fb.Structure(K, M, labels=1.0), "labels must be a list, got 1.0"),
     (lambda: fb.Structure(K, M, labels=[(1, "x"), (1, "x")]), "labels must not repeat: dof 0 and dof 1"),
     (lambda: fb.Structure(K, M, labels=[(1, "x"), (1, "w")]), r"labels\[1\] must be a node and one of x, y"),
     (lambda: fb.Structure(K, M, points={"end": 5}), "point 'end' must be a node of labels; 1 is the nearest"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -78,6 +78,7 @@ def labelled(labels: Any, size: int, where: str) -> tuple[Label, ...]:
     """Checked labels, one a dof: (node, component), none twice."""
     if labels is None:
         return tuple((i, "x") for i in range(size))
+    require(isinstance(labels, Iterable), "labels must be a list", labels, where, "give (node, 'x'), (node, 'y'), …")
     listed = [tuple(label) if isinstance(label, (tuple, list, np.ndarray)) else (label,) for label in labels]
     require(len(listed) == size, f"labels must be {size}, one for each dof of K", len(listed), where,
             "give (node, 'x'), (node, 'y'), … in the order of the rows")  # fmt: skip

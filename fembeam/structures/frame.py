@@ -80,6 +80,8 @@ class Frame:
         require(listed, "members must be a list", self.members, "Frame", "give [Member(a, b, section), …]")
         object.__setattr__(self, "members", tuple(self.members))
         require_finite("spin", self.spin, "Frame", "give rad/s")
+        known = isinstance(self.bending_only, (bool, np.bool_))
+        require(known, "bending_only must be true or false", self.bending_only, "Frame", "without quotes")
         check_frame(self)
 
     @classmethod

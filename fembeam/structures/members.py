@@ -7,7 +7,7 @@ moves along `up`; bending with I2 moves `across`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -94,7 +94,7 @@ class Member:
 
 def _releases(given: Any, where: str) -> tuple[str, ...]:
     """Checked releases, sorted and without repeats."""
-    listed = (given,) if isinstance(given, str) else tuple(given)
+    listed = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (given,)
     for one in listed:
         words = one.split() if isinstance(one, str) else []
         right = len(words) == 2 and words[0] in ENDS and words[1] in (*COMPONENTS, *OWN)
