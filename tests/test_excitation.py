@@ -548,6 +548,8 @@ def test_csv_with_and_without_header(tmp_path, text, mark):
 def test_csv_columns(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("\n".join(f"x,{k * k},{0.1 * k}" for k in range(20)))
+    with pytest.raises(ValueError, match=r"columns must be two different ones \(time, motion\), got \(1, 1\)"):
+        Record.from_csv(path, columns=(1, 1))
     record = Record.from_csv(path, columns=(2, 1), band=(0.0, 20.0), kind="acceleration")
     assert record.y[3] == 9.0
     assert record.quantity == record.kind == "acceleration"

@@ -242,6 +242,7 @@ def test_solvers_by_name(file_of):
         ),
         ("modes = 2", "mode = 2", r"\[reduce\]: unknown key 'mode'; did you mean 'modes'"),
         ("modes = 2", "modes = 2\ngravity = 9.81", r"unknown key 'gravity'; gravity stands above all tables \(valid"),
+        ("[beam]", 'gravity = "9.81"\n[beam]', r"toml:\d+: the file: gravity must be a number, or three, got '9.81'"),
         ("modes = 2", "modes = -1", r"\[reduce\]: modes must be a count above 0 or a list"),
         ("[base]", "[base.y]", r"\[base.y\]: the base of a beam moves along y alone: write \[base\] with kind = "),
         ("seed = 1", "frequency_hz = 9", r"unknown key 'frequency_hz'; frequencies are in rad/s, 2π times hertz: band"),
@@ -362,7 +363,16 @@ law = { kind = "hertz", stiffness = 1e7 }
         ("[basins]\nx_span = [0.0, 1.0]\ny_span = [0.0, 1.0]\npoints = 1", "points must be one or two whole numbers"),
         ("[basins]\nx_span = [0.0, 1.0]\ny_span = [0.0, 1.0]\nthreads = 0", "threads must be above 0, got 0"),
         ("[peak]\nover = 'stops[0].gap'\nvalues = [1e-3, 2e-3]\nspan = [20.0, 40.0]\nz = 2.0", "must lie on the beam"),
+        ("[peak]\nover = 'damping.zeta[0]'\nvalues = [-0.1, 0.1]\nspan = [20.0, 40.0]", "zeta"),
         ("[backbone]\nlevels = [1e-3, 2e-3]\nspan = [20.0, 40.0]\nz = 2.0", "must lie on the beam"),
+        (
+            "[vary]\nparameters = { 'stops[0].gap' = [1e-3, 2e-3] }\nquantity = 'rms'\nduration = 1\ndt = 2.0",
+            "dt must be at most the duration of 1 s, got 2.0",
+        ),
+        (
+            "[mode_count]\ncounts = [1, 2]\nquantity = 'rms'\nduration = 0.5\ndt = 2.0",
+            "dt must be at most the duration",
+        ),
         (
             "[ensemble]\nrealisations = 4\nduration = 9.0\ndt = 1e-3\nuntil = 2.0",
             r"until must lie in \(0, 1\), got 2.0",

@@ -77,6 +77,8 @@ def read_rows(path: Path, columns: tuple[int, int]) -> Vector:
     """The two columns of a text file, header skipped, shape (n, 2)."""
     if not is_pair(columns) or not all(is_whole(column) and column >= 0 for column in columns):
         raise ValueError(f"columns must be two whole numbers from 0 (time, motion), got {columns!r}")
+    if columns[0] == columns[1]:
+        raise ValueError(f"columns must be two different ones (time, motion), got {columns!r}")
     rows: list[tuple[float, float]] = []
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         for line_number, line in enumerate(file, start=1):

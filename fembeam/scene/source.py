@@ -164,5 +164,5 @@ def _table(lines: list[str], name: str, number: int) -> range:
 
 def _key(lines: list[str], word: str, among: range, otherwise: int) -> int:
     """The first of some lines that sets a key or opens the table of that name."""
-    sets = re.compile(rf"(?:^|[{{,\s\"'])(?<!\w){re.escape(word)}[\"']?\s*=|^\s*\[+(?:.*\.)?{re.escape(word)}\s*\]")
+    sets = re.compile(rf"(?:^|[{{,\s\"'])(?<!\w){re.escape(word)}[\"']?\s*=|^\s*\[+(?:.*\.)?{re.escape(word)}\s*[\].]")
     return next((i for i in among if sets.search(lines[i].split("#")[0])), otherwise)

@@ -121,7 +121,7 @@ class TableReader:
         if name == "gravity":
             if isinstance(value, list) or (isinstance(value, (int, float)) and not isinstance(value, bool)):
                 return value
-            self.fail("gravity", f"must be a number, or three, got {shown(value)}")
+            self.fail("the file", f"gravity must be a number, or three, got {shown(value)}")
         if name == "damping":
             if "zeta" in value and {"alpha", "beta"} & set(value):
                 self.fail("[damping]", "give either zeta, or alpha and beta, not both")

@@ -69,6 +69,9 @@ class Plan:
                     self.discard, "study", "run longer")  # fmt: skip
         if self.dt is not None:
             require_positive("dt", self.dt, "study", "give the output sampling in s")
+            longest = math.inf if self.duration is None else self.duration
+            require(self.dt <= longest, f"dt must be at most the duration of {longest:g} s", self.dt, "study",
+                    "sample more often")  # fmt: skip
         few = 0 < len(self.seeds) < FEWEST_SEEDS
         require(not few, f"seeds must be at least {FEWEST_SEEDS}, for an uncertainty", len(self.seeds), "study",
                 "e.g. range(8)")  # fmt: skip

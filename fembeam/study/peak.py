@@ -24,7 +24,7 @@ from fembeam.model import Model, Orbit, observed
 from fembeam.model.branch import Family
 from fembeam.model.sensitivity import of_amplitude
 from fembeam.plot.axis_names import axis_name
-from fembeam.scene import Scene, called, path_of
+from fembeam.scene import Scene, called, path_of, with_value
 from fembeam.study.response_curve import ResponseCurve, Seen
 from fembeam.study.result import Result, column
 from fembeam.support import Part, counting, is_finite, numbers, require
@@ -174,6 +174,8 @@ def check_peak(
     require(paths[0] != paths[1], "over must be another number than the parameter", over, where, "name both")
     pair = np.shape(span) == (2,) and all(map(is_finite, span)) and span[0] < span[1]
     require(bool(pair), "span must be two values, ascending", span, where, "give (lowest, highest)")
+    for value in p:
+        with_value(scene, over, float(value))  # what the part refuses, it refuses here
     return p
 
 
