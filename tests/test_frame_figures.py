@@ -110,6 +110,14 @@ def test_rig_of_a_frame():
     assert "base motion along x" in axis.get_title(loc="left")
 
 
+def test_few_contacts_are_seen_beside_their_median(plane):
+    *_, restitution = fb.plot.contacts(plane).axes
+    dots, median = restitution.lines
+    assert 0 < len(dots.get_xdata()) == len(plane.contacts) < 200
+    assert dots.get_markersize() > 4
+    assert dots.get_zorder() > median.get_zorder()
+
+
 def test_texts_of_a_rig_in_space_lie_apart():
     """A shaft with stops close together: numbers at the places, and a list of all names beside the axes."""
     law = KelvinVoigt(1e6, 50.0)
@@ -127,6 +135,8 @@ def test_texts_of_a_rig_in_space_lie_apart():
     at = axis.transData.transform(np.column_stack([x, y]))
     assert np.linalg.norm(np.diff(at, axis=0), axis=1).min() > listed.get_fontsize()
     assert at[:, 0].max() + 50.0 < box.x0 < box.x1 <= figure.bbox.x1
+    names = [one.label.get_window_extent() for one in (axis.xaxis, axis.yaxis, axis.zaxis)]
+    assert min(name.y0 for name in names) > 0.0  # of a shaft that stands upright, too
 
 
 def test_rigs_in_space_of_unknown_places_and_of_several_bodies():

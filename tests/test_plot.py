@@ -26,6 +26,7 @@ from contacts import (
 )
 from fembeam import plot, statistics
 from fembeam.plot.axis_names import axis_name
+from fembeam.plot.figure import heading
 from fembeam.plot.orbits import _widen
 from fembeam.plot.style import BLUE, GREY, RED
 from fembeam.response import backbone
@@ -51,6 +52,15 @@ def test_every_figure_draws_with_units(run):
         figure.canvas.draw()
         assert unit in texts(figure)
         assert all(axis.get_xlabel() or axis.get_ylabel() for axis in figure.axes)
+
+
+@pytest.mark.parametrize("width", [5.0, 7.0])
+def test_a_long_title_is_broken_so_that_it_fits(width):
+    figure = Figure(figsize=(width, 3.0))
+    title = "Power spectral densities after 5 s (595 s, 378 segments, lines 2 rad/s apart, 95 % shaded)"
+    heading([figure.subplots()], title, True)
+    figure.draw_without_rendering()
+    assert figure.texts[0].get_window_extent().x1 <= figure.bbox.x1
 
 
 def test_histories_are_those_of_the_run(run):
@@ -176,7 +186,7 @@ def test_linear_response_lies_in_the_band_of_a_linear_run(run):
     omega, level = next(line for line in upper.lines if line.get_label() == "linear, no contact").get_data()
     H = linear.model.frequency_response(omega, output=0.2599)
     assert level == pytest.approx(H.amplitude**2 * noise.psd_at(omega))
-    assert "95 % shaded" in texts(figure)
+    assert "95 % shaded" in texts(figure).replace("\n", " ")
     line = plot.spectra_of(linear, 5.0)["tip u"]
     low, high = line.interval()
     broad = (line.omega > 150.0) & (line.omega < 700.0)  # between the resonances: no leakage

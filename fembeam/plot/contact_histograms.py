@@ -86,7 +86,8 @@ def _restitutions(axis: Axes, speed_in: Vector, speed_out: Vector, unit: str) ->
     top = max(1.05, 1.1 * float(np.quantile(restitution, HIGHEST)))
     median = float(np.median(restitution))
     beyond = (restitution > top) & (speed >= slow)
-    axis.plot(speed[::every], np.where(beyond, np.nan, restitution)[::every], ".", markersize=2, alpha=0.4, color=GREEN)
+    dots = {"markersize": 2, "alpha": 0.4} if len(speed) >= MANY else {"markersize": 6, "zorder": 3}
+    axis.plot(speed[::every], np.where(beyond, np.nan, restitution)[::every], ".", color=GREEN, **dots)
     axis.axhline(median, color=RED, linestyle="--")
     axis.set_ylim(0, top)
     if beyond.any():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
     from fembeam.model import Run
 
+TITLE = 12.5  # characters of a title on an inch of a figure
 MANY_ROOM = "the axes must be as many as the figure has panels"
 
 
@@ -53,7 +55,8 @@ def heading(axes: Sequence[Axes], title: str, own: bool, weight: str = "bold", r
     """
     figure: Any = axes[0].figure
     partial = run is not None and not run.complete
-    title = "Partial: " * partial + title
+    wide = int(TITLE * figure.bbox.width / figure.dpi)
+    title = textwrap.fill("Partial: " * partial + title, wide, break_on_hyphens=False)
     if not own:
         axes[0].set_title(title)
         return

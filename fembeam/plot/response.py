@@ -24,7 +24,6 @@ Examples
 
 from __future__ import annotations
 
-import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -59,7 +58,6 @@ if TYPE_CHECKING:
 
     from fembeam.model import Model, Run
 
-TITLE = 88  # characters of a line over a figure
 PERIODS = 8  # of the lowest mode in a time history
 BEFORE = 0.3  # of a transient's window, before the largest force
 FEW = 10  # samples in a contact, below which its peak is drawn instead of its history
@@ -106,7 +104,7 @@ def time_history(
         title += f", contacts of {_listed(stops, run)} shaded" if seen.any() else ""
     beside = 0.0 if window else 0.01 * (hi - lo)  # so that a contact at the first instant is seen
     drawn[-1].set(xlabel=f"time / {second}", xlim=(tick * (lo - beside), tick * (hi + beside)))
-    heading(drawn, textwrap.fill(title, TITLE, break_on_hyphens=False), axes is None, run=run)
+    heading(drawn, title, axes is None, run=run)
     return figure
 
 

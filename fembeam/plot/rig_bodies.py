@@ -38,6 +38,9 @@ MOST_BESIDE = 40  # places with labels beside them
 BESIDE_LIST = 0.7  # of the width of a figure, left for the axes beside a list
 LISTED = 32  # characters of a line in the list of what stands on a body in space
 SLIMMEST = 0.7  # of its longest side, what a box in space is wide at least, so that its axes can be read
+TALLEST = (
+    0.56  # of the diagonal of a box in space, the height from which on it is drawn smaller, so that names stay inside
+)
 ZIGZAG = np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]) * 0.12  # of the length of a spring
 TIP = np.vstack([circle(0.15, (0.15, 0.0), (0.5 * np.pi, 1.5 * np.pi)), [[0.2, -0.15], [0.2, 0.15], [0.15, 0.15]]])
 IN_SPACE = 1.5  # times as large there, where bodies are small in their box
@@ -144,7 +147,7 @@ class _Panel:
         if not self.space and engine is not None and "rect" in engine.get():  # a figure of our own: room for the list
             engine.set(rect=(0.0, 0.0, BESIDE_LIST, 1.0))
         self._numbered(axis, [str(number) for number in range(1, 1 + len(self.words))])
-        write, x = (axis.text2D, 1.1) if self.space else (axis.text, 1.02)
+        write, x = (axis.text2D, 1.08) if self.space else (axis.text, 1.02)
         listed = write(x, 0.95, "\n".join(lines), transform=axis.transAxes, fontsize=size, va="top", parse_math=False,
                        family="monospace")  # fmt: skip
         listed.set_in_layout(self.space)  # of a plane it would press the axes flat
@@ -314,7 +317,7 @@ class _Panel:
             limits = np.array([axis.get_xlim(), axis.get_ylim(), axis.get_zlim()])
             half = np.maximum(np.ptp(limits, axis=1), SLIMMEST * np.ptp(limits, axis=1).max()) / 2
             axis.set(**{f"{c}lim": (m - h, m + h) for c, m, h in zip("xyz", limits.mean(axis=1), half, strict=True)})
-            axis.set_aspect("equal")
+            axis.set_box_aspect(half, zoom=min(1.0, TALLEST * np.linalg.norm(half) / half[2]))
             axis.set_zlabel("z / m")
         else:
             axis.set_aspect("equal", adjustable="datalim")
