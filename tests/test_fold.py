@@ -132,6 +132,7 @@ def test_the_table_of_a_scene_file(tmp_path, file_of):
     file = file_of(FILE)
     found = file.studies["fold"].run(file, tmp_path)
     assert np.abs(np.array(places(known())) - found.at[found.values == 0.3]).min() < 1e-7
+    assert np.count_nonzero(found.values == 0.3) == 1  # the end that it begins at, once
 
 
 def test_values_without_the_present_one_are_refused_when_read(file_of):

@@ -198,6 +198,8 @@ def _walk(
     """Points in one direction with their marks, and how the curve ended."""
     points: list[tuple[_Point, str]] = []
     ends, step = np.array(span) / equations.widths[1], 0.2 * longest
+    if np.any(np.isclose(point.y[-1], ends, rtol=1e-12, atol=0.0) & (np.array([-1.0, 1.0]) * point.tangent[-1] > 0.0)):
+        return points, "reached the end of the span"  # it begins there
     while len(points) < POINTS:
         try:
             new = _moved(equations, point, step, ends)
