@@ -505,6 +505,7 @@ def test_tables_are_checked_when_read(file_of, old, new, said):
     ({"quantity": ["rms", "rms"]}, "quantities must have different names"),
     ({"quantity": "density"}, "density must be one number at every point"),
     ({"dt": None}, "rms needs samples"),
+    ({"quantity": "wear_power"}, "a stop must have friction, got 'wear_power'"),
     ({"seeds": range(4)}, "seeds need noise"),
     ({"checkpoint": 3}, "checkpoint must be the path of a file, got 3"),
     ({"duration": -1.0}, "duration must be finite and positive"),

@@ -38,9 +38,7 @@ MOST_BESIDE = 40  # places with labels beside them
 BESIDE_LIST = 0.7  # of the width of a figure, left for the axes beside a list
 LISTED = 32  # characters of a line in the list of what stands on a body in space
 SLIMMEST = 0.7  # of its longest side, what a box in space is wide at least, so that its axes can be read
-TALLEST = (
-    0.56  # of the diagonal of a box in space, the height from which on it is drawn smaller, so that names stay inside
-)
+TALLEST = 0.56  # height of a box in space, in units of its diagonal, above which it is drawn smaller, for its names
 ZIGZAG = np.array([0, 0, 1, -1, 1, -1, 1, 0, 0]) * 0.12  # of the length of a spring
 TIP = np.vstack([circle(0.15, (0.15, 0.0), (0.5 * np.pi, 1.5 * np.pi)), [[0.2, -0.15], [0.2, 0.15], [0.15, 0.15]]])
 IN_SPACE = 1.5  # times as large there, where bodies are small in their box

@@ -79,6 +79,9 @@ class Plan:
     def check(self, scene: Scene, quantity: Quantity) -> None:
         """Raise ValueError when the scene cannot be run like this."""
         require(isinstance(scene, Scene), "scene must be a Scene", scene, "study", "of a model, give model.scene")
+        rubs = any(getattr(one, "friction", None) is not None for one in scene.acting)
+        require(rubs or not getattr(quantity, "rubbing", False), "a stop must have friction", label(quantity), "study",
+                "give it a Friction")  # fmt: skip
         if self.duration is None:
             try:
                 load_period(scene)

@@ -238,6 +238,8 @@ class Power:
 class WearPower(Power):
     """Mean work rate by friction of one stop, W: μN|v| of its slip over the time of the samples, which wear goes by."""
 
+    rubbing: ClassVar[bool] = True
+
     def work(self, run: Run, number: int) -> Vector:
         """Up to each sample, J."""
         require(run.rubs[number, 1] > 0.0, "the stop must have friction", self.stop, "WearPower", "give it a Friction")
