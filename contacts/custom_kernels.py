@@ -230,7 +230,10 @@ def _content(value: Any, above: tuple[Any, ...]) -> Iterator[str]:
         yield f"{getattr(value, '__module__', '')} {value.__name__}"
     elif isinstance(value, FunctionType) and value not in above:  # none that calls itself
         cells = tuple(cell.cell_contents for cell in value.__closure__ or ())
-        used = [value.__globals__[name] for name in _names(value.__code__) if name in value.__globals__]
+        used = [(name, value.__globals__[name]) for name in _names(value.__code__) if name in value.__globals__]
+        for part in (*cells, *(part for _, part in used)):
+            if isinstance(part, FunctionType) and not _is_known(part):
+                raise TypeError(f"{part!r} stands for what numba has as its overload")
         for part in (value.__code__, value.__defaults__, cells, *used):
             yield from _content(part, (*above, value))
     else:

@@ -374,7 +374,22 @@ def test_a_digest_tells_all_that_a_law_is_made_of(monkeypatch):
     assert digest_of(2.0) == found[-1]
 
 
-@pytest.mark.parametrize("constant", [[2.0], {"K": 2.0}, SimpleNamespace(K=2.0), shutil, np.zeros(200000)])
+def test_a_digest_tells_which_name_stands_for_what():
+    """A function of the name of a built-in one takes its place."""
+    found = []
+    for name in ("min", "max"):
+        space = {name: njit(lambda a, b: a)}
+        exec("def force(delta):\n    return min(delta, 1.0) + max(delta, 2.0)", space)
+        found.append(own._digest(space["force"]))
+    assert None not in found
+    assert found[0] != found[1]
+
+
+def overloaded(x):
+    """Stands for what numba has as its overload, which is not seen."""
+
+
+@pytest.mark.parametrize("constant", [[2.0], {"K": 2.0}, SimpleNamespace(K=2.0), shutil, np.zeros(200000), overloaded])
 def test_what_may_change_unseen_has_no_digest(constant):
     assert digest_of(constant) is None
 
