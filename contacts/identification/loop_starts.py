@@ -86,7 +86,7 @@ def _no_slip(measured: Measured, slope: float, squares: float) -> str:
     return (
         f"nothing slips in these records: the force is a line of slope {stiffness:.6g} N/m to within "
         f"{noise * measured.strength:.3g} N, which tells of the limit only that half the range of force, "
-        f"{measured.strength:.6g} N, does not reach it; load further"
+        f"{measured.strength:.6g} N, does not reach it; load further, or look whether samples are dense and in order"
     )
 
 
