@@ -5,13 +5,20 @@ from __future__ import annotations
 import inspect
 import math
 from dataclasses import dataclass, field, fields, replace
-from importlib import import_module
 from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from contacts.custom_kernels import Function, derivative_kernel, difference_kernel, force_kernel
+from contacts.custom_kernels import (
+    Function,
+    at_place,
+    derivative_kernel,
+    difference_kernel,
+    force_kernel,
+    frozen,
+    original,
+)
 from contacts.law import ENTRY_RATE_FLOOR, Law
 from contacts.numbers import LARGEST_EXPONENT, check_number, reals
 
@@ -66,23 +73,26 @@ class CustomLaw(Law):
 
     def __reduce__(self) -> tuple:
         """Pickle by the function's name, so that laws travel to worker processes; it stands for what was decorated."""
-        place = self.function.__module__, self.function.__qualname__
-        if "<locals>" not in place[1] and _named(*place) is self.function:  # ``law(function)`` has another name
-            return CustomLaw, tuple(getattr(self, one.name) for one in fields(self))
-        return _rebind, (*place, self.values)
+        who = f"law {self.name!r}"
+        function = original(self.function, who)
+        place = function.__module__, function.__qualname__
+        if at_place(*place) is not function:
+            return _rebind, (*place, self.values)
+        slopes = None if self.derivative is None else original(self.derivative, who)  # ``law(function)``
+        made = replace(self, function=function, derivative=slopes)
+        return _frozen_law, tuple(getattr(made, one.name) for one in fields(made))
 
 
 def _rebind(module: str, qualname: str, values: tuple[tuple[str, float], ...]) -> CustomLaw:
     """Find the decorated function again and bind its parameters."""
-    return _named(module, qualname)(**dict(values))  # type: ignore[no-any-return]
+    return at_place(module, qualname)(**dict(values))  # type: ignore[no-any-return]
 
 
-def _named(module: str, qualname: str) -> Any:
-    """What a module has under a name."""
-    found: Any = import_module(module)
-    for part in qualname.split("."):
-        found = getattr(found, part)
-    return found
+def _frozen_law(*parts: Any) -> CustomLaw:
+    """A law of functions as they are at present."""
+    made = CustomLaw(*parts)
+    slopes = None if made.derivative is None else frozen(made.derivative)
+    return replace(made, function=frozen(made.function), derivative=slopes)
 
 
 def law(
@@ -151,10 +161,11 @@ def law(
 
     def bind(**values: float) -> CustomLaw:
         pairs = bound_values(who, probe, values)
-        return _checked(CustomLaw(who, function, pairs, *options, power, floor, derivative), exponent is None)
+        return _checked(_frozen_law(who, function, pairs, *options, power, floor, derivative), exponent is None)
 
     bind.__name__, bind.__qualname__ = function.__name__, function.__qualname__
     bind.__doc__, bind.__module__ = function.__doc__, function.__module__
+    bind.decorated = function  # type: ignore[attr-defined]
     bind.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
         [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in probe.parameters.values()]
     )

@@ -5,6 +5,7 @@ Machine code is kept under a digest of all that it is made of, so a law that is 
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import inspect
 import math
@@ -15,6 +16,7 @@ from contextlib import suppress
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
+from pickle import PicklingError
 from types import CellType, CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -167,6 +169,53 @@ def _drop_oldest(folder: Path) -> None:
                 path.unlink()
 
 
+def frozen(function: Function) -> Function:
+    """The function with what it reads at present: later changes of globals, closures and arrays do not reach it.
+
+    Force and derivatives are compiled at different times, of the same numbers then. Itself where it has no digest.
+    """
+    digest = _present_digest(function)
+    return function if digest is None else _frozen(function, digest)
+
+
+@lru_cache(maxsize=1024)
+def _frozen(function: Function, digest: str) -> Function:
+    """A copy; the same one as long as the content is."""
+    made = functools.update_wrapper(_copied(function, _held), function)
+    del made.__wrapped__
+    return made
+
+
+def _held(value: Any) -> Any:
+    """What a function uses, as it is at present."""
+    from numba import jit
+    from numba.core.dispatcher import Dispatcher
+
+    if isinstance(value, Dispatcher):
+        return jit(**value.targetoptions)(frozen(value.py_func))
+    return value.copy(order="K") if isinstance(value, np.ndarray) else value
+
+
+def original(function: Function, who: str) -> Function:
+    """What pickle finds in another process under the function's name, or PicklingError if that is not the same."""
+    module, name = function.__module__, function.__qualname__
+    found = None
+    with suppress(ImportError, AttributeError):
+        found = at_place(module, name)
+        found = getattr(found, "decorated", found)
+    if inspect.isfunction(found) and (found is function or _present_digest(found) == _digest(function) is not None):
+        return found
+    raise PicklingError(
+        f"{who} cannot be pickled: its function is found by name, and {module}.{name} is not there, or no longer what "
+        "the law was made of; define it at the top of a module, and bind it again after a change"
+    )
+
+
+def at_place(module: str, name: str) -> Any:
+    """What a module has under a name."""
+    return functools.reduce(getattr, name.split("."), import_module(module))
+
+
 def _named(function: Function) -> Function:
     """The function under a name that tells its content, with all it calls; itself where that is not known.
 
@@ -175,12 +224,18 @@ def _named(function: Function) -> Function:
     digest = _digest(function)
     if digest is None:
         return function
-    found = function.__globals__
-    used = {name: _renamed(found[name]) for name in _names(function.__code__) if name in found}
-    cells = tuple(CellType(_renamed(cell.cell_contents)) for cell in function.__closure__ or ())
-    named = FunctionType(function.__code__, {**found, **used}, function.__name__, function.__defaults__, cells)
+    named = _copied(function, _renamed)
     named.__qualname__, named.__module__ = f"{function.__name__.strip('<>')}_{digest}", __name__
     return named
+
+
+def _copied(function: Function, changed: Callable[[Any], Any]) -> Function:
+    """A copy of a function in which what it uses is changed."""
+    found, own = function.__globals__, ("__builtins__", "__name__", "__package__", "__file__")
+    used = {name: changed(found[name]) for name in _names(function.__code__) if name in found}
+    kept = {name: found[name] for name in own if name in found}
+    cells = tuple(CellType(changed(cell.cell_contents)) for cell in function.__closure__ or ())
+    return FunctionType(function.__code__, {**kept, **used}, function.__name__, function.__defaults__, cells)
 
 
 def _renamed(value: Any) -> Any:
@@ -195,6 +250,11 @@ def _renamed(value: Any) -> Any:
 
 @lru_cache(maxsize=1024)
 def _digest(function: Function) -> str | None:
+    """Digest of a function that does not change."""
+    return _present_digest(function)
+
+
+def _present_digest(function: Function) -> str | None:
     """Digest of what a function is made of and of the versions that compile it; None where it is not known."""
     import llvmlite
     import numba

@@ -452,6 +452,49 @@ def test_a_law_made_without_a_decorator():
     assert again.force(3e-4) == one.force(3e-4)
 
 
+SCALE = 1e5
+
+
+@law
+def scaled(delta, delta_dot, entry_rate):
+    return SCALE * delta
+
+
+def test_a_law_is_of_what_it_read_when_it_was_bound(monkeypatch):
+    """Its derivatives too, which are compiled when they are first asked for."""
+    before = scaled()
+    monkeypatch.setitem(globals(), "SCALE", 3e5)
+    after = scaled()
+    for one, stiffness in ((before, 1e5), (after, 3e5)):
+        assert one.force(1e-3) == pytest.approx(1e-3 * stiffness, rel=1e-15)
+        assert slopes(one, np.array([1e-3]), np.array([0.0]), 1.0)[0, 0] == pytest.approx(stiffness, rel=1e-9)
+    assert before != after == scaled() == pickle.loads(pickle.dumps(after))
+    with pytest.raises(pickle.PicklingError, match=r"law 'scaled' cannot be pickled: .*scaled is not there, or no"):
+        pickle.dumps(before)
+
+
+def test_an_array_of_a_law_may_change_after_it_was_bound():
+    table = np.array([1e5, 2e5])
+
+    @law
+    def read(delta, delta_dot, entry_rate):
+        return table[0] * delta
+
+    before = read()
+    table[0] = 3e5
+    found = [slopes(one, np.array([1e-3]), np.array([0.0]), 1.0)[0, 0] for one in (before, read())]
+    assert found == pytest.approx([1e5, 3e5], rel=1e-9)
+
+
+def test_a_law_within_a_function_is_refused_by_pickle_at_once():
+    @law
+    def local(delta, delta_dot, entry_rate):
+        return delta
+
+    with pytest.raises(pickle.PicklingError, match=r"law 'local' cannot be pickled: .*define it at the top of a mod"):
+        pickle.dumps(local() + Hertz(1e6))
+
+
 def test_a_given_derivative_is_used_and_checked():
     one = cubic(stiffness=1e9, damping=20.0)
     assert one.exponent == 3.0

@@ -111,6 +111,27 @@ def test_it_travels_and_tells_of_itself():
     assert math.isnan(OWN.stored(1e-3, OWN.parameters))
 
 
+SCALE = 1e4
+
+
+def scaled(delta, delta_dot):
+    return SCALE * delta
+
+
+def test_it_is_of_what_it_read_when_it_was_bound(monkeypatch):
+    maker = memory_law("scaled", {"always": Segment(scaled)})
+    before = maker()
+    monkeypatch.setitem(globals(), "SCALE", 3e4)
+    after = maker()
+    for one, stiffness in ((before, 1e4), (after, 3e4)):
+        assert one.along([1e-3])[0] == pytest.approx(1e-3 * stiffness, rel=1e-12)
+        found = asked(one, "gradient", 3, np.array([1e-3]), np.array([0.0]), one.parameters)[0]
+        assert found[0] == pytest.approx(stiffness, rel=1e-8)
+    assert pickle.loads(pickle.dumps(after)) == after
+    with pytest.raises(pickle.PicklingError, match=r"law 'scaled' cannot be pickled"):
+        pickle.dumps(before)
+
+
 def nothing(delta, delta_dot, dent, k1, k2):
     return 0
 

@@ -6,7 +6,7 @@ import inspect
 import math
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from itertools import pairwise
 from typing import Any, ClassVar
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from contacts.custom import bound_values, changed_values
+from contacts.custom_kernels import frozen, original
 from contacts.law import Law
 from contacts.memory.custom_kernels import LEAST, RELATIVE, Function, Pieces, compiled
 from contacts.numbers import LARGEST_PARAMETER, check_number
@@ -47,6 +48,10 @@ class Border:
         if not isinstance(self.to, str):
             raise TypeError(f"to of Border must be the name of a segment, got {self.to!r}")
 
+    def of(self, change: Callable[[Function], Function]) -> Border:
+        """The same with functions that are changed."""
+        return Border(change(self.value), self.to, None if self.renew is None else change(self.renew))
+
 
 @dataclass(frozen=True)
 class Segment:
@@ -76,6 +81,11 @@ class Segment:
     def ends(self) -> tuple[Border, ...]:
         """The borders as a tuple."""
         return (self.borders,) if isinstance(self.borders, Border) else tuple(self.borders)
+
+    def of(self, change: Callable[[Function], Function]) -> Segment:
+        """The same with functions that are changed."""
+        slopes = None if self.slopes is None else change(self.slopes)
+        return Segment(change(self.force), tuple(end.of(change) for end in self.ends), slopes)
 
 
 @dataclass(frozen=True)
@@ -165,6 +175,20 @@ class CustomMemoryLaw(Law):
         """Not known of a user's law: nan."""
         return float("nan")
 
+    def of(self, change: Callable[[Function], Function]) -> CustomMemoryLaw:
+        """The same with functions that are changed."""
+        return replace(self, segments=tuple((name, one.of(change)) for name, one in self.segments))
+
+    def __reduce__(self) -> tuple:
+        """Pickle by the names of its functions."""
+        made = self.of(lambda function: original(function, f"law {self.name!r}"))
+        return _frozen_law, tuple(getattr(made, one.name) for one in fields(made))
+
+
+def _frozen_law(*parts: Any) -> CustomMemoryLaw:
+    """A law of functions as they are at present."""
+    return CustomMemoryLaw(*parts).of(frozen)
+
 
 def memory_law(
     name: str,
@@ -224,7 +248,7 @@ def memory_law(
 
     def bind(**values: float) -> CustomMemoryLaw:
         pairs = bound_values(name, probe, values)
-        made = CustomMemoryLaw(name, tuple(segments.items()), tuple(starts.items()), pairs, size, jumps, opens)
+        made = _frozen_law(name, tuple(segments.items()), tuple(starts.items()), pairs, size, jumps, opens)
         try:
             _check_cycles(made)
         except TypeError:  # of the compiler, which names no function
