@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import warnings
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar
 
@@ -213,6 +214,7 @@ def _checked(made: CustomLaw, finds_exponent: bool) -> CustomLaw:
     """A law that was tried out, with the exponent that it has if none was given."""
     _check_force(made)
     _check_jump(made)
+    _warn_of_sticking(made)
     if made.derivative is not None:
         _check_derivative(made)
     return replace(made, exponent=_leading_exponent(made)) if finds_exponent and not made.jump else made
@@ -251,6 +253,19 @@ def _check_jump(made: CustomLaw) -> None:
                 f"law {made.name!r} jumps to {nearer:g} N at delta = 0+ with delta_dot = {rate:g} m/s; "
                 "declare it with @law(jump=True), so that integrators locate it"
             )
+
+
+def _warn_of_sticking(made: CustomLaw) -> None:
+    """Warn of a force that jumps with the sign of the rate, between whose two values a place comes to rest."""
+    ends = np.array([made.force(_PROBES, rate, 1.0) for rate in (1e-12, -1e-12, 1e-15, -1e-15)])
+    far, jump = np.abs(ends[::2] - ends[1::2])
+    if np.any((jump > 0.5 * far) & (jump > 1e-3 * np.abs(ends).max(axis=0))):
+        where = int(np.argmax(jump))
+        warnings.warn(
+            f"force of law {made.name!r} jumps by {jump[where]:.6g} N with the sign of the rate at delta = "
+            f"{_PROBES[where]:g} m: where a place sticks by that a run takes forever; write a contacts.memory_law",
+            stacklevel=4,
+        )
 
 
 def _leading_exponent(made: CustomLaw) -> float:

@@ -495,6 +495,16 @@ def test_a_law_within_a_function_is_refused_by_pickle_at_once():
         pickle.dumps(local() + Hertz(1e6))
 
 
+def test_a_force_that_jumps_with_the_sign_of_the_rate_is_told():
+    @law
+    def rubbing(delta, delta_dot, entry_rate, mu):
+        return 1e5 * delta * (1.0 + mu * np.sign(delta_dot))
+
+    with pytest.warns(UserWarning, match="'rubbing' jumps by 60 N with the sign of the rate.*memory"):
+        rubbing(mu=0.3)
+    rubbing(mu=0.0)
+
+
 def test_a_given_derivative_is_used_and_checked():
     one = cubic(stiffness=1e9, damping=20.0)
     assert one.exponent == 3.0
