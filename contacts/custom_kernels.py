@@ -121,10 +121,11 @@ def gradient_batch(slopes: Any, count: int) -> Function:
 
 
 def inner(function: Function) -> Any:
-    """A function that kernels call, compiled without the wrappers that Python would need."""
+    """A function that kernels call, compiled without the wrappers that Python would need; it raises beyond an array."""
     from numba import njit
 
-    return njit(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(_named(function))
+    options = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return njit(boundscheck=True, **options)(_named(function))
 
 
 def kept(signature: Any, function: Function) -> Any:
@@ -244,7 +245,8 @@ def _renamed(value: Any) -> Any:
     from numba.core.dispatcher import Dispatcher
 
     if isinstance(value, Dispatcher) and value.py_func.__module__ != __name__:
-        return jit(**value.targetoptions)(_named(value.py_func))
+        options = value.targetoptions
+        return jit(**{**options, "boundscheck": options.get("boundscheck") is not False})(_named(value.py_func))
     return value
 
 

@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
+from numba import njit
 from problems import force_of
 from refusals import refused
 
@@ -484,6 +485,25 @@ def test_an_array_of_a_law_may_change_after_it_was_bound():
     table[0] = 3e5
     found = [slopes(one, np.array([1e-3]), np.array([0.0]), 1.0)[0, 0] for one in (before, read())]
     assert found == pytest.approx([1e5, 3e5], rel=1e-9)
+
+
+def test_beyond_the_end_of_an_array_there_is_no_force():
+    points = np.linspace(0.0, 100.0, 11)
+
+    @njit
+    def at(x):
+        return points[int(x)]
+
+    @law
+    def table(delta, delta_dot, entry_rate):
+        return points[int(1e4 * delta)]
+
+    @law
+    def within(delta, delta_dot, entry_rate):
+        return at(1e4 * delta)
+
+    for one in (table(), within()):
+        np.testing.assert_array_equal(one.force([5.5e-4, 1.05e-3, 1.15e-3, 2e-3]), [50.0, 100.0, np.nan, np.nan])
 
 
 def test_a_law_within_a_function_is_refused_by_pickle_at_once():
