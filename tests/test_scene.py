@@ -10,7 +10,7 @@ from refusals import refused
 
 import fembeam as fb
 import reduction
-from contacts import Hertz, KelvinVoigt
+from contacts import Hertz, KelvinVoigt, law
 from fembeam.beams import Beam, ModalDamping, Rayleigh, Section
 from fembeam.excitation import Harmonic
 from fembeam.scene import Clamped, Dashpot, Guided, LumpedMass, Pinned, PointForce, Scene, Spring, Stop
@@ -255,6 +255,7 @@ PARTS_REFUSED = [
     (lambda: Stop(0.5, Linear(), gap=math.nan), "gap must be finite, got nan in Stop at z = 0.5"),
     (lambda: Stop(0.5, Linear(), side="left"), "side must be 'below' or 'above', got 'left'"),
     (lambda: Stop(0.5, lambda d, v, e: d), "law must not be a bare function, .*decorate it with @law"),
+    (lambda: Stop(0.5, law(lambda delta, delta_dot, entry_rate: delta)), "law must not be .*with @law .*, and call it"),
     (lambda: Stop(0.5, 3.0), "law must offer force"),
     (lambda: Stop(0.5, Linear), "law must offer force"),
     (lambda: PointForce(0.5, None), "signal must be a function of t, got None"),

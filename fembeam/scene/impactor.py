@@ -102,7 +102,7 @@ def check_law(law: Any, where: str) -> None:
     import inspect
 
     bare = inspect.isroutine(law) and not hasattr(law, "force")
-    require(not bare, "law must not be a bare function", law, where, "decorate it with @law from contacts")
+    require(not bare, "law must not be a bare function", law, where, "decorate it with @law from contacts, and call it")
     valid = callable(getattr(law, "force", None)) and not inspect.isclass(law)
     require(valid, "law must offer force(delta, delta_dot, entry_rate)", law, where,
             "give a law such as contacts.Hertz(stiffness)")  # fmt: skip
