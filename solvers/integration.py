@@ -124,7 +124,8 @@ def integrate(
     progress : called with the simulated time now and then.
     check : raise when the run fails; False returns the partial solution with its status instead.
     memory : what the laws have latched at the start, one entry per contact as `Solution.memory` has it, None for what
-        a law begins with; by it a run goes on from another one's end.
+        a law begins with; by it a run goes on from another one's end. It does not hold the rate at which a contact
+        under way was entered: laws that depend on it take that at the start; end the first run where they are open.
 
     Returns
     -------
