@@ -1,6 +1,7 @@
 """Loads given as node tables: their responses, several on unequal grids, and none passed over where all is at rest."""
 
 import math
+import tracemalloc
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import combinations
@@ -16,6 +17,7 @@ from solvers import RK4, Contact, DormandPrince, Exponential, System, integrate,
 from solvers.exponential.flight import cell_of
 from solvers.exponential.phi_functions import signal_responses
 from solvers.integration import prepared_once
+from solvers.problem import forcing_of, on_one_grid
 
 REST = np.zeros(2)
 STEEL = fb.Section(E=2.1e11, rho=7800.0, A=1e-4, I=8.3e-10)
@@ -168,6 +170,19 @@ def test_a_coarse_record_beside_a_fine_smooth_one_keeps_the_grid_of_the_fine():
     alone = System.modal([1e5], 0.01, [], [([1.0], fine)])
     together, by_itself = (prepared_once(one, Exponential(1e-8), 20.0)[0].table_dt for one in (system, alone))
     assert 0.5 * by_itself[0] < together[0] <= by_itself[0]
+
+
+def test_a_short_pulse_beside_a_record_takes_little_more_memory_than_its_table():
+    """It took 15 times as much, and 50 times the time of the integration."""
+    fine, coarse = fb.Pulse(1.0, 0.01, 0.3).nodes(4.0, 1e-8), rough(0.05, 81, 0)
+    loads = [(np.eye(1)[0], Table(*fine)), (np.eye(1)[0], coarse)]
+    forcing = forcing_of([signal for _, signal in loads], 4.0, 1e-8)
+    tracemalloc.start()
+    together = on_one_grid(forcing, 4.0, 10.0)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert together.table.nbytes > forcing.table.nbytes
+    assert peak < 4.0 * together.table.nbytes
 
 
 # --- kinks --------------------------------------------------------------------------------------------------------

@@ -34,9 +34,10 @@ class _Wave(Unlimited):
 
     def __call__(self, t: ArrayLike) -> Any:
         """Value at the instants t (s), of any shape."""
-        s = 2 * (np.asarray(t, dtype=np.float64) - self.at) / self.length - 1
-        inside = Polynomial(self.coefficients)(np.clip(s, -1.0, 1.0))
-        return (self.size * np.where(s < -1, 0.0, np.where(s > 1, self.after, inside)))[()]
+        s = np.asarray(2 * (np.asarray(t, dtype=np.float64) - self.at) / self.length - 1)
+        value, within = np.where(s > 1, self.after, 0.0), ~(np.abs(s) > 1)  # mostly few instants
+        value[within] = Polynomial(self.coefficients)(s[within])
+        return (self.size * value)[()]
 
     def derivative(self, order: int) -> _Wave:
         """The signal d^order y/dt^order."""

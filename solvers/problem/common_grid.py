@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,8 @@ _KINKS_FIRST = 1e6  # weight of jumps of slope and curvature: the grid divides t
 _CELLS_A_STEP = 160  # of a rough table whose nodes are not on the grid
 _FEWEST_CELLS = 4096  # where two tables are rough and no grid has the nodes of both
 _RESOLVED, _MOST_CELLS = 0.3, 500_000  # ω dt of the fastest block there, unless that takes more cells than these
+_DEGREE = 11  # of a jump's changes as polynomials of its place in a cell
+_BLOCK = 2**13  # nodes at once
 
 
 def on_one_grid(forcing: Forcing, duration: float, fastest: float) -> Forcing:
@@ -67,8 +70,14 @@ def _common_step(tables: list[Array], steps: list[float], duration: float, faste
 
 def _roughness(rows: Array, dt: float) -> float:
     """Largest jump of the first three derivatives of a node table, in units of max|s|/dtᵖ; kinks come first."""
-    jumps = np.abs(_jumps(rows, dt)[:, :3]).max(axis=0, initial=0.0) * dt ** np.arange(1.0, 4.0)
+    blocks = [np.abs(_jumps(rows[some[0] : some[-1] + 3], dt, 3)).max(axis=1) for some in _blocks(len(rows) - 2)]
+    jumps = np.max(blocks, axis=0, initial=0.0) * dt ** np.arange(1.0, 4.0)
     return float((jumps * (_KINKS_FIRST, _KINKS_FIRST, 1.0)).max()) / max(float(np.abs(rows[:, 0]).max()), 1e-300)
+
+
+def _blocks(size: int) -> list[Any]:
+    """Numbers below ``size`` in blocks that fit into a processor's cache."""
+    return [np.arange(start, min(start + _BLOCK, size)) for start in range(0, size, _BLOCK)]
 
 
 def _part_of(step: float, most: float) -> float:
@@ -83,53 +92,66 @@ def _divides(dt: float, step: float) -> bool:
 
 def _cut(rows: Array, own: float, dt: float, cells: int) -> Array:
     """A node table whose cells are cut into equal parts."""
-    pieces, parts = _derivatives(rows, own), round(own / dt)
-    node = np.arange(cells + 1)
-    piece = np.minimum(node // parts, len(pieces) - 1)
-    after: Any = (node - piece * parts) * dt
-    out = np.tile(_moved(pieces[piece], after)[:, :3], rows.shape[1] // 3)
-    kept = node[::parts][: len(rows)]
+    parts, out = round(own / dt), np.empty((cells + 1, rows.shape[1]))
+    for node in _blocks(cells + 1):
+        piece = np.minimum(node // parts, len(rows) - 2)
+        out[node] = np.tile(_within(rows, own, piece, (node - piece * parts) * dt), rows.shape[1] // 3)
+    kept = np.arange(0, cells + 1, parts)[: len(rows)]
     out[kept] = rows[: kept.size]
     return out
 
 
 def _carried_over(rows: Array, own: float, dt: float, cells: int) -> Array:
     """A node table on a grid not coarser than its own."""
-    pieces, node = _derivatives(rows, own), np.arange(cells + 1)
-    place = np.arange(1.0, len(pieces)) * own / dt
-    # A node of the table on one of the grid ends the cell before it, x = 1, and what follows it begins there.
-    piece = np.searchsorted(place, node, side="right")
-    out = _moved(pieces[piece], node * dt - piece * own)[:, :3]
+    out, place = np.empty((cells + 1, 3)), np.arange(1.0, len(rows) - 1) * own / dt
+    for node in _blocks(cells + 1):
+        # A node of the table on one of the grid ends the cell before it, x = 1, and what follows it begins there.
+        piece = np.searchsorted(place, node, side="right")
+        out[node] = _within(rows, own, piece, node * dt - piece * own)
     place = place[place < cells]
-    cell = np.ceil(place).astype(np.int64) - 1
-    changes = _moments_kept(place - cell, _jumps(rows, own)[: len(place)] * dt ** np.arange(1.0, 6.0))
-    for end in range(2):
-        np.add.at(out, cell + end, changes[:, end] / dt ** np.arange(3.0))
+    for some in _blocks(len(place)):
+        jumps = _jumps(rows[some[0] : some[-1] + 3], own)
+        jumping = jumps.any(axis=0)  # before and after a pulse nothing does
+        at = place[some[jumping]]
+        cell = np.ceil(at).astype(np.int64) - 1
+        changes = _moments_kept(at - cell, jumps[:, jumping] * dt ** np.arange(1.0, 6.0)[:, None])
+        for end in range(2):
+            np.add.at(out, cell + end, changes[:, end] / dt ** np.arange(3.0))
     return out
+
+
+def _within(rows: Array, dt: float, piece: Any, span: Array) -> Array:
+    """(k, 3) s, s', s'' of a node table, times ``span`` after the starts of its cells ``piece``, which rise."""
+    first = piece[0]
+    pieces = _derivatives(rows[first : piece[-1] + 2], dt)
+    return _moved(pieces[:, piece - first], span, range(3)).T
 
 
 def _derivatives(rows: Array, dt: float) -> Array:
-    """(cells, 6) s, s', ..., s⁽⁵⁾ at the start of every cell of a node table."""
-    a, b = (part * (1.0, dt, 0.5 * dt**2) for part in (rows[:-1, :3], rows[1:, -3:]))
-    e0, e1, e2 = b[:, 0] - a.sum(axis=1), b[:, 1] - a[:, 1] - 2.0 * a[:, 2], b[:, 2] - a[:, 2]
+    """(6, cells) s, s', ..., s⁽⁵⁾ at the start of every cell of a node table."""
+    a, b = (part.T * np.array([[1.0], [dt], [0.5 * dt**2]]) for part in (rows[:-1, :3], rows[1:, -3:]))
+    e0, e1, e2 = b[0] - a.sum(axis=0), b[1] - a[1] - 2.0 * a[2], b[2] - a[2]
     rest = 10.0 * e0 - 4.0 * e1 + e2, -15.0 * e0 + 7.0 * e1 - 2.0 * e2, 6.0 * e0 - 3.0 * e1 + e2
-    derivatives: Array = np.column_stack((a, *rest)) * [math.factorial(k) / dt**k for k in range(6)]
+    derivatives = np.concatenate((a, rest))
+    derivatives *= np.array([[math.factorial(k) / dt**k] for k in range(6)])
     return derivatives
 
 
-def _moved(derivatives: Array, span: Array) -> Array:
-    """The derivatives of quintics after a time each."""
-    out, weight = derivatives.copy(), np.ones((len(derivatives), 1))
-    for i in range(1, 6):
-        weight = weight * span[:, None] / i
-        out[:, :-i] += weight * derivatives[:, i:]
+def _moved(derivatives: Array, span: Any, orders: range) -> Array:
+    """Some of the derivatives (6, k) of quintics after a time each, or after one for all."""
+    out = derivatives[orders.start : orders.stop].copy()
+    for order, row in zip(orders, out, strict=True):
+        rest: Any = 0.0
+        for i in range(5 - order, 0, -1):
+            rest = (derivatives[order + i] + rest) * (span / i)
+        row += rest
     return out
 
 
-def _jumps(rows: Array, dt: float) -> Array:
-    """(nodes within, 5) jumps of the first to fifth derivative of a node table."""
+def _jumps(rows: Array, dt: float, most: int = 5) -> Array:
+    """(5, nodes within) jumps of the first to fifth derivative of a node table; of fewer if ``most`` are wanted."""
     pieces = _derivatives(rows, dt)
-    return (pieces[1:] - _moved(pieces[:-1], np.full(len(pieces) - 1, dt)))[:, 1:]
+    return np.asarray(pieces[1 : most + 1, 1:] - _moved(pieces[:, :-1], dt, range(1, most + 1)))
 
 
 def _moments_kept(x: Array, jumps: Array) -> Array:
@@ -138,6 +160,21 @@ def _moments_kept(x: Array, jumps: Array) -> Array:
     The quintic through the rows at 0 and 1 takes the place of s in between. By the changes, which act from -1 to 2, it
     has the first six moments of s about the middle.
     """
+    powers = np.polynomial.chebyshev.chebvander(2.0 * x - 1.0, _DEGREE)
+    changes: Array = np.einsum("pn,npc->nc", jumps, (powers @ _unit_changes()).reshape(len(x), 5, 6))
+    return changes.reshape(-1, 2, 3)
+
+
+@cache
+def _unit_changes() -> Array:
+    """(12, 30) the changes by a jump of 1 of each derivative in turn as Chebyshev series of 2x - 1."""
+    x = 0.5 + 0.5 * np.polynomial.chebyshev.chebpts1(_DEGREE + 1)
+    by_jump = np.concatenate([_changes(x, np.tile(unit, (len(x), 1))) for unit in np.eye(5)], axis=1)
+    return np.linalg.solve(np.polynomial.chebyshev.chebvander(2.0 * x - 1.0, _DEGREE), by_jump)
+
+
+def _changes(x: Array, jumps: Array) -> Array:
+    """(n, 6) the changes that `_moments_kept` looks up, for jumps (n, 5)."""
     points, weights = np.polynomial.legendre.leggauss(6)  # exact up to the power 11
     u, weights, powers = 0.5 * (1.0 + points), 0.5 * weights, np.arange(6)
     rising, falling = _quintics(u), _quintics(1.0 - u) * np.array([[1.0], [-1.0], [1.0]])
@@ -149,7 +186,7 @@ def _moments_kept(x: Array, jumps: Array) -> Array:
     wanted = np.einsum("nu,nuk->nk", values * rest * weights, about)
     ends = [sum(jumps[:, [p - 1]] * _power(rest, p - k) for p in range(max(k, 1), 6)) for k in range(3)]
     changes: Array = np.linalg.solve(basis.T, (wanted - np.hstack(ends) @ rising @ within).T).T
-    return changes.reshape(-1, 2, 3)
+    return changes
 
 
 def _power(x: Array, p: int) -> Array:

@@ -108,9 +108,13 @@ def joined(tables: list[Array]) -> Array:
     """All node tables in one array, with both sides of each node if one has them; a single one is not copied."""
     if len(tables) == 1:
         return np.ascontiguousarray(tables[0], dtype=float)
-    sides = max([table.shape[1] for table in tables], default=3) // 3
-    both = [np.tile(table, sides) if table.shape[1] == 3 else table for table in tables]
-    return np.ascontiguousarray(np.concatenate(both or [np.empty((0, 3))]))
+    columns, ends = max([table.shape[1] for table in tables], default=3), np.cumsum([len(table) for table in tables])
+    out = np.empty((ends[-1] if tables else 0, columns))
+    for table, end in zip(tables, ends, strict=True):
+        width = table.shape[1]
+        for side in range(0, columns, width):  # both sides of a node are one where the table does not tell them
+            out[end - len(table) : end, side : side + width] = table
+    return out
 
 
 def tones_as_nodes(forcing: Forcing, chosen: list[int], duration: float, rtol: float) -> Forcing:
