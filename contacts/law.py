@@ -189,11 +189,20 @@ class Law(ABC):
         everywhere = bool(self.memory) and not self.one_sided
         touching = np.flatnonzero(((d > 0.0) | everywhere) & ~np.isnan(out))
         touching = touching[np.argsort(r.flat[touching], kind="stable")]
-        rates, starts = np.unique(r.flat[touching], return_index=True)
-        for rate, start, count in zip(rates, starts, np.diff(starts, append=len(touching)), strict=True):
-            chosen = touching[start : start + count]
-            out.flat[chosen] = self.batch(float(rate))(d.flat[chosen], v.flat[chosen])
+        if touching.size:
+            out.flat[touching] = self._force_at_rates(d.flat[touching], v.flat[touching], r.flat[touching])
         return out[()]
+
+    def _force_at_rates(self, delta: NDArray, delta_dot: NDArray, entry_rate: NDArray) -> NDArray[np.float64]:
+        """Force (k,) at entry rates (k,) that rise, by one call of the kernel for each that is another one."""
+        rates, starts = np.unique(np.maximum(entry_rate, self.entry_rate_floor), return_index=True)
+        force, parameters = np.empty(delta.size), np.ascontiguousarray(self.parameters, dtype=float)
+        d, v, p, f = (x.ctypes.data for x in (delta, delta_dot, parameters, force))
+        call, bytes_each, ends = BATCH(self.kernel.address), force.itemsize, [*starts[1:].tolist(), force.size]
+        for rate, start, end in zip(rates.tolist(), starts.tolist(), ends, strict=True):
+            skip = start * bytes_each
+            call(end - start, d + skip, v + skip, rate, p, f + skip)
+        return force
 
     def batch(self, entry_rate: float, parameters: NDArray | None = None) -> Callable[[NDArray, NDArray], NDArray]:
         """The force at one entry rate as a lean function of 1-D arrays ``delta >= 0`` and ``delta_dot``.
