@@ -9,6 +9,7 @@ from frames import PORTAL, SPACE_L, portal, space_l, static, turned
 from refusals import refused
 
 import fembeam as fb
+from fembeam.structures.element_matrices import Elements
 
 STEEL = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
 BARE = fb.Section(E=2.1e11, rho=7850.0, A=2e-4, I=1.7e-9)
@@ -52,6 +53,16 @@ def test_rows_of_many_places():
     s = np.array([0.31, 0.0, 0.5, 0.12])
     one_by_one = np.vstack([made.rows(("A-B", place)).toarray() for place in s])
     assert np.array_equal(made.mesh.along(0, s).toarray(), one_by_one)
+
+
+def test_fields_of_all_members_are_evaluated_at_once(monkeypatch):
+    """Of 800 members one after another they took 11 s of the 12 s of `reduce`."""
+    line = fb.Frame.polyline({f"n{i}": (0.1 * i, 0.0) for i in range(9)}, STEEL)
+    matrices, counts = line.assembled(modes=3), []
+    motion = Elements.motion
+    monkeypatch.setattr(Elements, "motion", lambda self, at, x: counts.append(len(x)) or motion(self, at, x))
+    matrices.rows_of([(one.name, 0.03) for one in line.members])
+    assert counts == [8]
 
 
 def test_rows_at_released_and_offset_ends():

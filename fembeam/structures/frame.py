@@ -184,6 +184,11 @@ class Frame:
         return np.linalg.norm(self.spans, axis=1)
 
     @cached_property
+    def numbers(self) -> dict[str, int]:
+        """{name: number} of the members."""
+        return {one.name: number for number, one in enumerate(self.members)}
+
+    @cached_property
     def axes(self) -> Vector:
         """(m, 3, 3): unit vectors across, up and along of every member."""
         along = self.spans / self.lengths[:, None]
@@ -218,9 +223,9 @@ class Frame:
     def site(self, place: Any, where: str) -> Site:
         """The node a place is, or the member and the distance from its first end."""
         if isinstance(place, str):
-            inside = any(one.name == place for one in self.members)
+            inside = place in self.numbers
             advice = f"write ({place!r}, s) for a place s along the member" if inside else "use one of the names"
-            _require_name("be a node", place, list(self.nodes), where, advice)
+            _require_name("be a node", place, self.nodes, where, advice)
             return place
         if is_pair(place) and isinstance(place[0], str):
             return self._inside(place[0], place[1], where)
@@ -230,9 +235,8 @@ class Frame:
 
     def _inside(self, name: str, s: Any, where: str) -> Site:
         """A place along a member."""
-        names = [one.name for one in self.members]
-        _require_name("lie on a member", name, names, where, "use one of the names")
-        index = names.index(name)
+        _require_name("lie on a member", name, self.numbers, where, "use one of the names")
+        index = self.numbers[name]
         length = float(self.lengths[index])
         close = SAME_PLACE * length
         inside = is_finite(s) and -close <= s <= length + close
@@ -353,7 +357,7 @@ class Frame:
         return coarse(self, modes, places)
 
 
-def _require_name(what: str, name: str, names: list[str], where: str, advice: str) -> None:
+def _require_name(what: str, name: str, names: Collection[str], where: str, advice: str) -> None:
     """Raise ValueError, with the nearest name, unless a place is one of these."""
-    close = "" if name in names else nearest(name, names)
+    close = "" if name in names else nearest(name, list(names))
     require(name in names, f"a place must {what} of the frame; {close}", name, where, advice)

@@ -6,9 +6,11 @@ asks: (γ h)⁴/1440 with the wavenumbers κ of bending, ω √(ρ/E) of stretch
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -109,12 +111,15 @@ class FrameMesh:
     def rows(self, place: Any) -> sparse.csr_matrix:
         """Displacement and rotation (c, N) at a place along the global axes, one row for each of the components."""
         site = self.frame.site(place, "rows")
-        if isinstance(site, str):
-            count = len(self.frame.components)
-            first = count * list(self.frame.nodes).index(site)  # dofs of nodes come first
-            columns = np.arange(first, first + count)
-            return sparse.csr_matrix((np.ones(count), (np.arange(count), columns)), shape=(count, len(self.labels)))
-        return self.along(site[0], np.array([site[1]]))
+        return self.at_nodes([site]) if isinstance(site, str) else self.along(site[0], np.array([site[1]]))
+
+    def at_nodes(self, names: Sequence[str]) -> sparse.csr_matrix:
+        """The same (c k, N) at nodes of the frame, all components of one after another."""
+        count, numbers = len(self.frame.components), {name: i for i, name in enumerate(self.frame.nodes)}
+        first = count * np.array([numbers[name] for name in names], dtype=np.int64)  # dofs of nodes come first
+        columns = (first[:, None] + np.arange(count)).ravel()
+        rows = np.arange(len(columns))
+        return sparse.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(len(rows), len(self.labels)))
 
     def sections(self) -> list[tuple[str, float]]:
         """All mesh nodes as (member, distance), member by member."""
@@ -122,10 +127,15 @@ class FrameMesh:
         return [(one.name, float(s)) for one, borders in pairs for s in borders]
 
     def along(self, member: int, s: Vector) -> sparse.csr_matrix:
-        """The same (c k, N) at distances s (k,) along a member, all components of one place after another."""
-        element, x, node = self.located(member, s)
+        """The same (c k, N) at distances s (k,) along a member."""
+        return self.along_members([(member, s)])
+
+    def along_members(self, places: Sequence[tuple[int, Vector]]) -> sparse.csr_matrix:
+        """The same at distances along several members, one member after another."""
+        parts = [(*self.located(member, s), np.full(len(s), member)) for member, s in places]
+        element, x, node, member = (np.concatenate(part) for part in zip(*parts, strict=True))
         columns = [COMPONENTS.index(name) for name in self.frame.components]
-        at_nodes = self.join[(6 * (node[node >= 0, None] + member) + columns).ravel()]
+        at_nodes = self.join[(6 * (node + member)[node >= 0, None] + columns).ravel()]
         inside = self._inside(element[node < 0], x[node < 0])
         order = np.argsort(np.concatenate([np.flatnonzero(node >= 0), np.flatnonzero(node < 0)]), kind="stable")
         rows = sparse.vstack([at_nodes, inside], format="csr")
@@ -172,17 +182,17 @@ class FrameMatrices(Assembled):
     mesh: FrameMesh
 
     def rows_of(self, places: Sequence[Any]) -> sparse.csr_matrix:
-        """`rows` of several places, one below the other, each member at once."""
+        """`rows` of several places, one below the other, all members at once."""
         sites = [self.mesh.frame.site(place, "rows") for place in places]
-        count = len(self.mesh.frame.components)
-        pieces, order = [sparse.csr_matrix((0, len(self.labels)))], []
-        for member in {site[0] for site in sites if not isinstance(site, str)}:
-            mine = [(i, site[1]) for i, site in enumerate(sites) if not isinstance(site, str) and site[0] == member]
-            pieces.append(self.mesh.along(member, np.array([s for _, s in mine])))
-            order += [i for i, _ in mine]
+        count, by_member = len(self.mesh.frame.components), defaultdict[int, list[int]](list)
         nodes = [i for i, site in enumerate(sites) if isinstance(site, str)]
-        pieces += [self.rows(places[i]) for i in nodes]
-        back = np.argsort(np.array(order + nodes, dtype=int))
+        for i, site in enumerate(sites):
+            if not isinstance(site, str):
+                by_member[site[0]].append(i)
+        along = [(member, np.array([sites[i][1] for i in mine], dtype=float)) for member, mine in by_member.items()]
+        pieces = [self.mesh.at_nodes([str(sites[i]) for i in nodes])]
+        pieces += [self.mesh.along_members(along)] if along else []
+        back = np.argsort(np.array([*nodes, *chain.from_iterable(by_member.values())], dtype=int))
         return sparse.vstack(pieces, format="csr")[(count * back[:, None] + np.arange(count)).ravel()]
 
     @cached_property
