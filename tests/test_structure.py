@@ -168,3 +168,18 @@ def test_complex_numbers_without_imaginary_parts_are_real():
     assert fb.Scene(found).reduce(modes=1).omega == pytest.approx([2.0])
     with pytest.raises(ValueError, match="shapes must be real; its largest imaginary part is, got 1"):
         fb.Structure.of_modes([10.0], [[1.0 + 1.0j]], [("a", "x")])
+
+
+@pytest.mark.parametrize("given", ["matrices", "modes"])
+def test_rows_of_many_places_are_made_at_once(given, monkeypatch):
+    """One after another those of 32 000 places took nine tenths of the time of `reduce`."""
+    labels = [(1, "y"), (1, "x"), (2, "z"), (5, "x")]
+    if given == "modes":
+        body = fb.Structure.of_modes([30.0, 190.0], np.arange(8.0).reshape(4, 2), labels, {"y": [1.2, 0.7]})
+    else:
+        body = fb.Structure(np.eye(4), np.eye(4), labels=labels, points={"tip": 5})
+    last = 5 if given == "modes" else "tip"
+    one_by_one = np.vstack([body.rows(place).toarray() for place in (2, last, 1)])
+    made = body.assembled()
+    monkeypatch.setattr(sparse, "vstack", None)
+    assert np.array_equal(made.rows_of([2, last, 1]).toarray(), one_by_one)

@@ -14,7 +14,7 @@ from scipy import sparse
 
 from fembeam.structures.assembled import COMPONENTS, Assembled
 from fembeam.structures.checks import Label, labelled, placed, real
-from fembeam.structures.named_body import NamedBody, checked_edges
+from fembeam.structures.named_body import NamedBody, NamedMatrices, checked_edges
 from fembeam.support import require
 
 Vector = NDArray[np.float64]
@@ -96,9 +96,9 @@ class GivenModes(NamedBody):
     def __repr__(self) -> str:
         return f"<structure of {len(self.omega)} given modes at {len(self.dofs)} nodes, {self.digest}>"
 
-    def rows(self, place: Any) -> sparse.csr_matrix:
-        """A row (c, n) for each of the components: the modes' values there."""
-        return sparse.csr_matrix(super().rows(place) @ self.shapes)
+    def rows_of(self, places: Sequence[Any]) -> sparse.csr_matrix:
+        """A row (c, n) for each of the components of places: the modes' values there."""
+        return sparse.csr_matrix(super().rows_of(places) @ self.shapes)
 
     def check(self) -> list[str]:
         """What the modes say, in sentences with numbers: frequencies, effective masses."""
@@ -117,11 +117,12 @@ class GivenModes(NamedBody):
         n = len(self.omega)
         along = [c for c in COMPONENTS[:3] if c in self.participation]
         moved = np.array([self.participation[c] for c in along]).reshape(len(along), n).T
-        return Assembled(
+        return NamedMatrices(
             *(sparse.eye(n, format="csr"), sparse.diags(self.omega**2).tocsr()),
             tuple((i, "mode") for i in range(n)),
             self.rows,
             moved,
             root=sparse.diags(self.omega).tocsr(),
             accuracy=f"{n} modes as they were given",
+            body=self,
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from fembeam.structures.assembled import COMPONENTS
+from fembeam.structures.assembled import COMPONENTS, Assembled
 from fembeam.structures.checks import Label
 from fembeam.structures.directions import nearest
 from fembeam.support import require
@@ -83,11 +83,28 @@ class NamedBody:
 
     def rows(self, place: Any) -> sparse.csr_matrix:
         """A row (c, N) for each of the components, of zeros for those the place has not."""
-        self.check_place(place, "rows")
-        mine, size = self.dofs[self.node(place)], len(self.labels)
-        pairs = np.array([(i, mine[component]) for i, component in enumerate(self.components) if component in mine])
-        i, j = pairs.reshape(-1, 2).astype(int).T
-        return sparse.csr_matrix((np.ones(len(pairs)), (i, j)), shape=(len(self.components), size))
+        return self.rows_of([place])
+
+    def rows_of(self, places: Sequence[Any]) -> sparse.csr_matrix:
+        """The same of several places, one below the other."""
+        pairs, count = [], len(self.components)
+        for first, place in zip(range(0, count * len(places), count), places, strict=True):
+            self.check_place(place, "rows")
+            mine = self.dofs[self.node(place)]
+            pairs += [(first + i, mine[name]) for i, name in enumerate(self.components) if name in mine]
+        i, j = np.array(pairs, dtype=int).reshape(-1, 2).T
+        return sparse.csr_matrix((np.ones(len(pairs)), (i, j)), shape=(count * len(places), len(self.labels)))
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class NamedMatrices(Assembled):
+    """Matrices of a body whose dofs are named, and that body."""
+
+    body: NamedBody
+
+    def rows_of(self, places: Sequence[Any]) -> sparse.csr_matrix:
+        """`rows` of several places, one below the other, all at once."""
+        return self.body.rows_of(places)
 
 
 def checked_edges(lines: Iterable[Sequence[Any]], nodes: dict[Hashable, Vector], where: str) -> tuple[Any, ...]:

@@ -18,7 +18,7 @@ from fembeam.structures.assembled import COMPONENTS, Assembled
 from fembeam.structures.checks import Label, labelled, matrix, placed, positive_mass, sentences, symmetric
 from fembeam.structures.massless import following
 from fembeam.structures.modes_given import GivenModes
-from fembeam.structures.named_body import NamedBody, checked_edges
+from fembeam.structures.named_body import NamedBody, NamedMatrices, checked_edges
 from fembeam.structures.readers import structure_arguments
 from fembeam.structures.readers.reading import Source
 from fembeam.structures.scale import Scale
@@ -277,12 +277,13 @@ class Structure(NamedBody):
                 "Scene.matrices", "ask for modes, or modes='all'")  # fmt: skip
         along = [c for c in COMPONENTS[:3] if c in self.components]
         moved = np.array([[float(component == c) for c in along] for _, component in self.labels])
-        return Assembled(
+        return NamedMatrices(
             *(self.M, self.K, self.labels, self.rows, moved.reshape(len(self.labels), len(along))),
             root=self.root,
             C=self.C,
             moved=self.moved,
             accuracy=f"{len(self.labels)} dofs as they were given",
+            body=self,
         )
 
 
