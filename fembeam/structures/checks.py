@@ -12,7 +12,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from fembeam.structures.assembled import COMPONENTS
 from fembeam.structures.directions import nearest
-from fembeam.support import require
+from fembeam.support import is_finite, require
 
 if TYPE_CHECKING:
     from fembeam.structures.structure import Structure
@@ -132,11 +132,14 @@ def placed(
     """Coordinates (3,) of the nodes, and the node of every point; ValueError for what does not exist."""
     known = list(dict.fromkeys(node for node, _ in labels))
     where_are: dict[Hashable, Vector] = {}
+    for name, named_by in (("nodes", nodes), ("points", points)):
+        require(named_by is None or isinstance(named_by, Mapping), f"{name} must be a dict by name", named_by, where,
+                "write {20: (0.1, 0, 0)} of nodes, {'lever': 20} of points")  # fmt: skip
     for node, given in (nodes or {}).items():
-        at = np.atleast_1d(np.asarray(given, dtype=float))
-        right = at.ndim == 1 and at.size in (2, 3) and bool(np.isfinite(at).all())
+        listed = list(given) if isinstance(given, (Sequence, np.ndarray)) and not isinstance(given, str) else []
+        right = len(listed) in (2, 3) and all(is_finite(x) for x in listed)
         require(right, f"nodes[{node!r}] must be three numbers, or two in the plane", given, where, "give m")
-        where_are[node] = np.append(at, np.zeros(3 - at.size))
+        where_are[node] = np.append(np.array(listed, dtype=float), np.zeros(3 - len(listed)))
     named: dict[str, Hashable] = {}
     for name, node in (points or {}).items():
         require(isinstance(name, str) and bool(name), "a point must have a name", name, where, "write {'lever': 88}")
