@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from frames import PORTAL, SPACE_L, frequencies, portal, static
+from structures import ELEMENTS, beam_labels, beam_matrices
 
 import fembeam as fb
 from fembeam.structures import JoinedBodies, Joint, Structure
@@ -104,3 +105,15 @@ def test_a_superelement_held_by_its_own_stiffness_is_loaded_as_it_is_moved():
                 np.testing.assert_allclose(runs[1].displacement(5, c), exact, atol=1e-8 * np.ptp(exact))
                 exact = runs[0].reactions()[0][c]
                 np.testing.assert_allclose(runs[1].reactions()[0][c], exact, atol=1e-8 * np.ptp(exact))
+
+
+def test_a_superelement_keeps_dofs_without_mass_of_its_nodes():
+    """A clamped beam of two halves whose rotations have no mass is joined in these too, as it is without reduction."""
+    K, M = beam_matrices()
+    half = Structure(K, np.diag(np.diag(M) * np.tile([1.0, 0.0], ELEMENTS + 1)), labels=beam_labels())
+    joints = [fb.Joint(ELEMENTS, to=(1, 0))]
+    exact, found = (
+        fb.Scene(half, [fb.Clamped(0)], bodies=[fb.Scene(other)], joints=joints).reduce(4).omega
+        for other in (half, half.reduced([0, ELEMENTS], modes=4))
+    )
+    np.testing.assert_allclose(found, exact, rtol=3e-4)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,10 @@ from scipy.sparse import linalg as sparse_linalg
 SINGULAR = 1e-10  # of K₀₀ scaled to a unit diagonal: a pivot below it is a dof that nothing holds
 
 
-def following(M: Any, K: Any, names: Sequence[Any], where: str) -> sparse.csr_matrix | None:
-    """T (N, n) with u = T u₁ of the dofs u₁ that have mass; None if all have.
+def following(M: Any, K: Any, names: Sequence[Any], where: str, kept: Collection[int] = ()) -> sparse.csr_matrix | None:
+    """T (N, n) with u = T u₁ of the dofs u₁ that have mass or are ``kept``; None if these are all.
 
-    Exact for loads on dofs with mass: without inertia K₀₁ u₁ + K₀₀ u₀ = 0.
+    Exact for loads on these: without inertia K₀₁ u₁ + K₀₀ u₀ = 0.
 
     Raises
     ------
@@ -32,7 +32,9 @@ def following(M: Any, K: Any, names: Sequence[Any], where: str) -> sparse.csr_ma
     [[0.5], [1.0]]
     """
     M, K = sparse.csr_matrix(M), sparse.csr_matrix(K)
-    bare, heavy = np.flatnonzero(M.diagonal() == 0), np.flatnonzero(M.diagonal() != 0)
+    stay = M.diagonal() != 0
+    stay[list(kept)] = True
+    bare, heavy = np.flatnonzero(~stay), np.flatnonzero(stay)
     if not bare.size:
         return None
     inner = K[bare][:, bare].tocsc()

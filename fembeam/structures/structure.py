@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -133,12 +133,13 @@ class Structure(NamedBody):
         """What the matrices say, in sentences with numbers: rigid motions, mass, dofs without mass, frequencies."""
         return list(sentences(self))
 
-    def condensed(self) -> Structure:
-        """The same without its massless dofs, which follow the others statically; their names are gone."""
-        T = following(self.M, self.K, self.labels, "Structure.condensed")
+    def condensed(self, but: Collection[Hashable] = ()) -> Structure:
+        """The same without its massless dofs, which follow the others statically, ``but`` those of some nodes."""
+        stay = (self.M.diagonal() != 0) | np.array([node in but for node, _ in self.labels])
+        T = following(self.M, self.K, self.labels, "Structure.condensed", np.flatnonzero(stay).tolist())
         if T is None:
             return self
-        kept = [label for label, bare in zip(self.labels, self.M.diagonal() == 0, strict=True) if not bare]
+        kept = [label for label, stays in zip(self.labels, stay, strict=True) if stays]
         C = None if self.C is None else T.T @ self.C @ T
         points = {name: node for name, node in self.points.items() if node in {one for one, _ in kept}}
         found = Structure(T.T @ self.K @ T, T.T @ self.M @ T, C, kept, self.nodes, points)
@@ -177,7 +178,8 @@ class Structure(NamedBody):
 
         Returns
         -------
-        Structure : with dofs of these nodes, then ("mode 1", "mode"), …; used as often as wanted, turned too.
+        Structure : with all dofs of these nodes, then ("mode 1", "mode"), …; used as often as wanted, turned too. Those
+            without mass elsewhere follow statically.
 
         Raises
         ------
@@ -196,8 +198,9 @@ class Structure(NamedBody):
         """
         from fembeam.structures.superelement import reduced
 
-        own = self.condensed()
-        return reduced(own, own.assembled(), [self.node(node) for node in nodes], modes, "Structure.reduced")
+        listed = [self.node(node) for node in nodes]
+        own = self.condensed(listed)
+        return reduced(own, own.assembled(), listed, modes, "Structure.reduced")
 
     @staticmethod
     def read(
