@@ -140,6 +140,7 @@ def test_section_forces_of_a_file(tmp_path):
 
 @pytest.mark.parametrize(("old", "new", "says"), [
     ('["C", "x"]', '["C", "x"], "E"', "places; use one of the names"),
+    ('["C", "x"]', '["C", "q"]', "direction must be one of x, y, z, rx, ry, rz, or a vector, got 'q' in places, 'C'"),
     ('["C", "x"]', '["C", "x"], "B"', r"must be asked for on a member of a frame, got 'C' in places"),
     ('places = [["B-C", 1.5], ["C", "x"]]', "", r"section forces need places, got \['moment'\] in simulate"),
     ('"moment"', '"slope"', "slope is of a Beam"),

@@ -66,7 +66,7 @@ from fembeam.study.smallest_model import MOST, SmallestModel, check_goal, smalle
 from fembeam.study.stationary import FEWEST_IN_SEGMENT
 from fembeam.study.trial import Trial
 from fembeam.study.variation import points_of
-from fembeam.support import Part, changes, require, require_non_negative, require_positive
+from fembeam.support import Part, changes, is_numbered, is_pair, require, require_non_negative, require_positive
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -277,6 +277,9 @@ class Simulate:
 
 def check_named(body: Any, places: Sequence[Any] | None, quantities: Sequence[str]) -> None:
     """Raise ValueError for outputs of a frame or structure that it does not have."""
+    for at in places or ():
+        if is_pair(at) and not is_numbered(at) and isinstance(at[1], str):
+            direction_of(at[1], f"places, {quoted(at[0])}")  # another text is none
     own = [at[0] if is_directed(at) else at for at in places or ()]
     for at in own:
         body.check_place(at, "places")
