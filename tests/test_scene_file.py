@@ -219,6 +219,11 @@ def test_solvers_by_name(file_of):
         ("mass = 25.4e-3", "", r"\[\[masses\]\] number 1: the key 'mass' is missing"),
         ("mass = 25.4e-3", 'mass = "25"', r"\[\[masses\]\] number 1: mass must be a number, got '25'"),
         ("mass = 25.4e-3", "mass = true", r"mass must be a number, got true"),
+        (
+            "inertia = 3.0e-6",
+            "inertia = [0.1, 0.2]",
+            r"list of 3 numbers or a list of lists of numbers",
+        ),
         ("mass = 25.4e-3", "mass = nan", r"\[\[masses\]\] number 1: mass must be finite"),
         ("stiffness =", "stifness =", r"\[\[stops\]\] number 1 law: unknown key 'stifness'; did you mean 'stiffness'"),
         ('"lankarani_nikravesh"', '"hysteretc"', r"law: kind must be one of .*did you mean 'hysteretic'"),

@@ -102,7 +102,8 @@ def _words(hint: Any) -> list[str]:
         return [f"a list of {', '.join(map(repr, get_args(entry)))}"]
     if str in options(entry) and float not in options(entry):
         return [f"a list of {number}names" + (" or vectors" if len(options(entry)) > 1 else "")]
-    return [] if entry is None else [f"a list of {number}{'whole ' if entry is int else ''}numbers"]
+    kind = "lists of " if entries_of(entry)[0] is not None else "whole " if entry is int else ""
+    return [] if entry is None else [f"a list of {number}{kind}numbers"]
 
 
 def converted(value: Any, hint: Any) -> Any:
