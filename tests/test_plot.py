@@ -383,6 +383,13 @@ def test_random_figures_have_units_bands_and_confidence():
     figure = plot.random_densities({"δ": signal, "mid": signal})
     for word in ("probability density / mm⁻¹", "δ / mm", "Gaussian", "skewness", " ± "):
         assert word in texts(figure)
+    figure = plot.random_densities(
+        {f"δ of annular stop at A-B + {z} m of body 1, (0.1521, -0.9884, 0)": signal for z in "12"}
+    )
+    figure.draw_without_rendering()
+    left, right = (axis.get_tightbbox().x1 for axis in figure.axes)
+    assert left < figure.axes[1].get_window_extent().x0
+    assert right < figure.bbox.x1
 
 
 def test_figures_of_laws():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from fembeam.statistics import Estimate, Signal
 
 FURTHEST = 5.0  # standard deviations shown of a density
+WIDTH = 44  # characters of a line over a density
 ROOM = 1.3  # of the highest density, the height of its axis, so that the legend has room
 
 
@@ -104,14 +106,19 @@ def density_panels(axes: Sequence[Axes], signals: Mapping[str, Signal]) -> None:
         wide = mean + std * np.linspace(-FURTHEST, FURTHEST, 301)
         normal = np.exp(-0.5 * ((wide - mean) / std) ** 2) / (std * np.sqrt(2 * np.pi))
         axis.plot(wide, normal, color=RED, linestyle="--", label="Gaussian")
-        axis.set_title(f"{verbatim(name)}: skewness {_rounded(signal.skewness)},\nkurtosis {_rounded(signal.kurtosis)}")
-        axis.set(
-            xlabel=f"{verbatim(name)} / {unit}", xlim=(wide[0], wide[-1]), ylim=(0, ROOM * max(p.max(), normal.max()))
-        )
+        shape = f"skewness\xa0{_rounded(signal.skewness)}", f"kurtosis {_rounded(signal.kurtosis)}"
+        axis.set_title(",\n".join((_filled(f"{name}: {shape[0]}"), shape[1])))
+        axis.set_xlabel(_filled(f"{name}\xa0/\xa0{unit}"))
+        axis.set(xlim=(wide[0], wide[-1]), ylim=(0, ROOM * max(p.max(), normal.max())))
         if unit != said:
             axis.set_ylabel(f"probability density / {unit}⁻¹")
         said = unit
     axes[0].legend(loc="upper left", fontsize=8)
+
+
+def _filled(text: str) -> str:
+    """A text over or below a density, on several lines where it is longer than the density is wide."""
+    return verbatim(textwrap.fill(text, WIDTH, break_on_hyphens=False).replace("\xa0", " "))
 
 
 def _rounded(found: Estimate) -> str:
