@@ -167,6 +167,18 @@ def test_flat_frames_in_space_have_axes_whose_numbers_do_not_meet():
         assert len(axis.get_zticks()) <= 4
 
 
+@pytest.mark.parametrize("end", [(0.0, 0.0, 1.0), (1.0, 1.0, 1.0), (0.0, 1.0, 1.0)])
+def test_names_of_the_axes_of_a_rig_in_space_are_inside(end):
+    """Those of an upright shaft were cut off below."""
+    frame = fb.Frame.polyline({"A": (0.0, 0.0, 0.0), "B": end}, fb.Section.circle(2.1e11, 7850.0, 0.04))
+    figure = fb.Scene(frame, [fb.Clamped("A")], masses=[fb.LumpedMass("B", 1.0)]).figure()
+    figure.draw_without_rendering()
+    (axis,) = figure.axes
+    for one in (axis.xaxis, axis.yaxis, axis.zaxis):
+        assert figure.bbox.containsx(one.label.get_window_extent().x1)
+        assert figure.bbox.containsy(one.label.get_window_extent().y0)
+
+
 def test_each_curve_of_a_spectrum_has_its_own_colour(plane):
     """Base motions along two directions stand above, beside δ; below is another place alone."""
     noise = {c: fb.BandNoise(1e-3, (5.0, 60.0), seed=i) for i, c in enumerate("xy")}
