@@ -15,7 +15,7 @@ from numba import njit
 
 import fembeam as fb
 from contacts import law
-from fembeam.study.execution.fingerprint import fingerprint
+from fembeam.support.fingerprint import fingerprint
 
 
 def made(text, name="f", **names):
@@ -221,7 +221,7 @@ def test_a_module_used_as_a_whole_is_told_by_all_it_holds(tmp_path, monkeypatch)
 
 SCRIPT = """
 import numpy as np, functools
-from fembeam.study.execution.fingerprint import fingerprint
+from fembeam.support.fingerprint import fingerprint
 from contacts import Hertz
 words, table = {"a", "b", "c"}, {"x": np.arange(5.0), 2: {"p", "q"}}
 class C:

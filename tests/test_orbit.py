@@ -12,7 +12,7 @@ from problems import TIP, paper_scene
 
 import fembeam as fb
 import solvers
-from contacts import Hysteretic
+from contacts import Hysteretic, law
 from fembeam.cli import commands as cli
 from fembeam.model import extremes_of
 from fembeam.model.equations import common_period
@@ -60,6 +60,22 @@ def test_an_unstable_orbit_beside_a_stable_subharmonic_from_nothing():
     assert orbit.found.period == pytest.approx(2.0 * math.pi / 430.0)
     later, method = delayed(orbit.found.system, orbit.found.phase), solvers.DormandPrince(rtol=1e-12, atol=1e-18)
     np.testing.assert_allclose(end_of(later, orbit.found.period, method)(orbit.state), orbit.state, rtol=1e-7)
+
+
+def test_a_branch_is_not_continued_under_a_law_with_other_code(tmp_path):
+    def with_law(factor):
+        @law
+        def spring(delta, delta_dot, entry_rate, stiffness):
+            return factor * stiffness * delta
+
+        scene = paper_scene()
+        return replace(scene, stops=[replace(scene.stops[0], law=spring(stiffness=1e5))]).reduce(1)
+
+    next(iter(branch := with_law(1.0).branch("omega", (190.0, 200.0), at=195.0)))
+    branch.save(tmp_path / "b.npz")
+    assert len(with_law(1.0).resume(tmp_path / "b.npz").parameter) == 1
+    with pytest.raises(ValueError, match="belongs to another scene: a law, a signal or fembeam itself has other code"):
+        with_law(3.0).resume(tmp_path / "b.npz")
 
 
 def test_branch_marks_the_flip_and_its_copy_from_a_file_is_the_same(model, tmp_path):

@@ -15,7 +15,7 @@ import fembeam as fb
 from fembeam import plot, study
 from fembeam.cli import main
 from fembeam.scene_file import json_schema, read
-from fembeam.study.execution.fingerprint import fingerprint
+from fembeam.support.fingerprint import fingerprint
 
 FILE = """
 [structure]

@@ -18,6 +18,7 @@ from fembeam.model.equations import load_period
 from fembeam.model.orbit import Orbit, checked_period, orbit
 from fembeam.scene import changes_structure, path_of, replaced, value_of
 from fembeam.support import Part, Printed, changes, counting, note, numbers, require, write_rows, written_whole
+from fembeam.support.fingerprint import fingerprint
 from solvers.branches import recorded, restarted
 from solvers.problem import counted, dataframe
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
     from fembeam.model.model import Model
 
 Vector = NDArray[np.float64]
-RECORDED = {"name", "period", "scene", "modes", "omega", "walks"}  # of a saved branch
+RECORDED = {"name", "period", "scene", "digest", "modes", "omega", "walks"}  # of a saved branch
 SAME = 1e-9  # relative: frequencies of one model, made again
 
 
@@ -172,7 +173,8 @@ class Branch(Printed):
         """Write all that is known as .npz, enough to go on as if it had not been saved; whole or not at all."""
         model = self.family.model
         record = {
-            **{"name": self.family.name, "period": self.family.period, "scene": repr(model.scene)},
+            **{"name": self.family.name, "period": self.family.period},
+            **{"scene": repr(model.scene), "digest": fingerprint(model.scene, "the scene")},
             **{"modes": list(model.modes), "omega": model.omega.tolist(), "walks": recorded(self.found)},
         }
         with written_whole(Path(path)) as file:
@@ -219,6 +221,8 @@ def resumed(model: Model, path: str | Path) -> Branch:
     same = omega.shape == model.omega.shape and bool(np.allclose(omega, model.omega, rtol=SAME, atol=0.0))
     if not same and not any(differing):
         differing = [f"the frequencies, {omega} there and {model.omega} here in rad/s, of another mesh"]
+    if record["digest"] != fingerprint(model.scene, "the scene") and not any(differing):
+        differing = ["a law, a signal or fembeam itself has other code, or reads other values, than there"]
     if said := "; ".join(filter(None, differing)):
         raise ValueError(f"{path} belongs to another scene: {said}; set it back, delete the file to begin anew, "
                          "or choose another place")  # fmt: skip

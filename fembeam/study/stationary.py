@@ -33,10 +33,10 @@ from fembeam.statistics import Batches, Estimate, Impacts, Signal
 from fembeam.statistics.initial_transient import Settling, settling
 from fembeam.statistics.spectra import FEWEST_OF_SLOW, FINEST_RESOLUTION
 from fembeam.study.execution.checkpoint import Checkpoint, model_identity
-from fembeam.study.execution.fingerprint import fingerprint
 from fembeam.study.result import Result
 from fembeam.study.segments import FEWEST_SAMPLES, SHORTEST, Segment, Segments
 from fembeam.support import Part, bar, is_whole, note, number, numbers, require
+from fembeam.support.fingerprint import fingerprint
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -1,4 +1,4 @@
-"""What all of fembeam needs: checks of arguments, whole files, progress, signals of the system.
+"""What all of fembeam needs: checks of arguments, whole files, progress, signals of the system, digests of values.
 
 Imports nothing of ours.
 """

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from fembeam.model import Model
 from fembeam.scene import Scene
-from fembeam.study.execution.fingerprint import fingerprint
 from fembeam.study.realisations import renewed
 from fembeam.support import changes, require, written_whole
+from fembeam.support.fingerprint import fingerprint
 
 FORMAT = 2
 Values = dict[str, NDArray[Any]]
