@@ -389,6 +389,15 @@ law = { kind = "hertz", stiffness = 1e7 }
             "tolerance = 0.5",
             r"tolerance must lie in \(0, 0.1\), got 0.5",
         ),
+        (
+            "[minimise]\nparameters = { 'stops[0].gap' = [1e-3, 2e-3] }\nquantity = 'rms'\nduration = 1\ndt = 1e-3\n"
+            "constraints = { peak_force = nan }",
+            "the bound of peak_force must be a finite number",
+        ),
+        (
+            "[basins]\nx_span = [0.0, 1.0]\ny_span = [0.0, 1.0]\nx = 'displacment'",
+            "x must be 'displacement', 'velocity' or the number of a state, got 'displacment'",
+        ),
     ],
 )
 def test_wrong_values_of_studies_are_said_before_anything_is_computed(file_of, table, message):

@@ -57,7 +57,7 @@ from fembeam.study.backbone import check_backbone
 from fembeam.study.basins import checked_points
 from fembeam.study.campbell import check_modes
 from fembeam.study.measure import Plan
-from fembeam.study.minimum import box_of, check_search
+from fembeam.study.minimum import box_of, check_search, limits_of
 from fembeam.study.mode_count import ModeCount, checked_counts, mode_count
 from fembeam.study.peak import check_peak
 from fembeam.study.quantities import Quantity, named
@@ -66,7 +66,16 @@ from fembeam.study.smallest_model import MOST, SmallestModel, check_goal, smalle
 from fembeam.study.stationary import FEWEST_IN_SEGMENT
 from fembeam.study.trial import Trial
 from fembeam.study.variation import points_of
-from fembeam.support import Part, changes, is_numbered, is_pair, require, require_non_negative, require_positive
+from fembeam.support import (
+    Part,
+    changes,
+    is_numbered,
+    is_pair,
+    is_whole,
+    require,
+    require_non_negative,
+    require_positive,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -494,6 +503,10 @@ class BasinsTable:
         for name, span in (("x_span", self.x_span), ("y_span", self.y_span)):
             right = len(span) == 2 and -np.inf < span[0] < span[1] < np.inf
             require(right, f"{name} must be two finite values, ascending", span, "[basins]", "give [lowest, highest]")
+        for name, axis in (("x", self.x), ("y", self.y)):
+            known = is_whole(axis) or axis in ("displacement", "velocity")
+            require(known, f"{name} must be 'displacement', 'velocity' or the number of a state", axis, "[basins]",
+                    "q first, then its rates")  # fmt: skip
         for name in ("settle", "longest", "threads"):
             require(getattr(self, name) > 0, f"{name} must be above 0", getattr(self, name), "[basins]", "give a count")
 
@@ -741,6 +754,7 @@ class MinimiseTable:
         """Raise ValueError when the scene cannot be varied like this."""
         ends = box_of(self.parameters).T
         check_search(self.tolerance, self.most, len(self.parameters))
+        limits_of(self.constraints or {})
         _check_trials(self, scene, list(self.parameters), [self.quantity, *(self.constraints or {})], ends)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Minimum:

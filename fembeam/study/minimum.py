@@ -182,7 +182,7 @@ def minimise(
     >>> found.active
     ('damping.zeta[0]',)
     """
-    box, limits = box_of(parameters), _limits(constraints or {})
+    box, limits = box_of(parameters), limits_of(constraints or {})
     check_search(tolerance, most, len(box))
     looks = LOOKS * len(box)
     plan = Plan(duration, dt, discard, seeds, start, solver)
@@ -218,7 +218,7 @@ def box_of(parameters: Mapping[str, Any]) -> Vector:
     return np.array([list(ends) for ends in parameters.values()], dtype=float)
 
 
-def _limits(constraints: Mapping[Any, float]) -> list[tuple[Quantity, float]]:
+def limits_of(constraints: Mapping[Any, float]) -> list[tuple[Quantity, float]]:
     """Constrained quantities with their bounds, checked."""
     right = isinstance(constraints, Mapping)
     require(right, "constraints must be {quantity: bound}", constraints, WHERE, "e.g. {'peak_force': 100.0}")
