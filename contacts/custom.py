@@ -263,7 +263,7 @@ def _warn_of_sticking(made: CustomLaw) -> None:
         where = int(np.argmax(jump))
         warnings.warn(
             f"force of law {made.name!r} jumps by {jump[where]:.6g} N with the sign of the rate at delta = "
-            f"{_PROBES[where]:g} m: where a place sticks by that a run takes forever; write a contacts.memory_law",
+            f"{_PROBES[where]:g} m: where a place sticks by that a run ends as stalled; write a contacts.memory_law",
             stacklevel=4,
         )
 

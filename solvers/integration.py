@@ -46,6 +46,7 @@ from solvers.problem.whole_runs import must_be_whole, whole_runs
 
 _SAMPLES = 64  # of a run that is made again for its balance
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
+_IDLE, _MOST_IDLE = 1e-7, 50  # part of the duration that such a block must pass; blocks that may not, one after another
 _MOST_KEPT = 1 << 22  # bytes of sampled signals that are kept for other runs: of longer ones the run takes the time
 _NOTHING = np.empty(0)  # latched by a law without memory
 
@@ -301,13 +302,18 @@ class _Run:
 
     def to_the_end(self, progress: Callable[[float], None] | None) -> Status:
         """Block after block until done, failed or interrupted."""
-        code = RUNNING
+        code, passed, idle = RUNNING, 0.0, 0
         try:
             self.engine.start()
             while code in (RUNNING, LOG_FULL):
                 if code == LOG_FULL:
                     self.engine.record(log=np.concatenate((self.state.log, np.empty_like(self.state.log))))
                 code = self.engine.march(BLOCK_STEPS)
+                if code == RUNNING:
+                    idle = idle + 1 if self.time - passed < _IDLE * self.engine.duration else 0
+                    if idle > _MOST_IDLE:
+                        return Status.STALLED
+                    passed = self.time
                 if self.tangent:
                     self.tangent.follow()
                 if progress:

@@ -5,6 +5,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from oscillators import Tone
 from problems import (
     HertzBounce,
     as_sparse,
@@ -19,7 +20,7 @@ from refusals import refused
 
 import fembeam as fb
 import solvers
-from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear
+from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from solvers import (
     RK4,
     CentralDifference,
@@ -32,6 +33,7 @@ from solvers import (
     Status,
     System,
     integrate,
+    integration,
 )
 
 METHODS = [RK4, CentralDifference, Newmark, GeneralizedAlpha]
@@ -375,3 +377,21 @@ def test_more_switches_at_one_instant_than_a_law_can_mean_stop_the_run(method):
     assert run.status is Status.CHATTER
     assert run.t[-1] == 0.0
     assert run.cost.events > 100
+
+
+def test_a_run_that_sticks_by_a_jump_that_its_law_does_not_declare_ends_as_stalled(monkeypatch):
+    """A constant force presses a mass on a dry surface, which it then does not leave."""
+
+    @law
+    def rough(delta, delta_dot, entry_rate, stiffness):
+        return stiffness * delta * (1.0 + 0.3 * np.sign(delta_dot))
+
+    monkeypatch.setattr(integration, "_MOST_IDLE", 2)
+    with pytest.warns(UserWarning, match="with the sign of the rate"):
+        stop = Contact([1.0], rough(stiffness=1e5), 1e-4)
+    system = System.modal([100.0], 0.02, [stop], [([-1.0], Tone(30.0, 0.0))])
+    run = integrate(system, [0.0], [0.0], 2.0, check=False)
+    assert run.status is Status.STALLED
+    assert 0.0 < run.t[-1] < 0.1
+    assert len(run.contacts) == 1
+    assert run.cost.steps <= 4 * integration.BLOCK_STEPS

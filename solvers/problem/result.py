@@ -51,6 +51,11 @@ class Status(Enum):
         "use a larger stiffness of Friction, or a smaller mu"
     )
 
+    STALLED = (
+        "hardly any progress in time: a law may jump where it does not say so, such as with the sign of the rate; "
+        "use a law with memory, or Friction"
+    )
+
     @property
     def good(self) -> bool:
         """Whether the result is what was asked for."""
