@@ -575,17 +575,23 @@ def test_an_element_with_memory_is_replayed():
     assert simpson(force * run.velocity(1.0), x=run.t) == pytest.approx(run.energy.contact[-1], rel=1e-3)
     assert run.force(mean=True)[1:-1] == pytest.approx(force[1:-1], abs=0.02)
     assert d[0] == pytest.approx(-0.15, rel=1e-9)
-    with pytest.raises(reduction.AccuracyError, match=r"element at z = 1.0 m slips or yields before equilibrium"):
+    with pytest.raises(reduction.AccuracyError, match=r"element at 1 m slips or yields before equilibrium"):
         model.equilibrium({1.0: -2.0})
 
 
 def test_what_yields_before_equilibrium_is_named():
     law, clamp = WaltonBraun(200.0, 900.0), [fb.Clamped(0.0)]
-    with pytest.raises(reduction.AccuracyError, match=r"the stop at z = 1.0 m is touched before equilibrium"):
+    with pytest.raises(reduction.AccuracyError, match=r"^stop at 1 m, below is touched before equilibrium"):
         beam(clamp, stops=[fb.Stop(1.0, law, gap=-0.1)]).reduce(2).equilibrium()
     striker = fb.Impactor(0.5, 1.0, 0.0, law, gap=-0.1, stiffness=10.0)
-    with pytest.raises(reduction.AccuracyError, match=r"the impactor at z = 0.5 m is touched before equilibrium"):
+    with pytest.raises(reduction.AccuracyError, match=r"^impactor at 0.5 m, above is touched before equilibrium"):
         beam(clamp, impactors=[striker]).reduce(2).equilibrium()
+    valve = fb.Structure([[900.0]], [[1.0]], labels=[("lever", "x")])
+    model = fb.Scene(valve, stops=[fb.Stop("lever", law, gap=-0.1, direction="x")]).reduce("all")
+    with pytest.raises(reduction.AccuracyError, match=r"^stop at lever, x is touched before equilibrium"):
+        model.equilibrium()
+    with pytest.raises(ValueError, match=r"^force at lever, x must be finite"):
+        model.equilibrium({("lever", "x"): np.nan})
 
 
 def test_a_stop_with_memory_is_replayed():

@@ -16,7 +16,16 @@ from scipy.sparse import linalg as sparse_linalg
 
 import reduction
 from contacts.path import borders
-from fembeam.scene import BodyMatrices, loads_of_dof, quoted, support_loads, tangent
+from fembeam.scene import (
+    BodyMatrices,
+    directed_words,
+    is_directed,
+    loads_of_dof,
+    place_words,
+    quoted,
+    support_loads,
+    tangent,
+)
 from fembeam.scene.signal_checks import require_array_function
 from fembeam.support import numbers, require, require_finite
 
@@ -172,7 +181,7 @@ def _check_impactors(model: Model, q: Vector) -> None:
                     delta, "Model.state", "widen its gap")  # fmt: skip
 
 
-def equilibrium(model: Model, loads: Mapping[float, float]) -> Vector:
+def equilibrium(model: Model, loads: Mapping[Any, float]) -> Vector:
     """Start from static equilibrium; `Model.equilibrium` explains it."""
     start, n = rest(model), len(model.omega)
     load = model.omega**2 * start[:n] if len(model.following) else np.zeros(n)
@@ -181,7 +190,8 @@ def equilibrium(model: Model, loads: Mapping[float, float]) -> Vector:
     named = isinstance(loads, Mapping)
     require(named, "loads must name their places", loads, "Model.equilibrium", "write {z: force}, in m and N")
     for z, force in loads.items():
-        require_finite(f"force at z = {z} m", force, "Model.equilibrium", "give N, positive up")
+        where = directed_words(z) if is_directed(z) else place_words(z)
+        require_finite(f"force at {where}", force, "Model.equilibrium", "give N, positive up")
         load = load + force * model.phi(z)
     free = np.ones(n, dtype=bool)
     free[n - len(model.matrices.impactors) :] = start[2 * n - len(model.matrices.impactors) :] == 0.0
@@ -280,10 +290,9 @@ def _check_memory(model: Model, delta: Vector) -> None:
     for row, own in zip(model.contact_rows, model.rows_of, strict=True):
         d = delta[own.start]
         if row.remembers and np.any(borders(row.law, np.array([d]), 0.0, row.law.parameters) < 0):
-            kind = "impactor" if row.on[0] == "impactor" else "element" if row.always else "stop"
             way = "is touched" if getattr(row.law, "opens", False) else "slips or yields"
             raise reduction.AccuracyError(
-                f"the {kind} at z = {row.z} m {way} before equilibrium in Model.equilibrium, and where it rests "
+                f"{row.name} {way} before equilibrium in Model.equilibrium, and where it rests "
                 "depends on how it gets there; simulate from rest instead, with damping"
             )
 
