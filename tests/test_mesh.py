@@ -279,6 +279,10 @@ ENDDATA
         ({"first": "INCLUDE 'bar.bdf'"}, "all cards must stand in one file"),
         ({"more": ",GGG,+B\n+B,56"}, "CBAR 1 must have no pin flags and no offsets, got ['56']"),
         ({"more": ",GGG,+B\n+B,,,0.,0.,.1"}, "CBAR 1 must have no pin flags and no offsets, got ['.1']"),
+        ({"more": ",GGG,+B\n$ pins\n+B,56"}, "CBAR 1 must have no pin flags and no offsets, got ['56']"),
+        ({"first": "CBEND,3,1,10,7"}, "cells must be lines, of CBAR, CBEAM, CROD, CTUBE, got {'CBEND': 1}"),
+        ({"first": "=,*(1),="}, "all cards must be written out"),
+        ({"first": "CROD,3,1,10,99"}, "GRID 99 must be defined"),
     ],
 )
 def test_what_is_passed_over_in_nastran_files(tmp_path, parts, said):
@@ -312,9 +316,13 @@ PART = """*Part, name=post
         ({"moved": "0.,0.,2.\n"}, "an instance must not be moved, got '0.,0.,2.'"),
         ({"second": "*Instance, name=two, part=post\n0.,0.,1.\n*End Instance\n"}, "one instance of a part"),
         ({"second": "*NGEN\n1,2,1\n"}, "nodes and elements must stand there as they are, got '*NGEN'"),
-        ({"nodes": "9"}, "it names 9, which is not defined above that"),
-        ({"nodes": "2,100"}, "cannot be read as a mesh: Expected number of data items does not match element type"),
-        ({"kind": "MASS"}, "cannot be read as a mesh: Element type not available: MASS"),
+        ({"nodes": "9"}, "node 9 must be defined, got 'none'"),
+        ({"nodes": "2,100"}, "each element of B31 must have a number and 2 nodes, got '4 numbers'"),
+        ({"kind": "MASS"}, "elements must be beams or trusses, got 'MASS'"),
+        ({"second": "*Node, system=C\n9,0,0,0\n"}, "must stand there as they are, got '*NODE, SYSTEM'"),
+        ({"second": "*Include, input=no.inp\n"}, "*INCLUDE must name another file"),
+        ({"second": "*Include, input=post.inp\n"}, "*INCLUDE must name another file"),
+        ({"second": "*End Assembly\n*Part, name=b\n*Node\n1,0,5,0\n"}, "node 1 must be given once"),
     ],
 )
 def test_what_is_passed_over_in_abaqus_files(tmp_path, parts, said):
@@ -325,3 +333,90 @@ def test_what_is_passed_over_in_abaqus_files(tmp_path, parts, said):
         fb.Frame.from_mesh(path, {"steel": THICK})
     path.write_text(PART.format(**plain))
     assert fb.Frame.from_mesh(path, {"steel": THICK}).nodes["n1"] == (0.0, 0.0, 1.0)
+
+
+GRIDS = """$ nothing but cards
+GRID,1 $ the clamp
+GRID*,50,,.2,0.
+*,0.
+GRID           9          5.0D-1   0.0+0
+grid          12             1.0      0.
+"""
+
+
+@pytest.mark.parametrize(
+    "bar",
+    [
+        "CBAR           3       2       9      12      0.      1.      0.",
+        "cbar           3       2       9      12      0.      1.      0.",
+        "CBAR\t3\t2\t9\t12\t0.\t1.\t0.",
+        "CBAR*                  3               2               9              12\n*        0.",
+        "$\nCBAR*,3,2,9,12\n$\n*,0.,1.,0. $ upright",
+        "CTUBE,3,2,9,12",
+    ],
+)
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_cards_of_nastran_in_all_fields(tmp_path, bar, end):
+    """A bar in large fields or small letters was passed over: the beam was 0.5 m long."""
+    text = "".join((GRIDS, "CBAR,1,1,1,50,0.,1.,0.\nCBAR,2,1,50,9,0.,1.,0.\n", bar, "\nENDDATA\nGRID,1,,9.\n"))
+    (tmp_path / "a.bdf").write_bytes(b"\xef\xbb\xbf" + text.replace("\n", end).encode())
+    beam = fb.Beam.from_mesh(tmp_path / "a.bdf", {1: THICK, 2: THIN})
+    assert (beam.borders, [section for _, section in beam.spans]) == ((0.0, 0.5, 1.0), [THICK, THIN])
+    (tmp_path / "a.bdf").write_text(text.partition("ENDDATA")[0])
+    with pytest.raises(ValueError, match=r"the file must end with ENDDATA, got '(CBAR|CTUBE)'"):
+        fb.Beam.from_mesh(tmp_path / "a.bdf", THIN)
+
+
+LEVELS = """*Part, name=post
+** as CAE writes it
+*Node
+      1,           0.
+  20, 2.0D-1, 0., 0.,
+*Element, type=b31,
+ elset="first span"
+1, 1, 20
+*Node
+3, 0.5, 0.
+4, 1.
+*Element, type=B31, elset=second
+2, 20, 3
+7, 3, 4
+*Elset, elset=Third, generate
+7, 7
+*Elset, elset=ends
+Second,
+*Elset, elset=ENDS
+"first span"
+*Nset, nset=tip
+4,
+*End Part
+*Assembly, name=rig
+*Instance, name=one, part=post
+*End Instance
+*Node
+1, 0.5, 0.5, 0.
+*Nset, nset=reference
+1,
+*Nset, nset=middle, instance=one
+20,
+*Nset, nset=middle
+one.3
+*End Assembly
+*Step
+*Element Output, directions=YES
+S,
+"""
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_parts_and_sets_of_abaqus(tmp_path, end):
+    """Nodes in several blocks, sets of sets, in parts, in ranges; a reference point of the assembly is no place."""
+    (tmp_path / "nodes.inp").write_bytes(LEVELS.replace("\n", end).encode())
+    (tmp_path / "a.inp").write_text("*Heading\n*Include, input=nodes.inp\n")
+    for name in ("nodes.inp", "a.inp"):
+        beam = fb.Beam.from_mesh(tmp_path / name, {"first span": THICK, "second": THIN})
+        assert (beam.borders, [section for _, section in beam.spans]) == ((0.0, 0.2, 1.0), [THICK, THIN])
+        assert beam.places == (("middle", 0.2), ("middle", 0.5), ("tip", 1.0))
+        assert fb.Beam.from_mesh(tmp_path / name, {"ends": THIN}).borders == (0.0, 1.0)
+        with pytest.raises(ValueError, match=r"one section, got \['Third', 'ends'\]"):
+            fb.Beam.from_mesh(tmp_path / name, {"ends": THIN, "Third": THICK})

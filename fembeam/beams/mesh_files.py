@@ -7,7 +7,6 @@ are made anew, as few as the modes need, so that a file's element size changes n
 from __future__ import annotations
 
 import os
-import re
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 
 from fembeam.beams.beam import Beam
 from fembeam.beams.mesh import SHORTEST, divided
-from fembeam.beams.mesh_unread import check_read
+from fembeam.beams.mesh_cards import abaqus_mesh, nastran_mesh
 from fembeam.beams.section import Section, Taper
 from fembeam.support import is_whole, require, written_beside
 
@@ -30,8 +29,7 @@ Vector = NDArray[np.float64]
 Names = list[set[str]]
 
 LINES = ("line", "line3", "line4")  # of higher ones the ends are used
-TWO_NODES = ("B23", "B23H", "B33", "B33H", "B31R")
-ABAQUS = dict.fromkeys(TWO_NODES, "line") | {"B32R": "line3"}  # beams that meshio does not know, or B33 wrongly
+READERS = {".inp": abaqus_mesh, ".bdf": nastran_mesh, ".nas": nastran_mesh, ".fem": nastran_mesh}  # of ours
 WRITERS: dict[str, dict[str, Any]] = {  # suffixes, and what meshio needs to know
     ".msh": {"file_format": "gmsh22", "binary": False},
     ".inp": {},
@@ -52,7 +50,7 @@ def beam_of(
     where = f"{path}"
     mesh = read_mesh(path)
     lines, names = lines_of(mesh, data, sections, where)
-    z = _along(np.asarray(mesh.points, dtype=float), lines, where)
+    z, off = _along(np.asarray(mesh.points, dtype=float), lines, where)
     chain, order = _chained(z, lines, mesh.points, where)
     chosen = chosen_names(sections, [names[i] for i in order], [f"z = {z:.6g} m" for z in chain], where)
     _warn_of_size(chain, where)
@@ -63,7 +61,10 @@ def beam_of(
         spans.append((float(chain[after] - chain[index]), table[name]))
         index = after
     beam = Beam.of_spans(spans, foundation, axial_force)
-    places = [(name, float(np.clip(z[node] - chain[0], 0.0, beam.length))) for name, node in named_nodes(mesh)]
+    on = off <= STRAIGHT * beam.length  # nodes elsewhere, such as reference points, are no places of the beam
+    on &= np.abs(z - (chain[0] + chain[-1]) / 2) <= (0.5 + STRAIGHT) * beam.length
+    named = [(name, node) for name, node in named_nodes(mesh) if on[node]]
+    places = [(name, float(np.clip(z[node] - chain[0], 0.0, beam.length))) for name, node in named]
     return Beam(beam.length, beam.section, beam.spans, foundation, axial_force, tuple(sorted(places)))
 
 
@@ -73,41 +74,33 @@ def read_mesh(path: str | os.PathLike[str]) -> Any:
 
     if not Path(path).is_file():
         raise FileNotFoundError(f"{path} does not exist")
-    check_read(Path(path))
+    if reader := READERS.get(Path(path).suffix.lower()):
+        return reader(Path(path))
     said = StringIO()
     try:
-        with _mended_readers(), redirect_stdout(said):
-            mesh = meshio.read(path)
+        with _mended_reader(), redirect_stdout(said):
+            return meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio raises many kinds, and exits for unknown suffixes
         raise ValueError(f"{path} cannot be read as a mesh: {_reason(error, said.getvalue())}") from error
-    if Path(path).suffix == ".inp":
-        _mend_sets(mesh, Path(path))
-    return mesh
 
 
 def _reason(error: BaseException, said: str) -> str:
     """Why meshio does not read a file: what it raised, or printed before it exits with a number."""
-    if isinstance(error, KeyError):
-        return f"it names {error.args[0]}, which is not defined above that"
     if isinstance(error, SystemExit) and is_whole(error.code):
         return said.strip() or "unknown format"
     return f"{error}" or "unknown format"
 
 
 @contextmanager
-def _mended_readers() -> Iterator[None]:
-    """Lend meshio's readers what they lack, and leave them as they were: other code may read with them."""
-    from meshio.abaqus import _abaqus
+def _mended_reader() -> Iterator[None]:
+    """Lend meshio's reader of gmsh 4.1 what it lacks, and leave it as it was: other code may read with it."""
     from meshio.gmsh import _gmsh41
 
-    known, mesh = dict(_abaqus.abaqus_to_meshio_type), _gmsh41.Mesh
-    _abaqus.abaqus_to_meshio_type.update(ABAQUS)
+    mesh = _gmsh41.Mesh
     _gmsh41.Mesh = _even_mesh
     try:
         yield
     finally:
-        _abaqus.abaqus_to_meshio_type.clear()
-        _abaqus.abaqus_to_meshio_type.update(known)
         _gmsh41.Mesh = mesh
 
 
@@ -117,19 +110,6 @@ def _even_mesh(points: Any, cells: Any, cell_data: Any = None, **rest: Any) -> A
 
     even = {name: data for name, data in (cell_data or {}).items() if len(data) == len(cells)}
     return meshio.Mesh(points, cells, cell_data=even, **rest)
-
-
-def _mend_sets(mesh: Any, path: Path) -> None:
-    """Sets of elements as an Abaqus file has them: of several blocks of one name meshio keeps the last one's size."""
-    heads = [line for line in path.read_text(errors="replace").splitlines() if re.match(r"\*element\b", line, re.I)]
-    named = [re.search(r"elset\s*=\s*([^,\s]+)", line, re.I) for line in heads]
-    none = np.zeros(0, dtype=np.int64)
-    for name, cells in mesh.cell_sets.items():
-        cells += [none] * (len(mesh.cells) - len(cells))  # of blocks that come after the set
-        mine = [found is not None and found[1] == name for found in named]
-        if any(mine) and len(named) == len(mesh.cells):  # else blocks are in other files
-            whole = zip(mine, mesh.cells, cells, strict=True)
-            mesh.cell_sets[name] = [np.arange(len(block)) if all_of_it else own for all_of_it, block, own in whole]
 
 
 def lines_of(mesh: Any, data: str | None, sections: Any, where: str) -> tuple[NDArray[np.int64], Names]:
@@ -199,8 +179,8 @@ def _numbering(mesh: Any) -> str | None:
     return own[0] if len(own) == 1 else None
 
 
-def _along(points: Vector, lines: NDArray[np.int64], where: str) -> Vector:
-    """Coordinates (p,) of all points along the axis of the lines."""
+def _along(points: Vector, lines: NDArray[np.int64], where: str) -> tuple[Vector, Vector]:
+    """Coordinates (p,) of all points along the axis of the lines, and their distances from it."""
     points = points.reshape(len(points), -1)
     used = points[np.unique(lines)]
     size = np.ptp(used, axis=0)
@@ -214,7 +194,7 @@ def _along(points: Vector, lines: NDArray[np.int64], where: str) -> Vector:
     bent = np.unique(lines)[off[np.unique(lines)] > STRAIGHT * length]
     require(not bent.size, "the lines must lie on one straight axis", shown(points[bent[:1]]), where,
             "a node is off it there; bent ones are read by Frame.from_mesh")  # fmt: skip
-    return z
+    return z, off
 
 
 def _chained(z: Vector, lines: NDArray[np.int64], points: Vector, where: str) -> tuple[Vector, NDArray[np.int64]]:

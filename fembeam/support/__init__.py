@@ -3,6 +3,7 @@
 Imports nothing of ours.
 """
 
+from fembeam.support.cards import Block, Card, abaqus_blocks, check_abaqus, nastran_cards, real
 from fembeam.support.changes import changes
 from fembeam.support.checks import (
     frozen,
