@@ -543,3 +543,56 @@ def test_nodes(tmp_path):
     assert read_nodes(written(tmp_path, "c.bdf", usual.replace("3.\n", "3.,0\n"))) == {7: (1.0, 2.0, 3.0)}
     with pytest.raises(ValueError, match=r"line 2: expected node, x, y, z, got '5 a b c'"):
         read_nodes(written(tmp_path, "b.txt", "4 1 2 3\n5 a b c\n"))
+
+
+@pytest.mark.parametrize(
+    "grid",
+    [
+        "GRID*,7,,1.0,2.0\n*,3.0\n",
+        "GRID*                  7                             1.0             2.0\n$ z\n*                    3.0\n",
+        "GRID           7             1.0     2.0     3.0 $ tip\n",
+        "GRID\t7\t\t1.\t2.\t3.\n",
+        "SOL 103\nBEGIN BULK\n$\nGRID,7,,1.,2.,3. $ tip\nENDDATA\n",
+    ],
+)
+def test_grids_in_all_fields(tmp_path, grid):
+    """Of large fields with commas, or with a comment between their lines, z was 0."""
+    assert read_nodes(written(tmp_path, "a.bdf", grid.replace("\n", "\r\n"))) == {7: (1.0, 2.0, 3.0)}
+
+
+ONE = "*NODE\n1, 1.,0.,0.\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "said"),
+    [
+        (
+            "a.bdf",
+            "INCLUDE 'b.bdf'\nGRID,2,,1.,2.,3.\n",
+            "line 1: expected all GRID cards in one file, got INCLUDE 'b.bdf'",
+        ),
+        ("a.bdf", "GRID,2,,1.,2.,3.\nGRID,2,,1.,2.,4.\n", r"line 2: expected node 2 once, got it at \(1.0, 2.0, 3.0\)"),
+        ("a.inp", "*NODE, SYSTEM=C\n1,1.,90.,0.\n", r"got '\*NODE, SYSTEM' in .*line 1"),
+        ("a.inp", "*System\n1.,0.,0.\n" + ONE, r"got '\*SYSTEM' in .*line 1"),
+        ("a.inp", ONE + "*NGEN\n1,5,1\n", r"got '\*NGEN' in .*line 3"),
+        ("a.inp", ONE + "*INSTANCE, NAME=I\n5.,0.,0.\n", "an instance must not be moved, got '5.,0.,0.'"),
+        ("a.inp", ONE + "*PART, NAME=B\n*NODE\n1, 2.,0.,0.\n", "line 5: expected node 1 once"),
+        ("a.inp", ONE + "*INCLUDE, INPUT=none.inp\n", r"\*INCLUDE must name another file, got '.*none.inp'"),
+        ("a.txt", "1 0 0 0\n1 0 0 2\n", "line 2: expected node 1 once"),
+    ],
+)
+def test_nodes_that_would_stand_elsewhere_are_refused(tmp_path, name, text, said):
+    with pytest.raises(ValueError, match=said):
+        read_nodes(written(tmp_path, name, text))
+
+
+def test_nodes_of_tables_and_included_files(tmp_path):
+    written(tmp_path, "nodes.txt", "** only data\n7, 1.0D+0, 2.,\n")
+    text = "*Node, nset=all\n*Include, input=nodes.txt\n*Element, type=B31, input=bars.txt\n*Node print\nU,\n"
+    assert read_nodes(written(tmp_path, "a.inp", text)) == {7: (1.0, 2.0, 0.0)}
+    assert read_nodes(written(tmp_path, "a.txt", "\ufeff7,1,2,3\ntip;0;0;0\n")) == {7: (1, 2, 3), "tip": (0, 0, 0)}
+
+
+def test_dmig_with_tabs_and_comments(tmp_path):
+    text = "DMIG\tK\t0\t6\t2\t0\nDMIG\tK\t3\t1\t\t3\t1\t5. $ a\n$ b\n\t4\t2\t-1.\nDMIG,K,4,2,,4,2,7. $ c\n"
+    check(read_matrices(written(tmp_path, "a.pch", text)), [[5.0, -1.0], [-1.0, 7.0]], ((3, "x"), (4, "y")))

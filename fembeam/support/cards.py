@@ -104,7 +104,7 @@ def abaqus_blocks(path: Path) -> list[Block]:
 
 
 def check_abaqus(blocks: list[Block], tables: tuple[str, ...] = ("NODE",), makers: tuple[str, ...] = ()) -> None:
-    """Raise ValueError for nodes that are generated, in a system of their own, or of instances that are several or moved.
+    """Raise ValueError for nodes that are generated, in a system of their own, or of several or moved instances.
 
     So for ``makers`` of elements, and for ``tables`` whose data are in other files.
     """

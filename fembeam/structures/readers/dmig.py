@@ -14,7 +14,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fembeam.structures.readers.given import SCALAR, Given, Label, assembled, component, numbered, real, wrong
+from fembeam.structures.readers.given import SCALAR, Given, Label, assembled, component, numbered, wrong
+from fembeam.support import real
 
 SQUARE, SYMMETRIC = 1, 6
 
@@ -77,9 +78,10 @@ def read_dmig(path: Path) -> Given:
 def _fields(path: Path) -> Iterator[tuple[int, list[str]]]:
     """(line, fields from the first on) of DMIG cards and of the lines that continue them, whose first field is ''."""
     inside = False
-    for number, line in enumerate(path.read_text(encoding="latin-1").splitlines(), 1):
+    for number, text in enumerate(path.read_text(encoding="latin-1").splitlines(), 1):
+        line = text.split("$")[0].rstrip().expandtabs(8)
         head = line[:8].split(",")[0].strip().upper()
-        if not line.strip() or head.startswith("$"):
+        if not line:
             continue
         inside = head.rstrip("*") == "DMIG" or (inside and head[:1] in ("", "*", "+"))
         if not inside:

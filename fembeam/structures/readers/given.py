@@ -51,15 +51,6 @@ def wrong(path: Path, where: str, expected: str, got: Any) -> ValueError:
     return ValueError(f"{path}, {where}: expected {expected}, got {got}")
 
 
-def real(text: str) -> float:
-    """A number as Fortran writes it: 1.5, 1.5E+3, 1.5D+3, 1.5+3."""
-    text = text.strip().upper().replace("D", "E")
-    sign = max(text.rfind("+"), text.rfind("-"))
-    if sign > 0 and "E" not in text:
-        text = f"{text[:sign]}E{text[sign:]}"
-    return float(text)
-
-
 def component(path: Path, where: str, number: int, node: Any) -> str:
     """The component of a numbered dof; ValueError for what is no displacement and no rotation."""
     if number not in COMPONENT:

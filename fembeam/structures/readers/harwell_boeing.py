@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from fembeam.structures.readers.given import Given, Label, assembled, real, wrong
+from fembeam.structures.readers.given import Given, Label, assembled, wrong
+from fembeam.support import real
 
 FORMAT = re.compile(r"\(\s*(?:\d+P\s*,?)?\s*(\d*)\s*[IEDFG](\d+)(?:\.\d+)?(?:E\d+)?\s*\)", re.IGNORECASE)
 NAMES = {"UX": "x", "UY": "y", "UZ": "z", "ROTX": "rx", "ROTY": "ry", "ROTZ": "rz"}

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from fembeam.structures.readers.given import real, wrong
+from fembeam.structures.readers.given import wrong
 from fembeam.structures.readers.op4 import SHORT, Columns
+from fembeam.support import real
 
 HEAD = re.compile(r"\s*(-?\d+)\s+(-?\d+)\s+(\d+)\s+(\d)(.{0,8})")
 NUMBER = re.compile(r"[+-]?\d*\.\d*(?:[EeDd]?[+-]\d+)?")
