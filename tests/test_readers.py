@@ -387,6 +387,8 @@ MARKET = [
         ("k.txt", [*MARKET[:2], "5 1 1.0", *MARKET[3:]],
          "k.txt, line 3: expected a row from 1 to 4 and a column from 1 to 4, got '5 1 1.0'"),
         ("k.mtx", [MARKET[0], "4 4"], "k.mtx, line 2: expected rows, columns, entries, got '4 4'"),
+        ("k.mtx", [MARKET[0], "3 4 1", "1 1 2"], "k.mtx, line 2: expected as many rows as columns of a symmetric matrix"),
+        ("k.mtx", ["%%MatrixMarket matrix array real symmetric", "2 1", "5"], "line 2: expected as many rows as columns"),
         ("k.mtx", ["%%MatrixMarket matrix coordinate complex hermitian", "1 1 1", "1 1 1 0"],
          "k.mtx, line 1: expected a real matrix, general or symmetric, got complex"),
         ("k.op4", ["hello world"], "k.op4, line 1: expected the head of a matrix, got 'hello world'"),

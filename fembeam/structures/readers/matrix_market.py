@@ -29,7 +29,7 @@ def read_matrix_market(path: Path) -> Given:
     if field not in ("real", "double", "integer") or symmetry not in ("general", "symmetric"):
         raise wrong(path, "line 1", "a real matrix, general or symmetric", f"{field} {symmetry}")
     data = [(i, line) for i, line in enumerate(lines, 1) if line.strip() and not line.startswith("%")]
-    sizes = _sizes(path, data, layout, len(lines))
+    sizes = _sizes(path, data, layout, symmetry, len(lines))
     values = table(path, data[1:], 3 if layout == "coordinate" else 1, ENTRIES[layout])
     count = sizes[2] if layout == "coordinate" else _kept(sizes[0], sizes[1], symmetry)
     if len(values) != count:
@@ -39,13 +39,15 @@ def read_matrix_market(path: Path) -> Given:
     return Given(path, ((path.stem, _of_entries(path, values, sizes, symmetry, data)),))
 
 
-def _sizes(path: Path, data: list[tuple[int, str]], layout: str, last: int) -> list[int]:
+def _sizes(path: Path, data: list[tuple[int, str]], layout: str, symmetry: str, last: int) -> list[int]:
     """Rows, columns and, of the layout coordinate, entries."""
     number, line = data[0] if data else (last, "the end")
     words = line.split()
     wanted = 3 if layout == "coordinate" else 2
     if len(words) != wanted or not all(word.isdecimal() for word in words) or "0" in words[:2]:
         raise wrong(path, f"line {number}", "rows, columns" + ", entries" * (wanted == 3), repr(line[:60]))
+    if symmetry == "symmetric" and int(words[0]) != int(words[1]):
+        raise wrong(path, f"line {number}", "as many rows as columns of a symmetric matrix", f"{words[0]} × {words[1]}")
     return [int(word) for word in words]
 
 
@@ -63,7 +65,7 @@ def _of_entries(path: Path, values: Any, sizes: list[int], symmetry: str, data: 
         raise wrong(path, f"line {number}", expected, repr(line[:60]))
     rows, columns = (values[:, :2].astype(int) - 1).T
     if symmetry == "symmetric":
-        return assembled(rows, columns, values[:, 2], max(sizes[:2]))
+        return assembled(rows, columns, values[:, 2], sizes[0])
     return sparse.csr_matrix((values[:, 2], (rows, columns)), shape=sizes[:2])
 
 
