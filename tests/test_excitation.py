@@ -560,6 +560,7 @@ def test_csv_columns(tmp_path):
     ("text", "message"),
     [
         ("a,b\nc,d\n", r"has no row with numbers in columns \(0, 1\)"),
+        ("t;y\n0,1;0,2\n", r"has no row with numbers .*; its last line is '0,1;0,2'; give .* decimal points"),
         ("t,y\n0,1\n0.1,oops\n", "record.csv, line 3: no numbers in columns"),
         ("0,1\n0.1\n", "line 2: no numbers"),
         ("\n".join(f"{k},nan" if k == 4 else f"{k},1" for k in range(12)), r"record.csv: Record y .* got nan in row 4"),

@@ -80,6 +80,7 @@ def read_rows(path: Path, columns: tuple[int, int]) -> Vector:
     if columns[0] == columns[1]:
         raise ValueError(f"columns must be two different ones (time, motion), got {columns!r}")
     rows: list[tuple[float, float]] = []
+    text = ""
     with path.open(encoding="utf-8-sig", errors="replace") as file:
         for line_number, line in enumerate(file, start=1):
             text = line.strip()
@@ -92,7 +93,9 @@ def read_rows(path: Path, columns: tuple[int, int]) -> Vector:
                 if rows:
                     raise ValueError(f"{path}, line {line_number}: no numbers in columns {columns}: {text!r}") from None
     if not rows:
-        raise ValueError(f"{path} has no row with numbers in columns {columns}; give columns=(time, motion)")
+        last = f"its last line is {text[:60]!r}; " if text else ""
+        advice = "give columns=(time, motion), decimal points and plain text"
+        raise ValueError(f"{path} has no row with numbers in columns {columns}; {last}{advice}")
     return np.array(rows)
 
 
