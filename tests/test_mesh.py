@@ -141,6 +141,24 @@ def test_files_that_are_no_meshes_are_refused(tmp_path):
         fb.Beam(1.0, THIN).to_mesh(tmp_path / "a.stl")
 
 
+@pytest.mark.parametrize("kind", ["gmsh22", "gmsh"])
+def test_nodes_that_are_not_there_are_refused(tmp_path, kind):
+    """meshio takes the last node for one that is not defined: a beam of 1 m had 0.7 m."""
+    points = np.array([[0.0, 0, 0], [0.3, 0, 0], [1.0, 0, 0], [0.7, 0, 0]])
+    mesh = meshio.Mesh(points, [("line", np.array([[0, 1], [1, 2]]))])
+    mesh.write(tmp_path / "a.msh", file_format=kind, binary=False)
+    assert fb.Beam.from_mesh(tmp_path / "a.msh", THIN).length == 1.0
+    text = (tmp_path / "a.msh").read_text()
+    head, elements = text.split("$Elements")
+    nodes = head.replace("\n3\n", "\n4000\n") if kind == "gmsh" else head.replace("\n3 ", "\n4000 ")
+    (tmp_path / "a.msh").write_text(f"{nodes}$Elements{elements}")
+    with pytest.raises(ValueError, match="cells must have nodes that are defined, got 'others in a line'"):
+        fb.Beam.from_mesh(tmp_path / "a.msh", THIN)
+    (tmp_path / "a.msh").write_text(text[: text.index("$Elements") + 14])
+    with pytest.raises(ValueError, match=r"cannot be read as a mesh: .*; is it cut, or of another format"):
+        fb.Beam.from_mesh(tmp_path / "a.msh", THIN)
+
+
 def test_far_too_fine_elements_are_noticed(tmp_path):
     path = written(tmp_path / "a.vtu", [0.0, 0.5, 0.500001, 1.0], [[0, 1], [1, 2], [2, 3]])
     with pytest.warns(UserWarning, match=r"far too fine: 1e-06 m at z = 0.5 m"):

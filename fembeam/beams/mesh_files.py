@@ -79,9 +79,15 @@ def read_mesh(path: str | os.PathLike[str]) -> Any:
     said = StringIO()
     try:
         with _mended_reader(), redirect_stdout(said):
-            return meshio.read(path)
+            mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio raises many kinds, and exits for unknown suffixes
-        raise ValueError(f"{path} cannot be read as a mesh: {_reason(error, said.getvalue())}") from error
+        reason = f"{_reason(error, said.getvalue())}; is it cut, or of another format than its suffix says?"
+        raise ValueError(f"{path} cannot be read as a mesh: {reason}") from error
+    for block in mesh.cells:  # of a node that is not there the readers of gmsh make -1, the last one
+        inside = not len(block.data) or (np.min(block.data) >= 0 and np.max(block.data) < len(mesh.points))
+        require(bool(inside), "cells must have nodes that are defined", f"others in a {block.type}", f"{path}",
+                "export it again: it is cut or edited")  # fmt: skip
+    return mesh
 
 
 def _reason(error: BaseException, said: str) -> str:
