@@ -292,3 +292,45 @@ def test_an_ensemble_resumes_from_its_checkpoint(tmp_path):
     assert len(both) == 3
     with pytest.raises(ValueError, match="another"):
         study.ensemble(pair(fb.BandNoise(3e-4, (50.0, 300.0), seed=1))[1].reduce(modes=2), 3, quantity, checkpoint=path)
+
+
+BESIDE = {
+    "job.sti": "1 1 3e5\n1 2 -1e5\n2 2 1e5\n",
+    "job.mas": "1 1 2.0\n2 2 0.5\n",
+    "job.dof": "20.1\n88.1\n",
+    "parts/nodes.inp": "*NODE\n1,0,0,0\n2,.5,0,0\n",
+    "parts/rig.inp": "*INCLUDE, INPUT=nodes.inp\n*ELEMENT, TYPE=B31, ELSET=all\n1,1,2\n",
+    "../outside.inp": "*INCLUDE, INPUT=scene/parts/rig.inp\n",
+}
+MESH = """[beam]
+mesh = "{}"
+sections = {{ all = {{ shape = "circle", E = 2e11, rho = 7800, diameter = 0.01 }} }}
+[[supports]]
+kind = "clamped"
+z = 0
+"""
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '[structure]\nstiffness = "job.sti"\nmass = "job.mas"\n',
+        MESH.format("parts/rig.inp"),
+        MESH.format("../outside.inp"),
+    ],
+)
+def test_a_saved_run_carries_what_its_files_are_read_with(tmp_path, text):
+    """Names of dofs beside matrices and files that a mesh includes: the run could not be read as a scene."""
+    folder = tmp_path / "scene"
+    (folder / "parts").mkdir(parents=True)
+    for name, content in BESIDE.items():
+        (folder / name).write_text(content)
+    (folder / "a.toml").write_text(text + "[damping]\nzeta = 0.01\n")
+    file = read(folder / "a.toml")
+    run = replace(file.model(modes=1).simulate(0.1, 1e-2), source=file.source)
+    path = run.save(folder / "run.npz")
+    for name in BESIDE:
+        (folder / name).unlink()
+    again = read(path)
+    np.testing.assert_array_equal(again.model(modes=1).omega, file.model(modes=1).omega)
+    assert again.source.files == file.source.files

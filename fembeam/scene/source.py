@@ -79,10 +79,16 @@ class Source:
     def unpacked(self) -> Iterator[dict[str, Path]]:
         """Where the files that it names lie: those it carries, for a while."""
         with tempfile.TemporaryDirectory(prefix="fembeam-") as folder:
-            places = {name: Path(folder, f"{i}-{Path(name).name}") for i, name in enumerate(self.files)}
+            places = {name: Path(folder, *_inside(Path(name))) for name in self.files}
             for name, place in places.items():
+                place.parent.mkdir(parents=True, exist_ok=True)
                 place.write_bytes(self.files[name])
             yield places
+
+
+def _inside(path: Path) -> Iterator[str]:
+    """The parts of a path that lead nowhere else: files that lie beside each other stay so, within one folder."""
+    yield from ("up" if part == ".." else part for part in path.parts if part != path.anchor)
 
 
 def _steps(key: str) -> list[str]:

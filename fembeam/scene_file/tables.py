@@ -29,7 +29,7 @@ from fembeam.scene_file.keys import (
 )
 from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
 from fembeam.scene_file.structures import PLACES, is_place
-from fembeam.support import is_whole, tuples
+from fembeam.support import is_whole, read_with, tuples
 
 Table = Mapping[str, Any]
 BODIES = tuple(further.MAKERS)  # tables beside [beam]
@@ -67,7 +67,10 @@ class TableReader:
                       "there, or name it by --set")  # fmt: skip
         if place.exists() and not place.is_file():
             self.fail(where, f"{name} is no ordinary file (a folder, pipe or device); give a file with the data")
-        return self.places.setdefault(name, place)
+        self.places.setdefault(name, place)
+        for other in read_with(place):
+            self.places.setdefault(str(Path(name).parent / other), place.parent / other)
+        return place
 
     def contents(self, tables: Table, known: Constructors) -> tuple[Scene, dict[str, Any], dict[str, Any]]:
         """The scene, the arguments of `Scene.reduce`, and the study tables among those known."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 from fembeam.support.checks import require
 
 NODE_MAKERS = ("NGEN", "NFILL", "NCOPY", "NMAP", "SYSTEM")
+INCLUDE = re.compile(r"\s*\*\s*INCLUDE\s*,", re.IGNORECASE)
 Line = tuple[str, str]  # where it stands, and its text
 
 
@@ -129,13 +131,27 @@ def _included(path: Path, within: tuple[Path, ...]) -> Iterator[Line]:
         text = line.strip()
         if not text or text.startswith("**"):
             continue
-        if text.upper().partition(",")[0].strip() != "*INCLUDE":
+        if not INCLUDE.match(text):
             yield where, text
             continue
-        other = path.parent / text.partition("=")[2].strip().strip('"')
+        other = path.parent / _file_named(text)
         require(other.is_file() and other not in within, "*INCLUDE must name another file", f"{other}", where,
                 "put it there, or insert what it includes")  # fmt: skip
         yield from _included(other, (*within, other))
+
+
+def _file_named(text: str) -> str:
+    """The file of an *INCLUDE."""
+    return text.partition("=")[2].strip().strip('"')
+
+
+def included_files(path: Path, within: tuple[Path, ...] = ()) -> Iterator[str]:
+    """Files that a file of Abaqus includes, by their names from its folder, and those that they include."""
+    for name in [_file_named(line) for _, line in _lines(path) if INCLUDE.match(line)]:
+        other = path.parent / name
+        if other.is_file() and other not in within:
+            yield name
+            yield from (f"{Path(name).parent / inner}" for inner in included_files(other, (*within, other)))
 
 
 def _heads_joined(lines: Iterator[Line]) -> Iterator[Line]:

@@ -12,6 +12,23 @@ from errno import ENOENT
 from pathlib import Path
 from typing import Any
 
+from fembeam.support.cards import included_files
+
+MAPPING = (".mapping", ".MAPPING")  # of Harwell–Boeing files
+BESIDE = {
+    **{".sti": (".dof",), ".mas": (".dof",), ".xdmf": (".h5",), ".xmf": (".h5",)},
+    **dict.fromkeys((".matrix", ".hb", ".rsa", ".rua", ".hbmat"), MAPPING),
+}
+
+
+def read_with(path: Path) -> Iterator[str]:
+    """Names, from its folder, of the files there that are read with a file: of dofs, of data, those it includes."""
+    for suffix in BESIDE.get(path.suffix.lower(), ()):
+        if path.with_suffix(suffix).is_file():
+            yield path.with_suffix(suffix).name
+    if path.suffix.lower() == ".inp" and path.is_file():
+        yield from included_files(path)
+
 
 @contextmanager
 def written_whole(target: Path) -> Iterator[Any]:
