@@ -347,6 +347,10 @@ def test_harwell_boeing_is_refused_in_words(tmp_path):
     for end in (2, 4, 5, len(lines) - 1):
         with pytest.raises(ValueError, match=rf"cut.hb, line {max(end, 2) + (end > 2)}: expected"):
             read_matrices(written(tmp_path, "cut.hb", "\n".join(lines[:end])))
+    for number, old, new in ((3, f"{'RSA':14s}{4:14d}{4:14d}", f"{'RSA':14s}{4:14d}"), (4, "(8I10)", "(0I10)")):
+        damaged = "\n".join(lines).replace(old, new, 1).replace(f"{0:14d}\n(", "\n(")
+        with pytest.raises(ValueError, match=rf"bad.hb, line {number}: expected"):
+            read_matrices(written(tmp_path, "bad.hb", damaged))
     written(tmp_path, "job.mapping", MAPPING.replace("ROTY", "TEMP"))
     with pytest.raises(
         ValueError, match=r"job.mapping, line 5: expected equation, node and one of UX, .*got '4 .*TEMP'"

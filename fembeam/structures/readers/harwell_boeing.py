@@ -30,6 +30,8 @@ def read_harwell_boeing(path: Path) -> Given:
     kind, sizes = lines[2][:3].upper(), _whole(path, lines, 2, 14)
     if kind not in ("RSA", "RUA"):
         raise wrong(path, "line 3", "a real assembled matrix, RSA or RUA", repr(kind))
+    if len(sizes) < 3 or min(sizes) < 0:
+        raise wrong(path, "line 3", "rows, columns and entries behind the type", repr(lines[2][14:74]))
     size, entries = sizes[0], sizes[2]
     if sizes[0] != sizes[1] or size < 1:
         raise wrong(path, "line 3", "as many rows as columns", f"{sizes[0]} × {sizes[1]}")
@@ -78,7 +80,7 @@ def _whole(path: Path, lines: list[str], line: int, begin: int = 0) -> list[int]
 def _format(path: Path, text: str) -> tuple[int, int]:
     """(numbers in a line, width of each) of a Fortran format."""
     found = FORMAT.search(text)
-    if not found:
+    if not found or found[1] == "0" or found[2] == "0":
         raise wrong(path, "line 4", "formats such as (8I10) and (4E20.12)", repr(text))
     return int(found[1] or 1), int(found[2])
 
