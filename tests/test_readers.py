@@ -205,6 +205,14 @@ def test_truncated_op4_names_the_place(tmp_path, layout):
             read_matrices(written(tmp_path, "cut.op4", "\n".join(text[:end])))
 
 
+def test_damaged_heads_of_op4_take_no_memory(tmp_path):
+    """Of rows of 1.6 PiB there was a MemoryError."""
+    whole = op4_binary([("K", K)], ">", "bigmat", 8)
+    at = whole.index(struct.pack(">q", -len(K)))
+    with pytest.raises(ValueError, match="byte 0: expected the head of a matrix"):
+        read_matrices(written(tmp_path, "a.op4", whole[:at] + struct.pack(">q", 1 << 48) + whole[at + 8 :]))
+
+
 # --- DMIG -------------------------------------------------------------------------------------------------------------
 
 

@@ -23,6 +23,7 @@ from scipy import sparse
 from fembeam.structures.readers.given import Given, wrong
 
 DIAGONAL, SHORT = 3, 65536
+MOST = 10**8  # rows and columns: more are those of a damaged head, for which there is no memory
 HEADS = {24: 4, 48: 8}  # bytes of the first record by those of a word
 
 
@@ -42,7 +43,7 @@ class Columns:
         """A matrix from its head; ValueError where this is none."""
         columns, rows, form, kind = (int(n) for n in numbers)
         name = name.replace("\0", " ").strip()
-        if columns < 1 or rows == 0 or kind not in (1, 2, 3, 4):
+        if not 1 <= columns <= MOST or not 1 <= abs(rows) <= MOST or kind not in (1, 2, 3, 4):
             expected = "the head of a matrix: columns, rows, form, type 1 to 4, name"
             raise wrong(path, where, expected, f"{columns} {rows} {form} {kind} {name!r}")
         return cls(name, columns, rows, form, kind)
