@@ -338,6 +338,7 @@ PART = """*Part, name=post
         ({"nodes": "2,100"}, "each element of B31 must have a number and 2 nodes, got '4 numbers'"),
         ({"kind": "MASS"}, "elements must be beams or trusses, got 'MASS'"),
         ({"second": "*Node, system=C\n9,0,0,0\n"}, "must stand there as they are, got '*NODE, SYSTEM'"),
+        ({"second": "*Nset, nset=a\nb\n"}, "a number, or a set above must stand there, got 'b'"),
         ({"second": "*Include, input=no.inp\n"}, "*INCLUDE must name another file"),
         ({"second": "*Include, input=post.inp\n"}, "*INCLUDE must name another file"),
         ({"second": "*End Assembly\n*Part, name=b\n*Node\n1,0,5,0\n"}, "node 1 must be given once"),

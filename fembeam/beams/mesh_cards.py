@@ -149,7 +149,7 @@ def _members(block: Block, assembly: bool, known: Any, sets: dict[str, list[Key]
                 yield from list(sets[word.strip('"').upper()])
                 continue
             instance, _, own = word.rpartition(".")
-            key = assembly and not instance, _whole(own, where)
+            key = assembly and not instance, _whole(own, where, "a number, or a set above")
             if block.keyword == "ELSET" and key not in known:
                 continue  # of an element that is no line, or nowhere: without it the set is as large
             _known(known, key, "node", where)
@@ -168,12 +168,12 @@ def _known(number: dict[Any, int], key: Any, what: str, where: str) -> int:
     return number[key]
 
 
-def _whole(word: str, where: str) -> int:
+def _whole(word: str, where: str, what: str = "a whole number") -> int:
     """A number of a node or the like."""
     try:
         return int(word)
     except ValueError:
-        raise ValueError(f"a whole number must stand there, got {word!r} in {where}; is the file cut?") from None
+        raise ValueError(f"{what} must stand there, got {word!r} in {where}; is the file cut?") from None
 
 
 def _place(words: list[str], where: str) -> list[float]:
