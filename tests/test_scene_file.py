@@ -188,6 +188,8 @@ def test_a_mesh_is_found_beside_the_scene(tmp_path, file_of):
     assert file_of(table + f"span_2 = {shape}\n").scene.beam.borders == (0.0, 0.2, 0.5)
     with pytest.raises(SceneFileError, match=r"\[beam\]: every element must have one section"):
         file_of(table)
+    with pytest.raises(SceneFileError, match=r"\[beam\]: .*none.msh: this mesh does not exist"):
+        file_of(table.replace("rig.msh", "none.msh"))
     with pytest.raises(SceneFileError, match="a mesh needs its path and a table sections"):
         file_of('[beam]\nmesh = "rig.msh"')
     with pytest.raises(SceneFileError, match=r"unknown key 'lenght'"):

@@ -11,6 +11,7 @@ import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
+from errno import ENOENT
 from io import StringIO
 from itertools import combinations, groupby, pairwise
 from pathlib import Path
@@ -73,7 +74,7 @@ def read_mesh(path: str | os.PathLike[str]) -> Any:
     import meshio
 
     if not Path(path).is_file():
-        raise FileNotFoundError(f"{path} does not exist")
+        raise FileNotFoundError(ENOENT, "this mesh does not exist", f"{path}")
     if reader := READERS.get(Path(path).suffix.lower()):
         return reader(Path(path))
     said = StringIO()
