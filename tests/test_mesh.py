@@ -73,6 +73,12 @@ def test_places_survive_the_file(tmp_path, suffix):
     assert dict(again.places) == pytest.approx(dict(beam.places), rel=1e-15)
 
 
+def test_names_that_no_file_can_hold_are_not_written(tmp_path):
+    beam = fb.Beam(1.0, THIN, places=(("tip, left", 1.0),))
+    with pytest.raises(ValueError, match=r"names of places must have no commas and quotes, got \['tip, left'\]"):
+        beam.to_mesh(tmp_path / "a.inp")
+
+
 def test_one_section_for_all_and_a_slanting_axis(tmp_path):
     t = np.array([0.0, 0.3, 0.7, 1.0])
     path = written(tmp_path / "a.vtu", np.column_stack([3 * t, 4 * t, 0 * t])[:, :2], [[3, 2], [0, 1], [1, 2]])

@@ -300,6 +300,8 @@ def to_mesh(beam: Beam, path: str | os.PathLike[str], elements: int = 100) -> di
     where, borders = "to_mesh", np.array(beam.borders)
     known = target.suffix in WRITERS
     require(known, f"the suffix must be one of {', '.join(WRITERS)}", target.suffix, where, "choose one")
+    apart = [name for name, _ in beam.places if set(name) & set(',"\n')]
+    require(not apart, "names of places must have no commas and quotes", apart, where, "such files end names there")
     counts = np.maximum(1, np.round(elements * np.diff(borders) / beam.length)).astype(int)
     z = np.unique(np.concatenate([divided(borders, counts), [place for _, place in beam.places]]))
     group = 1 + np.searchsorted(borders[1:-1], (z[:-1] + z[1:]) / 2)
