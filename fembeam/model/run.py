@@ -201,7 +201,7 @@ class Run(Histories, Printed):
     def to_xdmf(self, path: str | os.PathLike[str], stride: int = 1, hdf5: bool = False) -> Path:
         """Write every `stride`-th sample for ParaView: displacement, velocity, slope, moment, shear, stress.
 
-        ``hdf5``: the numbers go to an .h5 file beside it, quicker and smaller than text; ImportError without h5py.
+        ``hdf5``: the numbers go to an .h5 file beside it, half as large as text; ImportError without h5py.
         """
         from fembeam.model.run_paraview import to_xdmf
 

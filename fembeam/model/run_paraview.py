@@ -50,7 +50,8 @@ def to_xdmf(run: Run, path: str | os.PathLike[str], stride: int = 1, hdf5: bool 
     samples, points, cells, values = _samples(run, stride), *_geometry(run), _fields(run)
     target = _target(Path(path), ".xdmf")
     with written_beside(target) as draft:
-        writer = TimeSeriesWriter(draft, data_format="HDF" if hdf5 else "XML")
+        writer: Any = TimeSeriesWriter(draft, data_format="HDF" if hdf5 else "XML")
+        writer.numpy_to_xml_string = _as_text if h5py is None else writer.numpy_to_xml_string
         if h5py is not None:  # as a context it would take the working directory
             writer.h5_filename = os.path.splitext(draft)[0] + ".h5"
             writer.h5_file = h5py.File(writer.h5_filename, "w")
@@ -59,6 +60,12 @@ def to_xdmf(run: Run, path: str | os.PathLike[str], stride: int = 1, hdf5: bool 
             writer.write_data(float(run.t[sample]), point_data=values(sample))
         writer.__exit__()
     return target
+
+
+def _as_text(numbers: NDArray[Any]) -> str:
+    """Numbers as meshio writes them, one a line; its own way takes three times as long."""
+    line = "%.16e\n" if numbers.dtype.kind == "f" else "%d\n"
+    return line * numbers.size % tuple(numbers.ravel().tolist())
 
 
 def to_vtu(run: Run, path: str | os.PathLike[str], sample: int = -1, stride: int | None = None) -> Path:
