@@ -6,8 +6,8 @@
 
 with the changes df of the forces on the rows from `elements`. Columns of Y: by the start [q, q̇], by what laws have
 latched then, and last by the parameters, which alone have the explicit terms. Flights are exact; while forces act,
-their values at a panel's nodes are the unknowns. The end of a panel is linear in the state at its start: all panels of
-a stretch are solved at once, then applied one after the other.
+their values at a panel's nodes are the unknowns. They are linear in the state at its start: all panels of a stretch are
+solved at once, then passed one after the other.
 """
 
 from __future__ import annotations
@@ -228,10 +228,9 @@ class Flow:
 
     def fly(self, start: float, end: float, samples: Array) -> Array:
         """Move over a flight that parameters do not drive; derivatives by the parameters at samples, (q, 2n, d)."""
-        over = propagator(self.k, self.c, np.append(samples, end) - start)
-        found = moved(self.k, self.c, over, self.y[:, None])
-        self.y = found[:, -1]
-        return np.moveaxis(found[:, :-1, self.own], 0, 1)
+        found = moved(self.k, self.c, propagator(self.k, self.c, samples - start), self.y[:, None, self.own])
+        self.y = moved(self.k, self.c, propagator(self.k, self.c, np.asarray(end - start)), self.y)
+        return np.moveaxis(found, 0, 1)
 
     def pass_flight(self, panels: Panels, acting: Acting, samples: Array) -> Array:
         """The same where the parameters drive the motion, too."""
@@ -253,33 +252,48 @@ class Flow:
 
         These are at the nodes, of N (P, S, columns) and of the forces on the rows (P, m, S, columns).
 
-        f = A y + B with y at the start of a panel; y ← (E + K A) y + K B + drive at its end.
+        f = A y + B with y at the start of a panel; y ← E y + K f + drive at its end.
         """
         count, size, own = len(panels), 2 * len(self.k), self.own
         drive, pushes = self._drive(panels.times, acting), [push for s in acting.elements for push in self.push[s]]
-        (by_state, other), normals = self._forces(panels, acting, drive, pushes)
-        reach = np.concatenate([panels.reach(push) for push in pushes], axis=2)
-        across, given = panels.across() + reach @ by_state, reach @ other
-        if drive is not None:
-            given[..., own] += np.moveaxis(panels.at_ends(drive), 0, 1)
-        starts = np.empty((count + 1, size, self.columns))
-        starts[0] = self.y
-        for i in range(count):
-            starts[i + 1] = across[i] @ starts[i] + given[i]
-        self.y = starts[-1]
-        forces = (by_state @ starts[:-1] + other).reshape(count, len(pushes), S, -1)
-        changes, first = {}, 0
+        (by_state, forces), normals = self._forces(panels, acting, drive, pushes)
+        starts = self._pass(panels, by_state, forces, normals, drive, pushes)
+        forces, changes, first = forces.reshape(count, len(pushes), S, -1), {}, 0
         for s, normal in zip(acting.elements, normals, strict=True):
             mine = forces[:, first : first + len(self.rows[s])]
             first += len(self.rows[s])
-            changes[s] = mine[:, 0] if normal is None else normal[0] @ starts[:-1] + normal[1], mine
+            changes[s] = mine[:, 0] if normal is None else normal[1], mine
             self.impulse[s] += np.tensordot(panels.weights, changes[s][0], 2)
         if not samples.size:
             return np.zeros((0, size, len(self.by))), changes
         rates = np.tensordot(np.transpose(pushes), forces[..., own], (1, 1))
         rates = rates if drive is None else rates + drive
-        states = panels.free(np.moveaxis(starts[:-1, :, own], 1, 0)) + panels.at_nodes(rates)
-        return panels.within(states, samples), changes
+        return panels.within(panels.free(starts) + panels.at_nodes(rates), samples), changes
+
+    def _pass(
+        self, panels: Panels, by_state: Array, forces: Array, normals: Any, drive: Array | None, pushes: list[Array]
+    ) -> Array:
+        """Move over panels one after the other; the states (2n, P, d) at their starts by the parameters.
+
+        Adds what the state at the start of a panel does to all forces and to those N that are given beside it.
+        """
+        reach = np.concatenate([panels.reach(push) for push in pushes], axis=2)
+        given = None if drive is None else panels.at_ends(drive)
+        (a, b), n, own = (one.T[..., None] for one in panels.across()), len(self.k), self.own
+        from_p, from_v = self.k[:, None] * b, a - self.c[:, None] * b
+        starts = np.empty((2 * n, len(panels), len(self.by)))
+        for i, (to_end, force) in enumerate(zip(reach, forces, strict=True)):
+            p, v = self.y[:n], self.y[n:]
+            starts[:, i] = self.y[:, own]
+            force += by_state[i] @ self.y
+            for by_start, normal in (one for one in normals if one is not None):
+                normal[i] += by_start[i] @ self.y
+            self.y = to_end @ force
+            self.y[:n] += a[i] * p + b[i] * v
+            self.y[n:] += from_v[i] * v - from_p[i] * p
+            if given is not None:
+                self.y[:, own] += given[:, i]
+        return starts
 
     def _forces(self, panels: Panels, acting: Acting, drive: Array | None, pushes: list[Array]) -> Any:
         """Changes of all R forces on rows at the nodes by the state at a panel's start (P, R S, 2n), and by the rest.

@@ -67,10 +67,12 @@ def propagator(k: Array, c: Array, t: Array) -> tuple[Array, Array]:
     t = np.asarray(t, dtype=float)
     shape = (-1, *[1] * t.ndim)
     half, square = 0.5 * c.reshape(shape), (k - 0.25 * c * c).reshape(shape)
-    turn = np.sqrt(np.abs(square)) * t
+    omega = np.sqrt(np.abs(square))
+    turn = omega * t
     with np.errstate(over="ignore", invalid="ignore"):
         decay = np.exp(-half * t)
-        alpha, beta = decay * np.cos(turn), decay * t * np.sinc(turn / np.pi)
+        alpha = decay * np.cos(turn)
+        beta = decay * np.where(omega > 0.0, np.sin(turn) / np.where(omega > 0.0, omega, 1.0), t)
         if np.any(square < 0.0):
             grow, fall = np.exp(turn - half * t), np.exp(-turn - half * t)
             near = decay * t * (1.0 + turn * turn / 6.0 * (1.0 + turn * turn / 20.0))
@@ -167,11 +169,9 @@ class Panels:
         """States (2n, P, S, m) at the nodes without forces, from those at the starts of panels (2n, P, m)."""
         return moved(self.k, self.c, self._to_nodes, y[:, :, None])
 
-    def across(self) -> Array:
-        """E (P, 2n, 2n) from start to end."""
-        unit = np.eye(2 * len(self.k))[:, None]
-        over = propagator(self.k, self.c, np.diff(self.ends))
-        return np.moveaxis(moved(self.k, self.c, over, unit), 1, 0)
+    def across(self) -> tuple[Array, Array]:
+        """α and β (n, P) from start to end."""
+        return propagator(self.k, self.c, np.diff(self.ends))
 
     def seen(self, row: Array) -> Array:
         """What a row (2n,) reads at the nodes of a state at the start, (P, S, 2n)."""

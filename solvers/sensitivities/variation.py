@@ -28,7 +28,7 @@ from solvers.sensitivities.stretches import Acting, Depths, Division, Motion, St
 
 SMOOTH = 1e-3  # relative size of the last Legendre coefficients of forces' derivatives, above which panels are halved
 _REFINEMENTS, _REPEATS = (1, 2, 4), 2  # of panels, until derivatives are smooth; passes after the first to locate kinks
-_MOST_ENTRIES = 4_000_000  # of the tables of panels held at once
+_MOST_ENTRIES = 400_000  # of the tables of panels held at once, which processors keep at hand
 _SAME_BEND = 1e-9  # of the duration: a kink may be found twice, once from each side
 _NEAR_PEAK = 0.9  # of the largest force so far: panels whose nodes are all below have no larger one
 _SAME = 1e-6  # of the duration: difference of the times of events in two runs up to which they are the same
@@ -424,7 +424,9 @@ class _Walk:
         high -= int(high > low and times[high - 1] == stretch.end)
         if stretch.panels is None:
             self._sampled(low, flow.fly(begin, stretch.end, times[low:high]))
-        for panels in stretch.panels.parts(_MOST_ENTRIES // (S * S * len(flow.k))) if stretch.panels else ():
+        rows = sum(len(flow.rows[s]) for s in stretch.acting.elements)
+        most = max(_MOST_ENTRIES // (S * S * max(len(flow.k), rows * rows)), 1)
+        for panels in stretch.panels.parts(most) if stretch.panels else ():
             middle = high if panels.ends[-1] >= stretch.end else low + np.searchsorted(times[low:high], panels.ends[-1])
             if stretch.acting.elements:
                 found, changes = flow.pass_panels(panels, self.acting, times[low:middle])
