@@ -88,11 +88,7 @@ def modal_basis(
     wanted = _wanted(M.shape[0], count, indices)
     _check_mass(M)
     highest = int(wanted[-1]) + 1
-    if root is None:
-        basis = _without_root(M, K, *_solve(M, K, highest))
-        _verify(basis, M, K)
-    else:
-        basis = _settled(M, K, sparse.csr_matrix(root), highest)
+    basis = _settled(M, K, None if root is None else sparse.csr_matrix(root), highest)
     return oriented(Basis(basis.vectors[:, wanted], basis.omega[wanted]))
 
 
@@ -161,13 +157,16 @@ def _without_root(M: sparse.csc_matrix, K: sparse.csc_matrix, omega_squared: Vec
     return Basis(vectors, np.where(omega <= rigid, 0.0, omega))
 
 
-def _settled(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix, count: int) -> Basis:
-    """The verified basis in R, where need be with a larger shift: rounding may hide several rigid motions in space."""
+def _settled(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix | None, count: int) -> Basis:
+    """The verified basis, where need be with a larger shift: rounding may hide several rigid motions in space."""
     failure = None
     for factor in WIDER:
         try:
-            vectors = _solve(M, K, _guarded(M.shape[0], count), factor)[1]
-            basis = _with_root(M, K, R, vectors, factor * _shift(M, K), count)
+            if R is None:
+                basis = _without_root(M, K, *_solve(M, K, count, factor))
+            else:
+                vectors = _solve(M, K, _guarded(M.shape[0], count), factor)[1]
+                basis = _with_root(M, K, R, vectors, factor * _shift(M, K), count)
             _verify(basis, M, K)
         except AccuracyError as error:
             failure = failure or error
