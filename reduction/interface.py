@@ -11,14 +11,12 @@ the inertia forces that balance it (inertia relief).
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
 from reduction.basis import AccuracyError, Basis, Vector, checked_basis, oriented, reals
-from reduction.modal import ORTHONORMALITY_TOLERANCE, Matrix, checked_pair, modal_basis, ritz
+from reduction.modal import ORTHONORMALITY_TOLERANCE, Matrix, checked_pair, factored, modal_basis, ritz
 
 STATIC_TOLERANCE = 1e-9  # relative error of static compliance, given a root; 1e-13 but where elements are 1e-4 long
 STATIC_WITHOUT_ROOT = 2e-6  # same; rounding of K alone, up to 6e-7 in frames under compression on fine meshes
@@ -202,9 +200,11 @@ def static_shapes(M: Matrix, K: Matrix, B: Vector, rigid: Vector, root: Matrix |
     K ψ = B - M R RᵀB,    RᵀM ψ = 0        (solved with its constraint, refined through the root)
     """
     r, inertia = rigid.shape[1], M @ rigid
-    bordered: Any = sparse.bmat([[K, inertia], [inertia.T, None]], format="csc") if r else sparse.csc_matrix(K)
     try:
-        factors = sparse_linalg.splu(bordered)
+        if r:
+            factors = sparse_linalg.splu(sparse.bmat([[K, inertia], [inertia.T, None]], format="csc"))
+        else:
+            factors = factored(sparse.csc_matrix(K))
     except RuntimeError:
         raise ValueError(SINGULAR) from None
     load = B - inertia @ (rigid.T @ B)
@@ -295,7 +295,7 @@ def _interface_coordinates(B: Vector) -> tuple[sparse.csc_matrix, int]:
 def _held(K: Matrix, root: Matrix | None, inside: sparse.csc_matrix, interface: sparse.csc_matrix) -> Vector:
     """Static shapes (N, m) of unit interface displacements: no force inside, refined through the root."""
     try:
-        factors = sparse_linalg.splu((inside.T @ K @ inside).tocsc())
+        factors = factored(inside.T @ K @ inside)
     except RuntimeError:
         raise ValueError("the structure must not move freely with its interface held, got a singular stiffness in "
                          "craig_bampton; use modes with residual shapes") from None  # fmt: skip

@@ -19,6 +19,8 @@ from reduction.basis import AccuracyError, Basis, Vector, oriented, reals
 
 Matrix: TypeAlias = Any  # dense or sparse
 
+LARGE = 20_000  # dofs from which factors take seconds: ordered and pivoted as symmetric ones, half of that
+TINY_PIVOT = 1e-3  # of the largest number in its column
 DENSE_LIMIT = 60  # free dofs; dense stays faster up to 300, by 1 ms, but loses low modes beside stiff springs
 ORTHONORMALITY_TOLERANCE = 1e-9
 RESIDUAL_TOLERANCE = 1e-9  # of the largest terms in K φ - ω² M φ
@@ -111,9 +113,20 @@ def _solve(M: sparse.csc_matrix, K: sparse.csc_matrix, count: int, factor: float
     if size <= DENSE_LIMIT or 4 * count > size:
         return linalg.eigh(K.toarray(), M.toarray(), subset_by_index=(0, count - 1))
     start = np.random.default_rng(0).standard_normal(size)  # fixed: the same basis every time
-    pairs = sparse_linalg.eigsh(K, count, M, sigma=-factor * _shift(M, K), which="LM", v0=start)
+    shift, inverse = factor * _shift(M, K), None
+    if size >= LARGE:  # else that of ARPACK
+        inverse = sparse_linalg.LinearOperator(K.shape, factored(K + shift * M).solve, dtype=float)
+    pairs = sparse_linalg.eigsh(K, count, M, sigma=-shift, which="LM", v0=start, OPinv=inverse)
     order = np.argsort(pairs[0])
     return pairs[0][order], pairs[1][:, order]
+
+
+def factored(A: Any) -> Any:
+    """Factors of a sparse matrix like K; those of a large one keep to its diagonal, unless a pivot there is tiny."""
+    if A.shape[0] < LARGE:
+        return sparse_linalg.splu(A.tocsc())
+    options = {"SymmetricMode": True}
+    return sparse_linalg.splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=TINY_PIVOT, options=options)
 
 
 def _inverse(M: sparse.csc_matrix, K: sparse.csc_matrix, shift: float, count: int) -> tuple[Vector, Vector]:
@@ -183,7 +196,7 @@ def _with_root(
     mismatch = abs(R.T @ R - K).max() if R.shape[1] == K.shape[0] else np.inf
     if not mismatch <= SYMMETRY_TOLERANCE * abs(K).max():
         raise ValueError(f"root must satisfy rootᵀ root = K, got a difference of {mismatch} in modal_basis; fix it")
-    solve: Callable[[Vector], Vector] = sparse_linalg.splu((K + shift * M).tocsc()).solve
+    solve: Callable[[Vector], Vector] = factored(K + shift * M).solve
     omega, vectors = _ritz(M, R, vectors)
     rigid = _rigid_with_root(omega, _scale(M, K))
     change, turn, before, corrections = np.inf, np.inf, np.inf, 0

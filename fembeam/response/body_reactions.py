@@ -17,6 +17,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 import reduction
 from fembeam.structures import COMPONENTS
+from reduction.modal import factored
 
 if TYPE_CHECKING:
     from fembeam.scene import BodyMatrices, Matrices, Scene
@@ -94,7 +95,9 @@ def static_solver(K: sparse.csr_matrix, M: sparse.csr_matrix, rigid: Vector) -> 
     """F -> K⁻¹ f; with rigid-body modes that of the part of f that does not drive them."""
     border = sparse.csr_matrix(M @ rigid)
     count = border.shape[1]
-    factors = sparse_linalg.splu(sparse.bmat([[K, border], [border.T, None]], format="csc") if count else K.tocsc())
+    if count == 0:
+        return factored(K).solve
+    factors = sparse_linalg.splu(sparse.bmat([[K, border], [border.T, None]], format="csc"))
     return lambda f: factors.solve(np.vstack([f, np.zeros((count, f.shape[1]))]))[: f.shape[0]]
 
 
