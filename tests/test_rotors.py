@@ -1,6 +1,7 @@
 """Rotors of scenes: whirl of the exact shaft, Campbell diagrams, unbalance, identities of turned shafts, bad input."""
 
 import math
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -90,6 +91,17 @@ def test_twist_and_stretch_are_no_critical_speeds():
     shaft = fb.Frame.straight(LENGTH, SECTION)
     found = fb.Scene(shaft, [fb.Clamped("A")], masses=[DISK]).campbell([0.0, 3000.0], modes=4)
     np.testing.assert_allclose(found.critical, rotor().campbell([0.0, 3000.0], modes=4).critical, rtol=1e-6)
+
+
+def test_many_spins_of_a_diagram_need_little_memory():
+    """Shapes of each spin are not kept: 0.5 MB each."""
+    rotor().campbell([0.0], modes=2)
+    tracemalloc.start()
+    found = rotor().campbell(np.linspace(0.0, 400.0, 60), modes=2)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert found.omega.shape == (60, 2)
+    assert peak < 15e6
 
 
 def test_table_text_and_figure():

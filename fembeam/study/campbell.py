@@ -110,13 +110,16 @@ def campbell(scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | Non
                     lambda x: np.isfinite(x).all() and np.all(np.diff(x) > 0))  # fmt: skip
     check_modes(modes)
     basis, G, across = _at_unit_spin(scene, int(modes), elements)
-    found = [reduction.whirl(basis, spin * G, *across) for spin in speeds]
+    found = [
+        (one.omega[:modes], one.turning[:modes])
+        for one in (reduction.whirl(basis, spin * G, *across) for spin in speeds)
+    ]
     met = reduction.critical_speeds(basis, G, *across)
     critical = met.signed[_bends(met, across)]
     return Campbell(
         speeds,
-        np.array([one.omega[:modes] for one in found]),
-        np.array([one.turning[:modes] for one in found]),
+        np.array([omega for omega, _ in found]),
+        np.array([turning for _, turning in found]),
         critical[np.abs(critical) <= np.abs(speeds).max()],
     )
 
