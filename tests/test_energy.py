@@ -317,6 +317,15 @@ def test_outputs_of_another_spacing_give_the_same_ledger():
         )
 
 
+def test_tables_of_many_spacings_are_let_go():
+    """They counted a 300th of their size: 2400 spacings of two modes held 660 MB, of 256 at most."""
+    system = blocks([fb.Harmonic(2.0, 13.0)])
+    prepared = prepared_run(system, [0.1] * 4, [0.0] * 4, 1.0, None, Exponential(), False).engine.prepared
+    arrays = [array for array in prepared.energy_tables_for(0.1).value if isinstance(array, np.ndarray)]
+    assert prepared.kept.size >= sum(array.nbytes for array in arrays) > 100_000
+    assert prepared.kept.most < 1e8
+
+
 def unaccounted(run):
     """Energy a run does not account for, in units of what it handled, the exchange within its contacts included."""
     energy, log = run.energy, run.contacts

@@ -43,6 +43,7 @@ _KNOWN = "energy", "accuracy"  # arrays of the scratch that Python reads or writ
 _KINDS = {"tables": TABLES, "state": STATE, "scratch": SCRATCH, "energy_tables": ENERGY_TABLES}
 
 
+_MOST_KEPT = 1 << 26  # bytes of tables of the energy balance
 _MOST_SHORTENED = 2  # times that contact steps are shortened: to 1e-10 of the usual shortest one
 _ROUNDING_OF_TIME = 1e-16  # of the duration: shorter steps are none
 
@@ -117,11 +118,12 @@ class Prepared(NamedTuple):
     def energy_tables_for(self, spacing: float) -> Packed:
         """Tables of the energy balance for outputs of a spacing, s; what reads them is compiled for the first."""
 
-        def make() -> Packed:
+        def make() -> tuple[Packed, Any]:
             load_parts(type_of(self.problem.value), ENERGY)
-            return energy_tables_for(self.problem.value, self.tables.value, spacing)
+            made = energy_tables_for(self.problem.value, self.tables.value, spacing)
+            return made, made.value  # so that the arrays count
 
-        made: Packed = self.kept.get((spacing, self.tones), make)
+        made: Packed = self.kept.get((spacing, self.tones), make)[0]
         return made
 
     @property
@@ -226,7 +228,7 @@ class _SharedTables:
         for places, needed in zip((BORDERS, TWO_STOPS, MANY_STOPS, CIRCLES, FRICTION), needs, strict=True):
             load_parts(type_of(problem), (*EVERY_RUN, *places) if needed else EVERY_RUN)
         self.layout = _layout(pool=POOL if tables.node_propagator.size else 0, **sizes)
-        self.kept = Memo()
+        self.kept = Memo(_MOST_KEPT)
         self.problem = PackedTemplate(problem, type_of(problem), ("gap", "radius", "k", "read", "read_rate", "power"))
         self.tables = PackedTemplate(aligned(tables), TABLES, TONE_TABLES)
 
