@@ -32,6 +32,7 @@ from solvers.problem import (
 )
 from solvers.problem import event_list as at
 from solvers.problem.friction import ACCOUNTS, BEGUN, CODE, STICK, tell_sliders
+from solvers.problem.matrices import number
 from solvers.problem.run_arguments import (
     check_laws,
     check_maps,
@@ -147,6 +148,7 @@ def integrate(
         from solvers.exponential.method import Exponential
 
         method = Exponential()
+    duration = number(duration, "duration")
     arguments = system, q0, q_dot0, duration, dt, method, tangent, memory
     run = prepared_run(*arguments)
     started = time.perf_counter()
@@ -183,6 +185,7 @@ def prepared_run(
     """A run ready to start, everything checked."""
     if not hasattr(method, "engine") or isinstance(method, type):
         raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
+    duration = number(duration, "duration")
     check_tangent(tangent, method, system)
     z = checked_start(system, q0, q_dot0, method)
     check_places(system, q0)

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from solvers.integration import BLOCK_STEPS, prepared_once
 from solvers.problem import Array, SolverError, Status, System, counted
+from solvers.problem.matrices import number
 from solvers.problem.run_arguments import output_times
 
 if TYPE_CHECKING:
@@ -118,6 +119,7 @@ def integrate_many(
     if not isinstance(method, Exponential):
         raise TypeError(f"integrate_many offers Exponential only, got {method!r}; call integrate for each start")
     starts = _starts(system, q0, q_dot0)
+    duration = number(duration, "duration")
     output_times(duration, None)
     _check_threads(threads)
     own_gaps, scaled = _gaps(system, gaps, len(starts)), _factors(system, factors, len(starts))

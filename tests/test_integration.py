@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from oscillators import Tone
 from problems import bounce, coupled_dashpot, free_mass, linear_stop, paper_scene, reference
 from refusals import refused, refused_by
 from scipy.linalg import expm
@@ -384,6 +385,33 @@ def test_several_tones_equal_several_loads():
     assert distance(*runs) < 1e-11
 
 
+@pytest.mark.parametrize("dt", [None, 0.01])
+def test_a_tone_of_negative_frequency_is_its_mirror_image(dt):
+    """Re a e^{iωt} is Re ā e^{-iωt}; without samples the motion was wrong, with them it was refused."""
+    signals = Tone(1.0 + 2.0j, 31.0), Tone(1.0 - 2.0j, -31.0)
+    here, mirrored = (
+        integrate(System.modal([30.0], 0.02, stop, [([1.0], signal)]), [0.0], [0.0], 0.5, dt).end
+        for stop in [[Contact([1.0], Hertz(1e7))]]
+        for signal in signals
+    )
+    np.testing.assert_array_equal(here, mirrored)
+
+
+def test_a_plain_callable_may_change_the_times_it_is_given():
+    def shifted(t):
+        t += 0.1
+        return np.sin(31.0 * t)
+
+    assert distance(hit_by(shifted), hit_by(lambda t: np.sin(31.0 * (t + 0.1)))) == 0.0
+
+
+def test_a_duration_may_be_an_array_without_dimensions():
+    system, start = System.modal([30.0], 0.02, [Contact([1.0], Hertz(1e7))]), ([0.0], [-0.1])
+    run = integrate(system, *start, np.array(0.5))
+    np.testing.assert_array_equal(run.end, integrate(system, *start, 0.5).end)
+    np.testing.assert_array_equal(integrate_many(system, *np.array(start)[:, None], np.array(0.5)).q, run.q)
+
+
 def test_plain_callable_of_time_against_its_closed_answer():
     run = integrate(System([[2.0]], [[0.0]], [[0.0]], loads=[([1.0], lambda t: 6.0 * t)]), [0.0], [0.0], 2.0, 0.1, FINE)
     np.testing.assert_allclose(run.q[:, 0], run.t**3 / 2, atol=1e-12)
@@ -393,7 +421,12 @@ test_signals_that_are_no_signals_are_refused = refused_by(
     lambda signal: hit_by(signal),
     (Nodes(length=0.2), r"the signal of load 0 ends at 0.2 s, the run at 0.5 s"),
     (lambda t: 1.0, r"the signal of load 0 must broadcast: \(65,\) times gave \(\) values"),
-    (lambda t: np.where(np.asarray(t) > 0.3, np.nan, 1.0), r"the signal of load 0 is nan on \[0, 0.5\] s"),
+    (lambda t: np.where(np.asarray(t) > 0.3, np.nan, 1.0), r"the signal of load 0 is nan at t = 0.304688 s"),
+    (lambda t: np.exp(1j * t), "the signal of load 0 must be real"),
+    (lambda t: np.ones(65), r"the signal of load 0 must broadcast: \(4096,\) times gave \(65,\) values"),
+    (Tone(1.0, np.nan), r"tones\(\) of the signal of load 0 must be finite"),
+    (Tone(np.inf, 31.0), r"tones\(\) of the signal of load 0 must be finite"),
+    (Tone(np.array([1.0, 2.0]), 31.0), r"tones\(\) of the signal of load 0 must give frequencies and as many"),
 )
 
 

@@ -31,7 +31,7 @@ from solvers.exponential.linearised_step import DERIVATIVES, VARIATION, Derivati
 from solvers.exponential.preparation import places_among_tones
 from solvers.exponential.steady_response import steady_response
 from solvers.exponential.tables import uncut_parameters
-from solvers.problem import Array, Parameter, SolverError, System
+from solvers.problem import Array, Parameter, SolverError, System, tones_of
 
 _ROWS = 256  # of the event record, for some 25 contacts, within which no derivative overflows
 _CARRIED = [Derivatives._fields.index(name) for name in ("y", "entry", "shift", "rate", "latched")]
@@ -209,14 +209,14 @@ def _tones(here: System, behind: System, ahead: System) -> _Tones | None:
     """The tones; None if sampled signals differ."""
     found = []
     k, c = here.blocks.k, here.blocks.c
-    for (vector, signal), *others in zip(here.loads, behind.loads, ahead.loads, strict=True):
+    for load, ((vector, signal), *others) in enumerate(zip(here.loads, behind.loads, ahead.loads, strict=True)):
         signals: list[Any] = [signal, *(other for _, other in others)]
         if not all(hasattr(one, "tones") for one in signals):
             if any(one is not signal for one in signals):
                 return None
             continue
         push = here.push @ np.asarray(vector)
-        tones = [one.tones() for one in signals]
+        tones = [tones_of(one, load) for one in signals]
         omega, amplitude = (np.stack([tone[i] for tone in tones], axis=-1)[..., None] for i in (0, 1))
         response = steady_response(k, c, push * amplitude, omega)  # (tones, systems, 2n)
         found.append((omega[:, 0, 0], response[:, 0], np.diff(omega[:, 1:, 0])[:, 0], response[:, 2] - response[:, 1]))

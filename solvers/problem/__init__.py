@@ -29,5 +29,5 @@ from solvers.problem.result import (
     Transitions,
     counted,
 )
-from solvers.problem.signals import Forcing, forcing_of, quintics, tones_as_nodes
+from solvers.problem.signals import Forcing, forcing_of, quintics, tones_as_nodes, tones_of
 from solvers.problem.system import Contact, Law, Parameter, System, require_step

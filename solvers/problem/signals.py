@@ -2,7 +2,7 @@
 
 A signal is any callable t -> value that broadcasts. It becomes exactly one of
 
-* *tones*: ``signal.tones() -> (omega (k,), amplitude (k,) complex)``, value Re Σ a e^{iωt}, exact;
+* *tones*: ``signal.tones() -> (omega (k,), amplitude (k,) complex)``, value Re Σ a e^{iωt}, exact, ω of either sign;
 * *nodes*: ``signal.nodes(duration, rtol) -> (dt, (N, 3))``, rows [s, s', s''] at t = 0, dt, ...; between them the
   quintic through both ends' values, slopes and curvatures, within ``rtol`` times the signal's size, in the mean
   square at least. Where slope or curvature jump at nodes, (N, 6): of the cell that begins there, then of that which
@@ -22,6 +22,7 @@ Methods of constant step know a signal only where their steps evaluate it.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,10 +59,9 @@ def forcing_of(signals: list[Signal], duration: float, rtol: float) -> Forcing:
     tables: list[tuple[float, Array, int]] = []
     for load, signal in enumerate(signals):
         if hasattr(signal, "tones"):
-            omega, amplitude = signal.tones()
             tones += [  # of a constant the real part is all there is
-                (float(w), complex(a) if w else complex(np.real(a)), load)
-                for w, a in zip(omega, amplitude, strict=True)
+                (w, a if w else complex(a.real), load)
+                for w, a in zip(*(part.tolist() for part in tones_of(signal, load)), strict=True)
             ]
         else:
             provider = getattr(signal, "nodes", None)
@@ -79,6 +79,23 @@ def forcing_of(signals: list[Signal], duration: float, rtol: float) -> Forcing:
         starts.astype(np.int64),
         np.array([load for _, _, load in tables], dtype=np.int64),
     )
+
+
+def tones_of(signal: Any, load: int) -> tuple[Array, Any]:
+    """Frequencies (k,), none of them negative, and complex amplitudes (k,) of the signal of a load, checked."""
+    told = signal.tones()
+    try:
+        parts: Any = (np.asarray(part, dtype=kind) for part, kind in zip(told, (float, complex), strict=True))
+        omega, amplitude = parts
+        fits = omega.ndim == 1 and omega.shape == amplitude.shape
+    except (TypeError, ValueError):
+        fits = False
+    if not fits:
+        need = f"tones() of the signal of load {load} must give frequencies and as many amplitudes"
+        raise ValueError(f"{need}, got {repr(told)[:60]}")
+    if not (np.all(np.isfinite(omega)) and np.all(np.isfinite(amplitude))):
+        raise ValueError(f"tones() of the signal of load {load} must be finite, got {repr(told)[:60]}")
+    return np.abs(omega), np.where(omega < 0.0, np.conj(amplitude), amplitude)
 
 
 def sampled_values(forcing: Forcing, t: Array) -> dict[int, Array]:
@@ -154,6 +171,8 @@ def _numbers(told: Any, load: int) -> tuple[float, Array]:
 
 def _check_nodes(rows: Array, dt: float, duration: float, load: int) -> None:
     """A node table has three columns, or six, is finite and covers the run."""
+    if not 0.0 < dt < math.inf:
+        raise ValueError(f"nodes() of the signal of load {load} must give a positive, finite dt (s), got {dt!r}")
     if np.ndim(rows) != 2 or np.shape(rows)[1] not in (3, 6):
         raise ValueError(
             f"nodes() of the signal of load {load} must give rows [s, s', s''], (N, 3), or of both sides, (N, 6); "
@@ -169,6 +188,22 @@ def _check_nodes(rows: Array, dt: float, duration: float, load: int) -> None:
         raise ValueError(f"the signal of load {load} ends at {(len(rows) - 1) * dt:g} s, the run at {duration:g} s")
 
 
+def _values(signal: Signal, t: Any, load: int) -> Array:
+    """Checked values (k,) of a plain callable, which may change the times that it is given."""
+    found = np.asarray(signal(t.copy()))
+    if found.shape != t.shape:
+        raise ValueError(f"the signal of load {load} must broadcast: {t.shape} times gave {found.shape} values")
+    if np.iscomplexobj(found):
+        raise ValueError(
+            f"the signal of load {load} must be real, got {found[0]} at t = {t[0]:g} s; give its real part"
+        )
+    values = found.astype(float)
+    if not np.all(np.isfinite(values)):
+        bad = int(np.argmin(np.isfinite(values)))
+        raise ValueError(f"the signal of load {load} is {values[bad]} at t = {t[bad]:g} s")
+    return values
+
+
 def _sample(signal: Signal, duration: float, rtol: float, load: int) -> tuple[float, Array]:
     """Nodes of a plain callable: double a quintic spline's grid until it agrees to ``rtol`` between its nodes."""
     from scipy.interpolate import make_interp_spline
@@ -176,16 +211,12 @@ def _sample(signal: Signal, duration: float, rtol: float, load: int) -> tuple[fl
     cells = 64
     while cells <= _MOST_NODES:
         t = np.linspace(0.0, duration, cells + 1)
-        values = np.asarray(signal(t), dtype=float)
-        if values.shape != t.shape:
-            raise ValueError(f"the signal of load {load} must broadcast: {t.shape} times gave {values.shape} values")
-        if not np.all(np.isfinite(values)):
-            raise ValueError(f"the signal of load {load} is {values[~np.isfinite(values)][0]} on [0, {duration:g}] s")
+        values = _values(signal, t, load)
         spline = make_interp_spline(t, values, k=5)
         # thirds rather than midpoints, so that no period of the signal hides between the samples
         places = np.arange(max(cells, _FEWEST_PLACES))
         between = (places + np.where(places % 2, 1 / 3, 0.58)) * (duration / len(places))
-        error = np.abs(spline(between) - signal(between)).max()
+        error = np.abs(spline(between) - _values(signal, between, load)).max()
         if error <= rtol * np.abs(values).max():
             return duration / cells, np.stack([values, spline(t, 1), spline(t, 2)], axis=1)
         cells *= 2
