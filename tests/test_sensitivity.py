@@ -336,8 +336,15 @@ def test_a_start_on_the_surface_into_the_stop(damping):
 test_refusals_of_systems = refused(
     (lambda: sensitivity(ball(law=Viscoelastic.tsuji(2e7, 0.6, 0.3)), [0.0], [SPEED], 0.5), "slope is infinite"),
     (lambda: sensitivity(ball(), [0.0], [SPEED], -1.0), "duration must be positive"),
+    *((lambda x=x: sensitivity(ball(), [0.0], [SPEED], 0.5, times=x), "times must lie in") for x in ([0.6], [-0.1])),
+    *((lambda x=x: sensitivity(ball(), [0.0], [SPEED], 0.5, times=x), "times must be one ascending row")
+      for x in ([0.4, 0.2], [math.nan])),
+    *((lambda x=x: sensitivity(ball(), [0.0], [SPEED], 0.5, start=x), "start must be 2 finite numbers")
+      for x in (1.0, [1.0], [1.0, math.nan], [1.0, 0.0, 0.0])),
+    (lambda: sensitivity(ball(), [0.0, 0.0], [SPEED], 0.5), r"q0 must have shape \(1,\)"),
+    *((lambda x=x: Nearby.of(ball, GAP, x), "step must be finite and not 0") for x in (0.0, math.nan)),
     (lambda: Nearby.of(lambda value: _refuse(), 1.0, 1e-3), "no such value"),
-)
+)  # fmt: skip
 
 
 def _refuse():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -42,6 +43,8 @@ class Nearby:
         ------
         ValueError : `make` refuses values on both sides.
         """
+        if not (step and math.isfinite(step)):
+            raise ValueError(f"step must be finite and not 0, got {step!r}")
         refused: Exception = ValueError(f"no step from {value:g}")
         for side in sides:
             offsets, weights, coarse = _STENCILS[side]

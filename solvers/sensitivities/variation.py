@@ -17,6 +17,7 @@ from solvers.integration import prepared_run
 from solvers.problem import Array, ContactLog, Solution, SolverError, Status, System
 from solvers.problem import event_list as at
 from solvers.problem.friction import tell_sliders
+from solvers.problem.matrices import number
 from solvers.problem.whole_runs import whole_runs
 from solvers.sensitivities.elements import motion_of
 from solvers.sensitivities.events import GRAZING, NoDerivativeError, called, cross, knot_shift
@@ -134,19 +135,21 @@ def sensitivities(
     ``parameters`` are pairs of ``nearby`` and ``start``; all else is as for `sensitivity`.
     """
     from solvers.exponential.method import Exponential
-    from solvers.problem.run_arguments import check_slopes
+    from solvers.problem.run_arguments import check_slopes, checked_start
 
     check_slopes(system)
+    duration = number(duration, "duration")
     method = Exponential() if method is None else method
+    checked_start(system, q0, q_dot0, method)
     asked = _Request(
         system,
         _state(q0, q_dot0),
         duration,
-        np.atleast_1d(np.asarray(times, dtype=float)).clip(max=duration),  # k dt may round to more
+        _checked_times(times, duration),
         replace(method, ledger=False) if isinstance(method, Exponential) else method,
         memory,
         Change(system, [unchanged(system) if one is None else one for one, _ in parameters], duration),
-        [np.zeros(2 * system.size) if one is None else np.asarray(one, dtype=float) for _, one in parameters],
+        [_checked_direction(system, one) for _, one in parameters],
     )
     log, rows = asked.replayed(asked.dense_times())
     asked.measure(log, rows)
@@ -163,6 +166,29 @@ def sensitivities(
             break
     assert best is not None
     return best.results()
+
+
+def _checked_times(times: ArrayLike, duration: float) -> Array:
+    """Times (k,) at which derivatives are wanted."""
+    found = np.atleast_1d(np.asarray(times, dtype=float))
+    if found.ndim != 1 or not np.isfinite(found).all() or np.any(np.diff(found) < 0.0):
+        raise ValueError(f"times must be one ascending row of finite numbers (s), got {times!r}")
+    if found.size and not (found[0] >= 0.0 and found[-1] <= duration * (1.0 + 1e-9)):
+        raise ValueError(f"times must lie in [0, {duration:g}] s, got {found[0]:g} to {found[-1]:g} s")
+    return found.clip(max=duration)  # k dt may round to more
+
+
+def _checked_direction(system: System, start: ArrayLike | None) -> Array:
+    """Derivative of the start, (2n,) or with what is latched (2n + l,)."""
+    n2 = 2 * system.size
+    if start is None:
+        return np.zeros(n2)
+    found = np.asarray(start, dtype=float)
+    whole = n2 + sum(len(getattr(one.law, "memory", ())) for one in system.contacts)
+    if found.shape not in ((n2,), (whole,)) or not np.isfinite(found).all():
+        more = f", or {whole} with what is latched" if whole > n2 else ""
+        raise ValueError(f"start must be {n2} finite numbers, those of [q0, q_dot0]{more}, got {start!r}")
+    return found
 
 
 def _without_repeats(times: list[float], distance: float) -> Array:
