@@ -246,6 +246,13 @@ test_parts_are_refused = refused(
     *((lambda x=x: solvers.Friction(x, 1e5), "mu of Friction must be a number, got", TypeError) for x in ODD),
     *((lambda x=x: solvers.integrate(System.modal([2.0], [0.0]), [1.0], [0.0], x),
        "duration must be a number, got", TypeError) for x in ODD),
+    (lambda: System(ZERO[:0, :0], ZERO[:0, :0], ZERO[:0, :0]), r"M must be square, got shape \(0, 0\)"),
+    (lambda: System(np.eye(2), ZERO, ZERO, [LAW]), "contact 0 must be a Contact, got Hertz", TypeError),
+    (lambda: System(np.eye(2), ZERO, ZERO, Contact([1.0, 0.0], LAW)), "contacts must be a sequence of", TypeError),
+    (lambda: System(np.eye(2), ZERO, ZERO, loads=[np.cos]), r"load 0 must be a pair \(vector, signal\)", TypeError),
+    (lambda: System.modal([[1.0, 2.0]], 0.1), r"omega must be a row of numbers"),
+    (lambda: System.modal([1.0, 2.0], [0.1] * 3), r"zeta one number or as many"),
+    (lambda: solvers.RK4("fast"), "dt must be a number, got 'fast'", TypeError),
     (lambda: solvers.Friction(10**400, 1e5), "mu of Friction must be finite"),
 )  # fmt: skip
 

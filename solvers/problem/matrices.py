@@ -58,7 +58,7 @@ def square_matrix(name: str, matrix: Any, skew: bool = False) -> Any:
         values = copied.data
     else:
         copied = values = np.array(matrix, dtype=float, ndmin=2)
-    if copied.ndim != 2 or copied.shape[0] != copied.shape[1]:
+    if copied.ndim != 2 or copied.shape[0] != copied.shape[1] or not copied.shape[0]:
         raise ValueError(f"{name} must be square, got shape {copied.shape}")
     if not np.all(np.isfinite(values)):
         row, column = np.argwhere(~np.isfinite(dense(copied)))[0]

@@ -15,7 +15,7 @@ Runge–Kutta and exact propagation commute with this change of coordinates, so 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Protocol
@@ -323,9 +323,14 @@ class System:
 
     def _check_contacts_and_loads(self, known: Sequence[Any] = ()) -> None:
         """Contacts and loads fit the matrices; of loads with unchanged vectors only the signals are checked."""
+        for name, each in (("contacts", "of Contact"), ("loads", "of pairs (vector, signal)")):
+            if not isinstance(getattr(self, name), Iterable):
+                raise TypeError(f"{name} must be a sequence {each}, got {getattr(self, name)!r}")
         object.__setattr__(self, "contacts", tuple(self.contacts))
         object.__setattr__(self, "loads", tuple(self._load(i, pair, known) for i, pair in enumerate(self.loads)))
         for i, contact in enumerate(self.contacts):
+            if not isinstance(contact, Contact):
+                raise TypeError(f"contact {i} must be a Contact, got {contact!r}")
             if contact.rows.shape[1] != self.size:
                 raise ValueError(f"contact {i} has a direction of {contact.rows.shape[1]}, the system {self.size}")
 
@@ -365,7 +370,10 @@ class System:
 
     def _load(self, i: int, pair: tuple[ArrayLike, Signal], known: Sequence[Any]) -> tuple[Array, Signal]:
         """One checked load."""
-        given, signal = pair
+        try:
+            given, signal = pair
+        except (TypeError, ValueError):
+            raise TypeError(f"load {i} must be a pair (vector, signal), got {pair!r}") from None
         vector: Any = next((vector for vector in known if vector is given), None)
         if vector is None:
             vector = np.array(given, dtype=float, ndmin=1)
@@ -398,7 +406,12 @@ class System:
         contacts, loads : as for `System`, in modal coordinates.
         """
         omega = np.atleast_1d(np.asarray(omega, dtype=float))
-        zeta = np.broadcast_to(np.asarray(zeta, dtype=float), omega.shape)
+        zeta = np.asarray(zeta, dtype=float)
+        if omega.ndim != 1 or zeta.shape not in ((), (1,), omega.shape):
+            raise ValueError(
+                f"omega must be a row of numbers, zeta one number or as many, got shapes {omega.shape}, {zeta.shape}"
+            )
+        zeta = np.broadcast_to(zeta, omega.shape)
         if not (np.all(np.isfinite(omega)) and np.all(omega >= 0.0)):
             raise ValueError(f"omega must be finite and >= 0 (rad/s), got {omega}")
         if not (np.all(np.isfinite(zeta)) and np.all(zeta >= 0.0)):
@@ -485,5 +498,5 @@ class Parameter:
 
 def require_step(name: str, value: float) -> None:
     """ValueError for a step that is none."""
-    if not 0.0 < value < np.inf:
+    if not 0.0 < number(value, name) < np.inf:
         raise ValueError(f"{name} must be positive and finite (s), got {value!r}")
