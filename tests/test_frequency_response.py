@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from problems import paper_scene
 from scipy.signal import StateSpace, freqresp
 
 import fembeam as fb
@@ -103,3 +104,15 @@ def test_bad_input():
     free = fb.Scene(BEAM, damping=fb.ModalDamping(0.1)).reduce(3)
     with pytest.raises(ValueError, match="natural frequency"):
         free.frequency_response([0.0], 0.1, 0.2)
+
+
+def test_modes_that_nothing_couples_are_not_solved_together(monkeypatch):
+    """Against the same with all modes in one matrix."""
+    model, omega = paper_scene().reduce(8), np.linspace(0.0, 2e4, 301)
+    found = model.frequency_response(omega, "base")
+    K, C = model.system.K, model.system.C
+    v = model.participation
+    q = [w**2 * np.linalg.solve(K + 1j * w * C - w**2 * np.eye(8), v) for w in omega]
+    np.testing.assert_allclose(found.values, q @ model.phi(found.output), rtol=1e-10)
+    monkeypatch.setattr(np.linalg, "solve", None)
+    np.testing.assert_array_equal(model.frequency_response(omega, "base").values, found.values)
