@@ -257,6 +257,14 @@ test_parts_are_refused = refused(
 )  # fmt: skip
 
 
+@pytest.mark.parametrize("stiffness", [1e12, 1e14, 1e16])
+def test_soft_modes_apart_from_a_stiff_one_are_no_rigid_bodies(stiffness):
+    """Two of 1 and sqrt(3) rad/s beside one of 1e7 rad/s drifted as free bodies."""
+    K = np.array([[stiffness, 0.0, 0.0], [0.0, 2.0, -1.0], [0.0, -1.0, 2.0]])
+    run = solvers.integrate(System(np.eye(3), np.zeros((3, 3)), K), [0.0, 1.0, 0.0], [0.0, 0.0, 0.0], 3.0, 0.5)
+    np.testing.assert_allclose(run.q[:, 1], 0.5 * (np.cos(run.t) + np.cos(math.sqrt(3.0) * run.t)), atol=1e-12)
+
+
 def test_unknown_names_of_the_package_are_named_with_the_known_ones():
     with pytest.raises(AttributeError, match=r"no attribute 'Exponentail'; it offers \[.*'DormandPrince'"):
         _ = solvers.Exponentail

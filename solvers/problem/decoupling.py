@@ -58,7 +58,26 @@ def _is_diagonal(matrix: Array) -> bool:
 
 
 def _modes(M: Array, K: Array) -> tuple[Array, Array]:
-    """Mass-normalised modes and squared frequencies; rounding-size ones become exact zeros."""
+    """Mass-normalised modes and squared frequencies; rounding-size ones become exact zeros.
+
+    What is no more than the rounding of a stiff part may be the stiffness of another one that it does not act on.
+    """
+    from scipy.sparse.csgraph import connected_components
+
+    phi, k = _modes_of_one(M, K)
+    if k.all():
+        return phi, k
+    count, part = connected_components((M != 0.0) | (K != 0.0), directed=False)
+    own_phi, own_k = np.zeros_like(phi), np.zeros_like(k)
+    for places in (np.flatnonzero(part == i) for i in range(count)):
+        of_part = np.ix_(places, places)
+        own_phi[of_part], own_k[places] = _modes_of_one(M[of_part], K[of_part])
+    order = np.argsort(own_k, kind="stable")
+    return (own_phi[:, order], own_k[order]) if np.count_nonzero(own_k) > np.count_nonzero(k) else (phi, k)
+
+
+def _modes_of_one(M: Array, K: Array) -> tuple[Array, Array]:
+    """The same of one part."""
     from scipy.linalg import eigh
 
     k, phi = eigh(K, M)
