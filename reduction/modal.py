@@ -232,10 +232,11 @@ def ritz(M: Matrix, K: Matrix, root: Matrix | None, vectors: Vector) -> tuple[Ve
     if root is None:
         values, rotation = linalg.eigh(unit.T @ (K @ unit), unit.T @ (M @ unit))
         omega, vectors = np.sqrt(np.maximum(values, 0.0)), unit @ rotation
+        rigid = RIGID * _scale(M, K)
     else:
         omega, vectors = _ritz(M, sparse.csr_matrix(root), unit)
-        return np.where(omega <= _rigid_with_root(omega, _scale(M, K)), 0.0, omega), vectors
-    return np.where(omega <= RIGID * _scale(M, K), 0.0, omega), vectors
+        rigid = _rigid_with_root(omega, _scale(M, K))
+    return np.where(omega <= rigid, 0.0, omega), vectors
 
 
 def _ritz(M: sparse.csc_matrix, R: sparse.csr_matrix, vectors: Vector) -> tuple[Vector, Vector]:
