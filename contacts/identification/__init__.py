@@ -2,7 +2,8 @@
 
 `records` reads and checks collisions, `motion` makes positions and rates of what was measured, `fit` finds the law,
 `result` tells how well it is known. Laws with memory come from loops of force over displacement, by `loops`, whose
-models are in `loop_models`. Imports: the laws of `contacts`. Begin with `fit.identify` or `loops.identify_loop`.
+models are in `loop_models`, starting values in `loop_starts`, least squares in `loop_fit`, remarks and results in
+`loop_remarks` and `loop_result`. Imports: the laws of `contacts`. Begin with `fit.identify` or `loops.identify_loop`.
 """
 
 from contacts.identification.fit import identify

@@ -3,8 +3,9 @@
 `walk` controls the steps along the branch, `point` takes one, `bifurcations` locates folds, flips and tori,
 `count_changes` where contacts or phases of stick come and go, `hopping` continues past corners due to laws with memory,
 `grazing`, `merging` and `nonsmooth` cross the points where the return map is not smooth, `reshooting` moves the starts
-of shots, `subharmonic_end` ends a branch on that of half the period, `restart` reads one back. `folds` follows a fold
-over a second parameter. Imports: `orbits` and what that may. Begin with `continuation.branch`.
+of shots, `subharmonic_end` ends a branch on that of half the period, `ending` says how one ended, `restart` reads one
+back. `folds` follows a fold over a second parameter. Imports: `orbits` and what that may. Begin with
+`continuation.branch`.
 """
 
 from solvers.branches.folds import FoldCurve, fold_curve

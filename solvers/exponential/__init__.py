@@ -1,10 +1,11 @@
 """The main method: exact flight between contacts, forces by collocation within them, exact derivatives.
 
 `method` has the settings and the loop over flights and contacts. `safe_steps` takes flight steps that miss no contact
-and finds where a contact begins, `flight` evaluates them; the folder `contact` takes a step in contact and locates
-where it ends. `preparation` prepares a system, `tables`, `block_tables`, `responses` and `phi_functions` make the
-tables. The folder `energy` has the energy balance and refuses runs that do not balance. `tangent`, `linearised` and
-`linearised_step` differentiate a run; `many_starts` integrates many starts. Imports: `compiled`, `problem`. Its files
+and finds where one begins, by `first_contact`; `flight` evaluates them. The folder `contact` takes a step in contact
+and locates where it ends, the folder `circles` has what circular clearances and friction add. `preparation` prepares a
+system, `tables`, `block_tables`, `responses`, `phi_functions` and `steady_response` make the tables. The folder
+`energy` has the energy balance and refuses runs that do not balance. `tangent`, `linearised`, `linearised_step` and
+`linearised_border` differentiate a run; `many_starts` integrates many starts. Imports: `compiled`, `problem`. Its files
 load machine code when imported; begin with `method`.
 """
 

@@ -2,11 +2,12 @@
 
 M q'' + C q' + K q = Σ v_l s_l(t) + Σ w_c F_c(-w_c·q - gap_c, ...)
 
-`system` holds matrices, contacts and loads and decouples them into blocks, `signals` samples loads for compiled code,
-`common_grid` puts the samples of several on one grid, `friction` is that of a contact, `memo` keeps what was computed
-once, `event_list` names the columns of what a run logs, `record` is what a run leaves, `result` the solution with its
-log of contacts and its energies, `losses` the energy that contacts dissipated, `renewals` calls laws with memory.
-Imports: numpy, scipy. Begin with `system.System`.
+`system` holds matrices, contacts and loads, `decoupling` makes blocks of them, `signals` samples loads for compiled
+code, `common_grid` puts the samples of several on one grid, `friction` is that of a contact, `memo` keeps what was
+computed once, `event_list` names the columns of what a run logs, `record` is what a run leaves, `result` the solution
+with its log of contacts and its energies, `frames` its tables, `losses` the energy that contacts dissipated, `renewals`
+calls laws with memory, `run_arguments` checks what a run is given, `whole_runs` says what Ctrl-C leaves of it. Imports:
+numpy, scipy. Begin with `system.System`.
 """
 
 from solvers.problem.common_grid import on_one_grid
