@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.orbits.whole_state import codes, derivatives, end, rate_at_end, units
+from solvers.orbits.whole_state import codes, derivatives, rate_at_end, units
 from solvers.problem import Array, Parameter, Solution, System
 
 _UNIT = 1e-12  # rounding of the derivatives of latched numbers that are not renewed
@@ -89,7 +89,7 @@ class PeriodicProblem:
         for i, (system, duration) in enumerate(here):
             tangent: Any = Parameter(sides[0][i][0], sides[1][i][0], h) if h else True
             solution, matrix = derivatives(system, x[i], duration, self.method, tangent)
-            residual[i] = end(solution) - x[(i + 1) % m]
+            residual[i] = solution.end - x[(i + 1) % m]
             tangents.append(matrix[:, :size])
             if h:
                 lengthening = (sides[1][i][1] - sides[0][i][1]) / (2.0 * h)

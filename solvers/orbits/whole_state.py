@@ -66,21 +66,15 @@ def run(system: System, x: Array, duration: float, dt: Any = None, method: Any =
         return integrate(system, x[:n], x[n : 2 * n], duration, dt, method, memory=memory or None, **more)
 
 
-def end(solution: Solution) -> Array:
-    """The state a run ends with."""
-    state: Array = np.concatenate((solution.q[-1], solution.q_dot[-1], *solution.memory))
-    return state
-
-
 def rate_at_end(system: System, solution: Solution) -> Array:
-    """Derivative of `end` by the duration, of a run with a tangent."""
+    """Derivative of `Solution.end` by the duration, of a run with a tangent."""
     assert solution.rate is not None
     return np.concatenate((solution.rate, told_rates(system.contacts, solution.memory)))
 
 
 def state_after(system: System, x: Array, duration: float, method: Any) -> Array:
     """State after a duration."""
-    return end(run(system, x, duration, method=method))
+    return run(system, x, duration, method=method).end
 
 
 def derivatives(system: System, x: Array, duration: float, method: Any, tangent: Any) -> tuple[Solution, Array]:
