@@ -15,9 +15,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from solvers.problem import Array, Forcing, System, require_step
+from solvers.problem.run_arguments import check_maps
 from solvers.stepping.critical_step import eigen_oscillators
 from solvers.stepping.events import IGNORED, LOCATED
-from solvers.stepping.stability import Limit, Radius, limit
+from solvers.stepping.stability import Limit, Radius, largest_steps, with_tangents
 
 
 class ConstantStep(ABC):
@@ -72,7 +73,21 @@ class ConstantStep(ABC):
         Exact, dashpots that couple the modes included; in contact as good as a frozen tangent is. Of large sparse
         matrices only the largest, the most damped and the fastest eigenvalues are asked.
         """
-        return limit(self, system, indentation, duration)
+        check_maps(system, self)
+        flight, mode = self._shortest(system, *self.oscillators(system), duration)
+        if not system.contacts:
+            return Limit(flight, math.inf, mode, -1)
+        C, K, half_period = with_tangents(system, indentation)
+        if any(contact.always or contact.gap < 0.0 for contact in system.contacts) or duration == math.inf:
+            half_period = duration  # a preloaded contact may last for ever
+        decisive = self.critical(system.M, C, K, system.gyroscopic)
+        contact, contact_mode = self._shortest(system, *decisive, min(duration, half_period))
+        return Limit(flight, contact, mode, contact_mode)
+
+    def _shortest(self, system: System, k: Array, c: Array, duration: float) -> tuple[float, int]:
+        """Smallest limit of oscillators, and which mode it is; -1 if they are not the modes."""
+        steps = largest_steps(self.radius, k, c, duration)
+        return float(steps.min()), int(np.argmin(steps)) if len(steps) == system.size else -1
 
     def critical(self, M: Any, C: Any, K: Any, G: Any) -> tuple[Array, Array]:
         """Stiffness k and damping c (j,) of the oscillators that decide on matrices."""

@@ -13,11 +13,7 @@ from solvers.problem.friction import ARM, BEGUN, SPIN, STIFFNESS
 from solvers.stepping.stability import is_dissipative, work_of
 
 NOW, BEGAN, LEAST, IN_A_ROW, MOST_INPUT, HELD = range(6)  # places in `Space.watch`, see `watched`
-
-
 STEPS_OF_GAIN = 8  # consecutive steps with a gain; one alone may be an error of the balance, as in a load's first step
-
-
 _FAR, STEPS_FAR = 1e3, 3  # factor on the energy given, and consecutive steps above it, that end a run sooner
 _TRIED = np.geomspace(1e-9, 1e3, 241)  # m or rad, to either side, where a law that always acts must lead back to 0
 

@@ -15,16 +15,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from solvers.problem import Array, Contact, System
 from solvers.problem.friction import Rubbing
-from solvers.problem.run_arguments import check_maps
-
-if TYPE_CHECKING:
-    from solvers.stepping.constant_step import ConstantStep
 
 Radius = Callable[[Any, Any, Any], Any]
 """ρ(h, k, c): factor by which one step of size h multiplies a mode p'' + c p' + k p = 0; arrays as numbers."""
@@ -120,26 +116,6 @@ def _first_border(stable: Callable[[Array, Any], Any], modes: Any, fastest: Arra
     return border
 
 
-def limit(method: ConstantStep, system: System, indentation: float | None, duration: float) -> Limit:
-    """Predicted limits of a method; see `ConstantStep.stable_dt`."""
-    check_maps(system, method)
-    flight, mode = _shortest(method, system, *method.oscillators(system), duration)
-    if not system.contacts:
-        return Limit(flight, math.inf, mode, -1)
-    C, K, half_period = with_tangents(system, indentation)
-    if any(contact.always or contact.gap < 0.0 for contact in system.contacts) or duration == math.inf:
-        half_period = duration  # a preloaded contact may last for ever
-    decisive = method.critical(system.M, C, K, system.gyroscopic)
-    contact, contact_mode = _shortest(method, system, *decisive, min(duration, half_period))
-    return Limit(flight, contact, mode, contact_mode)
-
-
-def _shortest(method: ConstantStep, system: System, k: Array, c: Array, duration: float) -> tuple[float, int]:
-    """Smallest limit of the oscillators, and which mode it is; -1 if they are not the modes."""
-    steps = largest_steps(method.radius, k, c, duration)
-    return float(steps.min()), int(np.argmin(steps)) if len(steps) == system.size else -1
-
-
 def with_tangents(system: System, indentation: float | None) -> tuple[Any, Any, float]:
     """C and K with every stop's tangent, and the half period of the slowest contact, s."""
     C, K, longest = system.C, system.K, 0.0
@@ -168,8 +144,10 @@ def shortest_contact(system: System) -> float:
 def tangents(system: System, indentation: float | None) -> list[tuple[float, float, float]]:
     """The `tangent` of every stop; computed once per system."""
     key = "tangents", indentation
-    found: Any = system.kept.get(key, lambda: [tangent(system, contact, indentation) for contact in system.contacts])
-    return found  # type: ignore[no-any-return]
+    found: list[tuple[float, float, float]] = system.kept.get(
+        key, lambda: [tangent(system, contact, indentation) for contact in system.contacts]
+    )
+    return found
 
 
 def tangent(system: System, contact: Contact, indentation: float | None) -> tuple[float, float, float]:
