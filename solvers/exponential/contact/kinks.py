@@ -94,8 +94,9 @@ def step_to_kink(problem, tables, state, scratch, horizon):
 
 @inner
 def land_on_kink_or_limit(problem, tables, state, scratch, level):
-    """Longest step, s, that sampled loads allow: to their next kink, if a step of a level reaches so far, and a cell
-    beyond the end of the run. It is 0 if a step to the kink has been done.
+    """Longest step, s, that sampled loads allow; 0 if a step to their next kink has been done.
+
+    It ends at this kink, if a step of a level reaches so far, and at most a cell beyond the end of the run.
     """
     remaining = state.now[T_END] - state.now[T]
     longest = remaining + problem.table_dt[0]

@@ -80,7 +80,7 @@ class Scratch(NamedTuple):
     split_state: Annotated[Any, "6, 2, N8"]  # p and v of the blocks, of several states; see `energy.flight_balance`
     motion: Annotated[Any, "R+A, 2, S"]  # displacements of the rows and their rates at the nodes, δ and δ̇ of circles
     clipped: Annotated[Any, "S"]  # indentations of one stop at the nodes, not below 0
-    free: Annotated[Any, "R, 2, S"]  # the same without contact forces
+    free: Annotated[Any, "R, 2, S"]  # the motion of the rows without contact forces
     force: Annotated[Any, "R+L, S"]  # forces on the rows, then values of the signals
     law_force: Annotated[Any, "R+A, S"]  # forces on the rows by the laws for the present motion, then the radial ones
     trial: Annotated[Any, "S"]  # eight numbers for use within a function
