@@ -19,7 +19,7 @@ from contacts import Hertz, KelvinVoigt, Viscoelastic
 from fembeam import Harmonic
 from solvers import Contact, Exponential, System
 from solvers.compiled import decorators, dop853_tableau
-from solvers.compiled.fields import dimensions_of, packed_type, shapes_of
+from solvers.compiled.fields import _declared, packed_type, shapes_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned, unpacker
 from solvers.compiled.shortcuts import Shortcuts, known_by_type
 from solvers.compiled.simd import bit_pattern, load8, positive8, splat8, sqrt8, store8, sum8
@@ -362,7 +362,7 @@ def test_arrays_have_the_shapes_they_are_declared_with(stops, tones):
     _, prepared = prepared_once(system, method, 10.0)
     for value in (prepared.problem.value, prepared.tables.value):
         sizes = {}
-        for name, shape in dimensions_of(type(value)).items():
+        for name, _, shape in _declared(type(value)):
             array = np.asarray(getattr(value, name))
             assert array.ndim == len(shape), name
             for part, size in zip(shape, array.shape, strict=True):

@@ -58,8 +58,3 @@ def _size(dimension: str, sizes: Mapping[str, int]) -> int:
     """A sum of products of names and numbers, such as S+2 or 2*N."""
     products = (product.split("*") for product in dimension.split("+"))
     return sum(math.prod(int(part) if part.isdigit() else sizes[part] for part in product) for product in products)
-
-
-def dimensions_of(tuple_class: type) -> dict[str, tuple[str, ...]]:
-    """The dimensions of every field, by its name."""
-    return {name: shape for name, _, shape in _declared(tuple_class)}

@@ -111,15 +111,22 @@ def splat8(typingctx, number):
     return VECTOR8(types.float64), codegen
 
 
-@intrinsic
-def sqrt8(typingctx, numbers):
-    """Square roots."""
+def _each(name):
+    """An intrinsic that applies LLVM's function of a name to each of eight numbers."""
 
-    def codegen(context, builder, signature, arguments):
-        kind = ir.FunctionType(_VECTOR, [_VECTOR])
-        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.sqrt.v{WIDTH}f64"), arguments)
+    @intrinsic
+    def applied(typingctx, numbers):
+        def codegen(context, builder, signature, arguments):
+            kind = ir.FunctionType(_VECTOR, [_VECTOR])
+            function = cgutils.get_or_insert_function(builder.module, kind, f"llvm.{name}.v{WIDTH}f64")
+            return builder.call(function, arguments)
 
-    return VECTOR8(VECTOR8), codegen
+        return VECTOR8(VECTOR8), codegen
+
+    return applied
+
+
+sqrt8, size8 = _each("sqrt"), _each("fabs")
 
 
 @intrinsic
@@ -129,17 +136,6 @@ def positive8(typingctx, numbers):
     def codegen(context, builder, signature, arguments):
         zero = ir.Constant(_VECTOR, [0.0] * WIDTH)
         return builder.select(builder.fcmp_ordered("<", arguments[0], zero), zero, arguments[0])
-
-    return VECTOR8(VECTOR8), codegen
-
-
-@intrinsic
-def size8(typingctx, numbers):
-    """Absolute values."""
-
-    def codegen(context, builder, signature, arguments):
-        kind = ir.FunctionType(_VECTOR, [_VECTOR])
-        return builder.call(cgutils.get_or_insert_function(builder.module, kind, f"llvm.fabs.v{WIDTH}f64"), arguments)
 
     return VECTOR8(VECTOR8), codegen
 
