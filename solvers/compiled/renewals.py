@@ -17,18 +17,7 @@ from solvers.compiled.kernels import (
     inner,
     rubs,
 )
-from solvers.compiled.state import (
-    AT_ONCE,
-    LAST_EVENT,
-    LOGGED,
-    PEAK_DELTA,
-    RENEWAL,
-    T,
-    end_event,
-    event_row,
-    renew_slider_row,
-    write_event,
-)
+from solvers.compiled.state import LOGGED, PEAK_DELTA, RENEWAL, T, end_event, event_row, renew_slider_row, write_event
 from solvers.problem import event_list as at
 
 
@@ -70,14 +59,6 @@ def renew(problem, state, s, j, delta, rate):
     end_event(problem, state, s, row)
     if row[at.FROM] == 0.0 and row[at.TO] > 0.0:
         state.active[s, PEAK_DELTA] = delta
-
-
-@inlined
-def count_event(state):
-    """Count the events at one instant."""
-    t = state.now[T]
-    state.count[AT_ONCE] = state.count[AT_ONCE] + 1 if t == state.now[LAST_EVENT] else 0
-    state.now[LAST_EVENT] = t
 
 
 @inlined

@@ -255,6 +255,14 @@ def renew_slider_row(problem, state, s, j, row):
     end_event(problem, state, s, row)
 
 
+@inlined
+def count_event(state):
+    """Count the events at one instant."""
+    t = state.now[T]
+    state.count[AT_ONCE] = state.count[AT_ONCE] + 1 if t == state.now[LAST_EVENT] else 0
+    state.now[LAST_EVENT] = t
+
+
 @inner
 def switch(problem, state, s, direction):
     """Move stop s one segment up (direction 1) or down (-1), and log it, after the slip that it ends by a jump of N."""
@@ -273,8 +281,7 @@ def switch(problem, state, s, direction):
     end_event(problem, state, s, row)
     if rubs(problem, s) and (state.segment[s] == 0 or row[at.FROM] == 0.0):
         log_slider(problem, state, s)
-    state.count[AT_ONCE] = state.count[AT_ONCE] + 1 if t == state.now[LAST_EVENT] else 0
-    state.now[LAST_EVENT] = t
+    count_event(state)
 
 
 @inlined

@@ -23,9 +23,9 @@ from solvers.compiled.kernels import (
     slider_of,
     surface_tolerance,
 )
-from solvers.compiled.renewals import count_event, margins, margins_after, margins_in, renew
+from solvers.compiled.renewals import margins, margins_after, margins_in, renew
 from solvers.compiled.sliding import POINT, XI, XI_RATE, move_point, point_of, slider_margins, xi_tolerances
-from solvers.compiled.state import LAST_EVENT, T, rate_tolerance
+from solvers.compiled.state import LAST_EVENT, T, count_event, rate_tolerance
 from solvers.problem.friction import CODE, STICK
 from solvers.stepping.events import NONE, bisection, golden_section, motion_of, point_at, polynomial
 
@@ -40,7 +40,7 @@ _RATE_STEP = 1e-4  # part of a step over which the rate of a margin is differenc
 
 @inner
 def _slider_margins_now(problem, state, space, s, t, x, rate):
-    """The same of friction, in the state x with its rate, without moving it."""
+    """`_margins_now` of friction, in the state x with its rate, without moving it."""
     point, moved, scale = space.point[0], space.point[1], space.scale[s]
     point_of(problem, s, t, x, rate, point)
     scale[0] = max(scale[0], 4.0 * surface_tolerance(problem, s, x))

@@ -29,10 +29,10 @@ from solvers.compiled.kernels import (
     surface_tolerance,
 )
 from solvers.compiled.parts import BEHIND, PASSED, part
-from solvers.compiled.renewals import count_event, margins, margins_after, margins_in, renew
+from solvers.compiled.renewals import margins, margins_after, margins_in, renew
 from solvers.compiled.simd import load8
 from solvers.compiled.sliding import DELTA, RATE
-from solvers.compiled.state import AT_ONCE, LAST_EVENT, PEAK_FORCE, T, rate_tolerance
+from solvers.compiled.state import AT_ONCE, LAST_EVENT, PEAK_FORCE, T, count_event, rate_tolerance
 from solvers.exponential.circles.friction import TANGENTIAL
 from solvers.exponential.contact.crossings import (
     ON_BORDER,
@@ -79,7 +79,7 @@ _SLOPE_STEP = 1e-5  # relative step in σ for the slope of this polynomial at it
 _MOST_ILLINOIS = 6  # iterations for a root of the polynomial through the nodes
 _INTERPOLATED = 4.0  # rounding of a margin at points around a node, in units of that at the nodes
 _LOWEST = 2  # place in `Scratch.ends`, once the rounding is known, of the lowest margin at the end or between nodes
-_CHECKED_BELOW = 0.5  # margin at an end of a landing, in the same units, below which a minimum inside is looked for
+_CHECKED_BELOW = 0.5  # margin at an end of a landing, in units of its largest, below which minima inside are looked for
 _CLEAR = 0.03  # estimate of such a minimum, in the same units, that counts as positive
 
 
