@@ -119,8 +119,7 @@ def taylor_terms(problem, x, t, terms, signal_terms):
     n = problem.k.size
     for e in range(2 * n):
         terms[0, e] = x[e]
-    for j in range(problem.table_dt.size):
-        signal_derivatives(problem, j, t, signal_terms[j])
+    derive_signals(problem, t, signal_terms)
     for i in range(ORDER):
         for b in range(n):
             terms[i + 1, b] = terms[i, n + b]

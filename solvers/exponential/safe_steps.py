@@ -84,9 +84,10 @@ def _acceleration_bound(problem, tables, r, norms, signal_bounds, horizon):
 
 
 @inlined
-def _target(tables, t, first, second, t_end):
+def _target(tables, state, first):
     """Time at which a step must end: the end, or an output time too late to be evaluated from the step's start."""
-    if tables.fastest * (first - t) > SERIES_REACH:
+    t_end, second = state.now[T_END], state.due[min(state.count[SAMPLED] + 1, state.out.shape[0])]
+    if tables.fastest * (first - state.now[T]) > SERIES_REACH:
         return min(first, t_end)
     return t_end if tables.fastest * (second - first) <= SERIES_REACH else min(second, t_end)
 
@@ -264,24 +265,24 @@ def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell,
 @merged
 def fly(problem, tables, energy_tables, state, scratch, budget):
     """Fly until a stop is reached (returns its index), to the end (-1), or until the budget is spent (-2)."""
-    now, out, due = state.now, state.out, state.due
+    now, due = state.now, state.due
     sampled, with_energy = problem.table_dt.size > 0, energy_tables.active > 0.0
     dt_cell, count = problem.table_dt[0] if sampled else np.inf, 0
     while count < budget:
         if sampled:
             count += _cross_cells(problem, tables, energy_tables, state, scratch, budget - count)
         if due[state.count[SAMPLED]] <= now[T]:
-            copy(state.x, out[state.count[SAMPLED]], state.x.size)
+            row = state.out[state.count[SAMPLED]]
+            copy(state.x, row, state.x.size)
             if with_energy:
-                account_output(problem, tables, energy_tables, state, scratch, now[T], out[state.count[SAMPLED]])
+                account_output(problem, tables, energy_tables, state, scratch, now[T], row)
             state.count[SAMPLED] += 1
         if now[T] >= now[T_END]:
             return -1
 
         # --- the time up to the next output, the end, or the end of the signals' cell
         first = due[state.count[SAMPLED]]
-        second = due[min(state.count[SAMPLED] + 1, out.shape[0])]
-        target = _target(tables, now[T], first, second, now[T_END])
+        target = _target(tables, state, first)
         begin, span, rest, offset, cell = now[T], target - now[T], np.inf, 0.0, 0
         if sampled:
             cell, offset = cell_of(problem, now[T])

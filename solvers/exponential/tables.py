@@ -128,18 +128,8 @@ def uncut_parameters(contacts: Sequence[Any]) -> Any:
 
 # tables with columns for the tones' blocks
 TONE_TABLES = (
-    *(
-        "flight_propagator",
-        "contact_propagator",
-        "free",
-        "node_propagator",
-        "alias",
-        "ripple_weight",
-        "block_k_c",
-        "stop_rows",
-        "acceleration_weight",
-        "rate_weight",
-    ),
+    *("flight_propagator", "contact_propagator", "free", "node_propagator", "alias", "ripple_weight"),
+    *("block_k_c", "stop_rows", "acceleration_weight", "rate_weight"),
     *("signal_rows", "power_rows", "loss_rows", "steady_rate", "cell", "cell_error"),
 )
 

@@ -53,15 +53,13 @@ def sample_step(problem, tables, energy_tables, state, scratch, node_set, level)
 @merged
 def end_run(problem, tables, state, scratch, node_set, level):
     """End the run within the step, in the state that `sample_step` has written into ``scratch.stages[START]``."""
-    x, t_end = scratch.stages[START], state.now[T_END]
-    share = (t_end - state.now[T]) / tables.contact_step[level]
-    place = share ** (1.0 / tables.time_exponent[node_set])
+    x, t_end, h = scratch.stages[START], state.now[T_END], tables.contact_step[level]
+    place = min(((t_end - state.now[T]) / h) ** (1.0 / tables.time_exponent[node_set]), 1.0)
     for s in range(problem.law.size):
         if acting_segment(problem, state, s) > 0 and begins_and_ends(problem, s):
-            step_peaks(problem, tables, state, scratch, node_set, tables.contact_step[level], s, min(place, 1.0))
+            step_peaks(problem, tables, state, scratch, node_set, h, s, place)
             if rubs(problem, s):
-                length = tables.contact_step[level]
-                peak_of_friction(problem, tables, state, scratch, node_set, length, s, min(place, 1.0))
+                peak_of_friction(problem, tables, state, scratch, node_set, h, s, place)
     if state.event_record.shape[0]:
         record_forces(problem, state, scratch, PART, t_end, node_set, level)
     copy(x, state.x, state.x.size)
@@ -89,14 +87,14 @@ def finish_step(problem, tables, state, scratch, node_set, level):
             if rubs(problem, s):
                 work = work_with_friction(problem, tables, state, scratch, node_set, level, s)
                 peak_of_friction(problem, tables, state, scratch, node_set, h, s, 1.0)
-                state.x[size + 2 + 2 * s] += work
             elif is_circle(problem, s):
-                state.x[size + 2 + 2 * s] += work_in_circle(problem, tables, state, scratch, node_set, level, s)
+                work = work_in_circle(problem, tables, state, scratch, node_set, level, s)
             elif resolves_rates(tables, node_set, s, h):
-                state.x[size + 2 + 2 * s] += work_by_rates(tables, node_set, s, h, force, motion[1])
+                work = work_by_rates(tables, node_set, s, h, force, motion[1])
             else:
                 ends = scratch.start_motion[s, 0], indentation(problem, s, scratch.x_new)
-                state.x[size + 2 + 2 * s] += work_by_places(tables, node_set, force, motion[0], ends, scratch.trial)
+                work = work_by_places(tables, node_set, force, motion[0], ends, scratch.trial)
+            state.x[size + 2 + 2 * s] += work
             state.x[size + 3 + 2 * s] += h * sum8(weights_of(tables, node_set, s) * load8(force, 0))
             if is_open(problem, s):
                 continue

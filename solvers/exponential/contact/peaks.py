@@ -186,23 +186,15 @@ def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
         place = max(place, 0)
         if seen != place:
             motion_around(problem, tables, state, scratch, node_set, h, s, place)
-            local_motion, seen = scratch.local_motion, place
+            deltas, rates, seen = scratch.local_motion[DELTAS, :S], scratch.local_motion[RATES, :S], place
             for i in range(S):
-                local_motion[DELTAS, i] = off_knots(problem, s, state.segment[s], local_motion[DELTAS, i])
-            contact_forces(
-                problem,
-                s,
-                local_motion[DELTAS, :S],
-                local_motion[RATES, :S],
-                state.entry_rate[s],
-                local_motion[FORCES, :S],
-            )
+                deltas[i] = off_knots(problem, s, state.segment[s], deltas[i])
+            contact_forces(problem, s, deltas, rates, state.entry_rate[s], scratch.local_motion[FORCES, :S])
         begin, end = tables.local_interval[node_set, place]
         within = min(2.0 * (limit - begin) / (end - begin) - 1.0, 1.0)
         if within > -1.0:
-            best = local_maximum(
-                scratch.local_motion[FORCES] if d == 0 else scratch.local_motion[DELTAS], within, scratch.trial
-            )
+            sought = scratch.local_motion[FORCES if d == 0 else DELTAS]
+            best = local_maximum(sought, within, scratch.trial)
             state.active[s, column] = max(state.active[s, column], best)
 
 

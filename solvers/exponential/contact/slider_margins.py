@@ -180,16 +180,8 @@ def slider_margins_at_nodes(problem, tables, state, scratch, s, node_set, h):
     if _slips(slider) and _rate_dependent(problem, s):
         _node_accelerations(tables, scratch, node_set, h, s, motion[1], slid[SPARE])
     _margins_at(
-        problem,
-        tables,
-        state,
-        scratch,
-        s,
-        scratch.clipped,
-        motion[1],
-        slid[NODE_XI_RATE],
-        slid[TANGENTIAL],
-        slid[SPARE],
+        *(problem, tables, state, scratch, s, scratch.clipped),
+        *(motion[1], slid[NODE_XI_RATE], slid[TANGENTIAL], slid[SPARE]),
     )
 
 

@@ -151,31 +151,35 @@ def _leave_or_rest(problem, tables, state, scratch, stop, time_to_knot):
 
 
 @merged
-def _predict(problem, tables, state, scratch, level):
-    """First guess of the forces: the extrapolated polynomial of the last step, or the law for the free response."""
+def _extrapolate(problem, tables, scratch, s, level):
+    """Guess the forces of stop s by the extrapolated polynomial of the last step."""
     control = scratch.control
     shift = level - control[LEVEL] + 2
+    for r in range(row_of(problem, s), row_of(problem, s + 1)):
+        if 0 <= shift < tables.extrapolation.shape[1]:
+            combine(tables.extrapolation[control[NODE_SET], shift], scratch.previous[r], S, None, scratch.force[r])
+        else:
+            for i in range(S):
+                scratch.force[r, i] = scratch.previous[r, S - 1]
+
+
+@merged
+def _predict(problem, tables, state, scratch, level):
+    """First guess of the forces: the extrapolated polynomial of the last step, or the law for the free response."""
     for s in range(problem.law.size):
         if state.segment[s] == 0:
             continue
-        if control[NEW] and rubs(problem, s):
+        if not scratch.control[NEW]:
+            _extrapolate(problem, tables, scratch, s, level)
+        elif rubs(problem, s):
             guess_rubbing_forces(problem, tables, state, scratch, s)
-            continue
-        if control[NEW] and is_circle(problem, s):
+        elif is_circle(problem, s):
             guess_radial_forces(problem, tables, state, scratch, s)
-            continue
-        if control[NEW]:
+        else:
             free, force = scratch.free[row_of(problem, s)], force_of(problem, scratch, s)
             copy(free[0], scratch.clipped, S)
             contact_forces(problem, s, scratch.clipped, free[1], state.entry_rate[s], force)
             state.count[CALLS] += S
-            continue
-        for r in range(row_of(problem, s), row_of(problem, s + 1)):
-            if 0 <= shift < tables.extrapolation.shape[1]:
-                combine(tables.extrapolation[control[NODE_SET], shift], scratch.previous[r], S, None, scratch.force[r])
-            else:
-                for i in range(S):
-                    scratch.force[r, i] = scratch.previous[r, S - 1]
 
 
 @merged
