@@ -99,9 +99,7 @@ _MOST_ROUNDING = 0.01  # the same, up to which rounding of δ may hide a margin'
 _PROMISED = 0.01  # the same after a first trial whose slope is known, up to which the landing goes on
 _HALVINGS, _LEAST_SHARE = 30, 1e-3  # of an interval that contains a root; least share of the way to it
 _MOST_VERTICES = 6  # parabolas to the maximum of |F_t| inside a landing
-_MOST_BORDER_TRIALS = (
-    40  # of a landing on a bend or border: δ may change only near the start, which bisection must find
-)
+_MOST_BORDER_TRIALS = 40  # on a bend or border: δ may change only near the start, which bisection must find
 _ERROR_SHARE = 0.1  # part of the embedded difference that counts as the error
 _ERROR_SHARE_FOURTH_ROOT = 3e-2  # the same with u = δ^{1/4}: terms t² = u⁸, exact in the step, make up the difference
 _DERIVATIVE_SHARE, _MOST_FACTOR = 0.01, 1e4  # the derivative of a run may err by a hundred tolerances of the motion
