@@ -142,7 +142,7 @@ def _bin_count(values: NDArray[np.float64]) -> int:
     """Freedman and Diaconis' number of bins, within reason for heavy tails."""
     lower, upper = np.percentile(values, [25, 75])
     width = 2 * (upper - lower) / values.size ** (1 / 3)
-    return int(np.clip(np.ptp(values) / width, 10, MOST_BINS)) if width > 0 else MOST_BINS
+    return max(10, int(np.ptp(values) / width)) if np.ptp(values) < MOST_BINS * width else MOST_BINS
 
 
 def _edges(values: NDArray[np.float64], bins: int | ArrayLike) -> NDArray[np.float64]:
