@@ -47,7 +47,7 @@ from solvers.problem.whole_runs import must_be_whole, whole_runs
 
 _SAMPLES = 64  # of a run that is made again for its balance
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
-_IDLE, _MOST_IDLE = 1e-7, 50  # part of the duration that such a block must pass; blocks that may not, one after another
+_IDLE, _MOST_IDLE = 1e-6, 50  # of shortened steps: part of the duration a block must pass; blocks in turn that may not
 _MOST_KEPT = 1 << 22  # bytes of sampled signals that are kept for other runs: of longer ones the run takes the time
 _NOTHING = np.empty(0)  # latched by a law without memory
 
@@ -312,7 +312,7 @@ class _Run:
                 if code == LOG_FULL:
                     self.engine.record(log=np.concatenate((self.state.log, np.empty_like(self.state.log))))
                 code = self.engine.march(BLOCK_STEPS)
-                if code == RUNNING:
+                if code == RUNNING and self.system.kept.find("shortened"):
                     idle = idle + 1 if self.time - passed < _IDLE * self.engine.duration else 0
                     if idle > _MOST_IDLE:
                         return Status.STALLED

@@ -78,6 +78,14 @@ def test_a_branch_is_not_continued_under_a_law_with_other_code(tmp_path):
         with_law(3.0).resume(tmp_path / "b.npz")
 
 
+def test_a_branch_of_what_has_no_digest_is_saved_all_the_same(model, tmp_path, monkeypatch):
+    branch = model.branch("omega", (190.0, 200.0), at=195.0)
+    next(iter(branch))
+    monkeypatch.setattr("fembeam.model.branch.fingerprint", lambda *_: (_ for _ in ()).throw(ValueError("a lock")))
+    branch.save(tmp_path / "b.npz")
+    assert len(model.resume(tmp_path / "b.npz").parameter) == 1
+
+
 def test_branch_marks_the_flip_and_its_copy_from_a_file_is_the_same(model, tmp_path):
     branch = model.branch("omega", (270.0, 300.0), at=280.0, step=0.2).run()
     flips = [orbit for orbit in branch.special if orbit.mark == "flip"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -174,7 +175,7 @@ class Branch(Printed):
         model = self.family.model
         record = {
             **{"name": self.family.name, "period": self.family.period},
-            **{"scene": repr(model.scene), "digest": fingerprint(model.scene, "the scene")},
+            **{"scene": repr(model.scene), "digest": _digest(model)},
             **{"modes": list(model.modes), "omega": model.omega.tolist(), "walks": recorded(self.found)},
         }
         with written_whole(Path(path)) as file:
@@ -221,13 +222,20 @@ def resumed(model: Model, path: str | Path) -> Branch:
     same = omega.shape == model.omega.shape and bool(np.allclose(omega, model.omega, rtol=SAME, atol=0.0))
     if not same and not any(differing):
         differing = [f"the frequencies, {omega} there and {model.omega} here in rad/s, of another mesh"]
-    if record["digest"] != fingerprint(model.scene, "the scene") and not any(differing):
+    if record["digest"] != _digest(model) and not any(differing):
         differing = ["a law, a signal or fembeam itself has other code, or reads other values, than there"]
     if said := "; ".join(filter(None, differing)):
         raise ValueError(f"{path} belongs to another scene: {said}; set it back, delete the file to begin anew, "
                          "or choose another place")  # fmt: skip
     family = Family(model, record["name"], record["period"])
     return Branch(family, restarted(family, record["walks"]))
+
+
+def _digest(model: Model) -> str:
+    """Digest of the scene; "" of one that cannot be told from another, whose branch is saved all the same."""
+    with suppress(ValueError):
+        return fingerprint(model.scene, "the scene")
+    return ""
 
 
 def _record_of(path: str | Path) -> dict[str, Any]:
