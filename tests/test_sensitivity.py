@@ -76,6 +76,17 @@ def test_a_force_that_jumps_at_entry():
     assert np.isnan(found.exits[0])
 
 
+def test_the_peak_of_a_contact_that_only_pulls():
+    """A dashpot holds back what leaves it from the start on: the log has the peak 0, whatever its strength."""
+    start = [GAP + 1e-3], [-SPEED], 0.01
+    strengths = Nearby.of(lambda c: ball(law=KelvinVoigt(1e3, c)), 20.0, 1e-2)
+    system = ball(law=KelvinVoigt(1e3, 20.0))
+    assert integrate(system, *start).contacts.peak_force == [0.0]
+    found = sensitivity(system, *start, nearby=strengths, method=FINE)
+    assert found.impulse[0] < -1e-5
+    assert found.peak_force[0] == 0.0
+
+
 @pytest.mark.parametrize("speed", [1e-6, 1e-3, 1e3])
 def test_damping_by_the_entry_rate_scales_with_it(speed):
     """Of F = K δ^p (1 + a δ̇/v) and entries at v: F ~ v^(2p/(p + 1)) at any v, the impulse as v."""

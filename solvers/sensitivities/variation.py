@@ -319,7 +319,7 @@ class _Contact:
     exit: Array
     impulse: Array
     peak: Array
-    top: float = -np.inf
+    top: float = 0.0  # as in the log: of a contact that only pulls the peak is 0
 
     def offer(self, force: float, change: Array) -> None:
         """Take a force and its derivatives as peak if it is the largest so far."""
@@ -430,7 +430,7 @@ class _Walk:
                 one.exit, one.impulse = last[own], (self.flow.impulse[s] - one.before)[own]
             if begins:
                 unknown = np.full(len(self.asked.by), np.nan)
-                self.open[s] = _Contact(s, last[own], before, unknown, unknown, unknown)
+                self.open[s] = _Contact(s, last[own], before, unknown, unknown, np.zeros(len(unknown)))
                 self.contacts.append(self.open[s])
             self._offer(self._at_instant(t), last)
 
