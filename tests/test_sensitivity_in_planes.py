@@ -75,6 +75,21 @@ def test_a_slip_that_ends_at_a_knot():
     np.testing.assert_allclose(found.states[-1], expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
 
 
+def test_a_slip_that_ends_at_the_knot_that_moves():
+    """N of nearby laws is one of both segments there: derivatives of the motion along the wall had the other sign."""
+
+    def made(knot):
+        return wall(PiecewiseLinear([4e5, 4e6], [knot]))
+
+    start = [-1e-3, 0.0], [0.8, 0.6], 0.0016
+    found = sensitivity(made(1e-4), *start, [0.0016], Nearby.of(made, 1e-4, 1e-11), method=FINE)
+    assert list(found.solution.transitions.event[:1]) == ["stick"]
+    assert found.solution.transitions.t[0] > found.contacts.t_in[0]
+    expected = five_points(lambda h: integrate(made(1e-4 + h), *start, method=SHARP).end[:4], 1e-9)
+    for kind in (slice(2), slice(2, 4)):
+        np.testing.assert_allclose(found.states[-1, kind], expected[kind], atol=1e-5 * np.abs(expected[kind]).max())
+
+
 def test_two_slips_that_one_entry_ends():
     """Two equal walls with dashpots; another stop presses the mass to both at once."""
     one, push = wall(KelvinVoigt(2e5, 50.0), k_t=2e4), Contact([0.6, -0.8], KelvinVoigt(4e5, 600.0), 4e-4)

@@ -86,11 +86,13 @@ class Flow:
             self.system.contacts[s].law, self._inside(s, acting, self.motion_of(t, s)), acting.entry_rate[s]
         )
 
-    def _inside(self, s: int, acting: Acting, motion: ElementMotion) -> tuple[Array, Array]:
-        """δ, kept within the segment of the law, and δ̇."""
+    def _inside(self, s: int, acting: Acting, motion: ElementMotion, more: Sequence[Any] = ()) -> tuple[Array, Array]:
+        """δ, kept within the segment of the law, and of ``more`` laws with as many knots elsewhere, and δ̇."""
         contact = self.system.contacts[s]
-        knots = (-np.inf if contact.always else 0.0, *contact.law.knots, np.inf)
-        low, high = knots[acting.segment[s] - 1], knots[acting.segment[s]]
+        lowest, own = -np.inf if contact.always else 0.0, contact.law.knots
+        alike = (law.knots for law in more if len(law.knots) == len(own))  # those of a sum may fall together
+        knots = np.array([(lowest, *one, np.inf) for one in (own, *alike)])
+        low, high = knots[:, acting.segment[s] - 1].max(), knots[:, acting.segment[s]].min()
         low = low + _INSIDE * abs(low) + 1e-300 if np.isfinite(low) else low  # above zero, where a force may jump
         high = high * (1.0 - _INSIDE)
         return np.clip(motion.delta, low, high), motion.rate
@@ -155,12 +157,14 @@ class Flow:
 
         return self.by.over_laws(s, of)
 
-    def _force_over_laws(self, s: int, acting: Acting, inside: tuple[Array, Array]) -> Array:
+    def _force_over_laws(self, s: int, acting: Acting, motion: ElementMotion) -> Array:
         """Derivatives (k, d) of N by the parameters, through the law's numbers at fixed motion.
 
-        Of a law that is cut at zero force where it is not cut itself: nearby ones are cut a little before or after.
+        On a knot, a little beside it, where nearby laws of other knots are in the same segment. Of a law that is cut at
+        zero force where it is not cut itself: nearby ones are cut a little before or after.
         """
         law, rate = self.system.contacts[s].law, acting.entry_rate[s]
+        inside = self._inside(s, acting, motion, self.by.laws_of(s))
         if getattr(law, "bend", None) != "force":
             return np.asarray(self.over_laws(s, acting, lambda one, own: laws.force(one, own, inside, rate)))
         pushes: Any = laws.bend(law, inside, rate)
@@ -176,7 +180,7 @@ class Flow:
         by_law = np.outer(slopes[2], self.entry[s])
         if len(self.latched[s]) and slider is None:
             by_law += laws.by_latched(law, acting.rows[s], inside, rate).T @ self.latched[s]
-        by_law[:, self.own] += self._force_over_laws(s, acting, inside)
+        by_law[:, self.own] += self._force_over_laws(s, acting, motion)
         if circle := self.system.contacts[s].circle:
             by_law[:, self.own] -= np.outer(slopes[0], np.sign(circle) * self.by.elements[s].clearance)
         found = linear(motion, slider, self.force(t, s, acting, motion), slopes[:2], by_law)

@@ -173,6 +173,10 @@ class Change:
         moving = any(signal is not None for signals in self.signals for signal in signals)
         return self.structural or moving or bool(np.any(self.vectors))
 
+    def laws_of(self, s: int) -> list[Any]:
+        """The laws of an element in all nearby systems, of parameters that change its law."""
+        return [law for laws in self.laws for law in laws[s] or ()]
+
     def of_knot(self, s: int, border: int) -> Array:
         """(d,) derivatives of a knot of an element; border 0 is its surface."""
         return self.over_laws(s, lambda law: 0.0 if border == 0 else law.knots[border - 1])
