@@ -86,10 +86,11 @@ class HenonRK2(ConstantStep):
 
     Notes
     -----
-    Order 2; only 1 for a law whose force jumps, as the exit is not located. Unstable for every step on an undamped
-    mode (|R|² = 1 + (hω)⁴/4); with damping ratio ζ stable for about hω < (8ζ)^(1/3). Two contacts of one stop inside
-    one flight step are missed. Where the beam grazes a stop Hénon's step divides by zero; it is then approached with
-    ``dt_contact`` instead, without landing.
+    Order 2; only 1 for a law whose force jumps, as the exit is not located, and for one that depends on the entry rate
+    where a stop is met while another is in contact, as it lands from flight only. Unstable for every step on an
+    undamped mode (|R|² = 1 + (hω)⁴/4); with damping ratio ζ stable for about hω < (8ζ)^(1/3). Two contacts of one stop
+    inside one flight step are missed. Where the beam grazes a stop Hénon's step divides by zero; it is then approached
+    with ``dt_contact`` instead, without landing.
 
     Examples
     --------
