@@ -91,7 +91,7 @@ def test_signals_and_spectra_by_name():
     t = np.linspace(0.0, 4.0, 401)
     spectrum = fb.response_spectrum(t, np.sin(9.0 * t), periods=np.geomspace(0.05, 5.0, 9), zeta=[0.02])
     entries = legend(plot.response_spectrum({BROKEN: spectrum, HIDDEN: spectrum}))
-    assert [entry.partition(", ζ")[0] for entry in entries] == [BROKEN, HIDDEN]
+    assert [entry.partition(", ζ")[0] for entry in entries[:-1]] == [BROKEN, HIDDEN]
 
 
 def test_places_of_frames():

@@ -177,6 +177,15 @@ def test_a_transient_gets_a_response_spectrum_instead_of_a_psd(knocked, tmp_path
     np.testing.assert_allclose(again.axes[0].lines[0].get_ydata(), level)
 
 
+def test_floor_spectra_in_axes_of_an_array_keep_their_warning_and_their_legend(knocked):
+    axes = Figure().subplots(2)
+    figure = plot.floor_spectrum(knocked, axes=axes)
+    assert "Contacts are shorter than ten samples" in axes[0].get_title("left")
+    assert "pseudo-acceleration" in axes[0].get_legend().get_texts()[-1].get_text()
+    assert "pseudo-acceleration" in texts(report.figures(knocked)["response_spectrum"]())
+    assert figure is axes[0].figure
+
+
 def test_linear_response_lies_in_the_band_of_a_linear_run(run):
     noise = fb.BandNoise(2e-4, (0.0, 1226.6), seed=3)
     scene = dataclasses.replace(run.model.scene, stops=[], base=noise, damping=fb.ModalDamping(0.1))

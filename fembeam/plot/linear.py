@@ -61,7 +61,8 @@ def response_spectrum(
             colour = line.get_color()
             upper.loglog(period, one.pseudo_acceleration[i, order], "k--", linewidth=0.7)  # seen where they coincide
             lower.loglog(period, scale * one.displacement[i, order], color=colour)
-    upper.set(ylabel="largest acceleration / m s⁻²", title="Response spectrum; dashed: pseudo-acceleration ω² max |x|")
+    upper.lines[-1].set_label("pseudo-acceleration ω² max |x|")
+    upper.set(ylabel="largest acceleration / m s⁻²", title="Response spectrum")
     lower.set(xlabel="period / s", ylabel=f"largest displacement / {unit}")
     for axis in (upper, lower):
         axis.margins(x=0.0)
@@ -100,9 +101,11 @@ def floor_spectrum(run: Run, z: Any = None, zeta: float = 0.05, axes: Sequence[A
         along = split(place)[1] if isinstance(place, tuple) else UP
         found["frame"] = computed(run.t, frame_motion(run, 2, along), omega, zeta)
     figure = response_spectrum(found, axes)
+    drawn = figure.axes if axes is None else axes
+    drawn[0].set_title("")
+    heading(drawn, "Response spectra of absolute motion", axes is None, run=run)
     if said:
-        (axes or figure.axes)[0].set_title("Contacts are shorter than ten samples: levels are rough; lower dt")
-    heading(figure.axes if axes is None else axes, "Response spectra of absolute motion", axes is None, run=run)
+        drawn[0].set_title("Contacts are shorter than ten samples: levels are rough; lower dt")
     return figure
 
 
