@@ -2,6 +2,7 @@
 
 import dataclasses
 import re
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -128,7 +129,7 @@ def test_shaded_contacts_are_those_of_the_stop_whose_motion_is_drawn(knocked):
     at = np.searchsorted(knocked.t, 0.6)
     z = knocked.stops[stop, 0]
     assert np.interp(knocked.t[at], t, u) == pytest.approx(1e3 * knocked.displacement(z)[at])
-    assert f"contacts of {knocked.name(stop)} shaded" in texts(figure)
+    assert f"contacts of {knocked.name(stop)} shaded" in " ".join(texts(figure).split())
     tops = [segment[1, 1] for lines in lower.collections for segment in lines.get_segments()]
     short = (log.t_out - log.t_in < 10 * 2e-4) & (log.t_in < 1.2)
     assert sorted(tops) == pytest.approx(sorted(log.peak_force[short]))
@@ -184,6 +185,47 @@ def test_floor_spectra_in_axes_of_an_array_keep_their_warning_and_their_legend(k
     assert "pseudo-acceleration" in axes[0].get_legend().get_texts()[-1].get_text()
     assert "pseudo-acceleration" in texts(report.figures(knocked)["response_spectrum"]())
     assert figure is axes[0].figure
+
+
+LONG = "guide of the main steam line at the wall of the turbine hall, north side, of the drawing of 1987"
+
+
+@pytest.fixture(scope="module")
+def long_named(run):
+    stops = [dataclasses.replace(stop, name=f"{LONG} {i}") for i, stop in enumerate(run.model.scene.stops)]
+    return dataclasses.replace(run.model.scene, stops=stops).reduce(2).simulate(2.0, 1e-3)
+
+
+@pytest.mark.parametrize(
+    "draw", [plot.time_history, plot.spectrum, lambda run: plot.frame(run, 1.0)], ids=["history", "psd", "animation"]
+)
+def test_long_names_fit(long_named, draw):
+    figure = draw(long_named)
+    figure.draw_without_rendering()
+    legends = [*figure.legends, *(axis.get_legend() for axis in figure.axes if axis.get_legend())]
+    drawn = [*figure.texts, *(text for legend in legends for text in legend.get_texts())]
+    extents = [text.get_window_extent() for text in drawn]
+    assert any("turbine" in text.get_text() for text in drawn)
+    assert all(extent.x0 >= 0.0 and extent.x1 <= figure.bbox.x1 for extent in extents)
+    assert figure.axes[0].get_position().width > 0.6
+
+
+def test_numbers_below_a_narrow_density_do_not_overlap():
+    x = -0.5e-3 + 1.7e-5 * np.random.default_rng(0).standard_normal(1000)
+    signal = statistics.Signal(x, 1e-3, 256)
+    signal.add(x)
+    figure = plot.random_densities({"a": signal, "b": signal})
+    figure.draw_without_rendering()
+    labels = [label.get_window_extent() for label in figure.axes[0].get_xticklabels() if label.get_text()]
+    assert all(left.x1 < right.x0 for left, right in pairwise(labels))
+
+
+def test_a_legend_of_many_laws_fits():
+    figure = plot.loops({f"law {i}": KelvinVoigt(1e5 * (i + 1), 10.0) for i in range(30)})
+    figure.draw_without_rendering()
+    extent = figure.legends[0].get_window_extent()
+    assert extent.y0 >= 0.0
+    assert extent.y1 <= figure.bbox.y1
 
 
 def test_linear_response_lies_in_the_band_of_a_linear_run(run):

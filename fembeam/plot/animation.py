@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from fembeam.plot.bodies import BodyStage
 from fembeam.plot.run_signals import samples_in
-from fembeam.plot.style import BLUE, GREY, ORANGE, RED, own_colour, styled, verbatim
+from fembeam.plot.style import BLUE, GREY, ORANGE, RED, entry, own_colour, styled
 from fembeam.plot.units import length_for, unit_for
 from fembeam.scene import ON
 from fembeam.support import require, written_beside
@@ -27,6 +27,7 @@ Vector = NDArray[np.float64]
 
 MOST_FRAMES = 1000  # above it a GIF takes minutes and fills disks
 POINTS = 121  # along a beam
+ACROSS, HANDLE = 96, 8  # characters of a legend side by side, and as many as the handle of an entry takes
 STAY = 0.6  # of the height of the picture, the length of the arrow of the largest force
 
 
@@ -222,15 +223,19 @@ class _Stage:
         self.tick, self.second = unit_for(self.run.t[self.samples[[0, -1]]], "s")
         t = self.tick * self.run.t[self.samples]
         for i, force in enumerate(self.forces):
-            label = verbatim(self.run.name(i))
+            label = entry(self.run.name(i))
             self.force_axis.step(t, scale * force, color=own_colour(i), where="mid", label=label)
         self.cursor = self.force_axis.axvline(t[0], color=ORANGE)
         self.force_axis.set(xlabel=f"time / {self.second}", ylabel=f"peak contact\nforce / {unit}")
         self.force_axis.set_xlim(*self.tick * self.run.t[self.samples[[0, -1]]])
         if len(self.forces) > 1:
-            self.figure.legend(*self.force_axis.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-        self.figure.draw_without_rendering()
-        self.figure.set_layout_engine("none")  # once is enough, and takes longer than a picture
+            handles, labels = self.force_axis.get_legend_handles_labels()
+            longest = max(len(line) for label in labels for line in label.splitlines())
+            columns = max(1, min(4, ACROSS // (longest + HANDLE)))
+            self.figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+        for _ in range(2):  # the first may change the ticks, and so the space for them
+            self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")  # takes longer than a picture
         return self.figure
 
     def _limits(self, axis: Axes) -> float:

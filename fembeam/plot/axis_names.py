@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from fembeam.plot.style import short
 from fembeam.scene import PointMoment, Scene
 
 SIGNALS = {"base": "base", "foot": "foot", "signal": "drive", "motion": "motion"}
@@ -120,7 +121,8 @@ def frequency_words(coordinate: str, omega: float) -> str:
     $\omega_{2}$ of beam 1 = 310, static shape: 473
     """
     number, space, of = coordinate.removeprefix("mode ").partition(" ")
-    return rf"$\omega_{{{number}}}${space}{of} = {omega:.0f}" if number.isdigit() else f"{coordinate}: {omega:.0f}"
+    name = rf"$\omega_{{{number}}}${space}{of} =" if number.isdigit() else f"{coordinate}:"
+    return f"{name} {short(omega)}"
 
 
 def _owner(scene: Scene, beam: str | None, kind: str, number: int) -> str:

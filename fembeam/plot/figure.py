@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from fembeam.model import Run
 
-TITLE = 12.5  # characters of a title on an inch of a figure
+TITLE = 12.0  # characters of a title on an inch of a figure
 MANY_ROOM = "the axes must be as many as the figure has panels"
 
 

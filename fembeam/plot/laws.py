@@ -9,7 +9,7 @@ import numpy as np
 
 from contacts import PUBLISHED, Bounce, Hysteretic, Identified, KelvinVoigt, Law, Viscoelastic, bounce, restitution
 from fembeam.plot.figure import heading, legend, sheet
-from fembeam.plot.style import BLUE, CYCLE, GREY, RED, Vector, own_colour, styled, verbatim
+from fembeam.plot.style import BLUE, CYCLE, GREY, RED, Vector, entry, own_colour, styled, verbatim
 from fembeam.plot.units import length_for, unit_for
 from fembeam.support import require
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from fembeam.study import Equivalent
 
 POINTS = 100  # between two turning points of a path
+ROWS = 18  # of a legend, as high as the figure
 
 
 @styled
@@ -165,10 +166,10 @@ def _drawn(
     scale, unit = unit_for([force for _, force in curves.values()], "N")
     per_length, of_length = length_for([delta for delta, _ in curves.values()])
     for number, (name, (delta, force)) in enumerate(curves.items()):
-        axis.plot(per_length * delta, scale * force, **_line(number), label=verbatim(name))
+        axis.plot(per_length * delta, scale * force, **_line(number), label=entry(name))
     axis.axhline(0.0, color=GREY, linewidth=0.6)
     axis.set(xlabel=f"{words[0]} / {of_length}", ylabel=f"{words[1]} / {unit}")
-    legend(axis, axes is None, "outside right center")
+    legend(axis, axes is None, "outside right center", ncols=-(-len(curves) // ROWS))
     heading([axis], title, axes is None)
     return figure
 

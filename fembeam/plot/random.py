@@ -10,7 +10,19 @@ import numpy as np
 
 from fembeam.plot.figure import sheet
 from fembeam.plot.orbits import branch
-from fembeam.plot.style import BLUE, GREY, RED, curve, fit_levels, one_legend, own_colour, ribbon, styled, verbatim
+from fembeam.plot.style import (
+    BLUE,
+    GREY,
+    RED,
+    curve,
+    entry,
+    fit_levels,
+    one_legend,
+    own_colour,
+    ribbon,
+    styled,
+    verbatim,
+)
 from fembeam.plot.units import length_for
 from fembeam.statistics import Spectrum
 
@@ -23,6 +35,7 @@ if TYPE_CHECKING:
 
 FURTHEST = 5.0  # standard deviations shown of a density
 WIDTH = 44  # characters of a line over a density
+TICKS = 5  # at most, between the ends of a density
 ROOM = 1.3  # of the highest density, the height of its axis, so that the legend has room
 
 
@@ -51,7 +64,7 @@ def random_spectra(
         lines = {label: x if isinstance(x, Spectrum) else x.psd for label, x in shown.items()}
         axis = drawn[row * columns]
         for i, (label, line) in enumerate(lines.items()):
-            curve(axis, line, omega_max, label=verbatim(label), color=own_colour(i))
+            curve(axis, line, omega_max, label=entry(label), color=own_colour(i))
         fit_levels(axis, list(lines.values()), omega_max)
         if bands and title in bands:
             axis.axvspan(*bands[title], ymin=0.96, color=GREY, alpha=0.6, linewidth=0)
@@ -109,6 +122,7 @@ def density_panels(axes: Sequence[Axes], signals: Mapping[str, Signal]) -> None:
         shape = f"skewness\xa0{_rounded(signal.skewness)}", f"kurtosis {_rounded(signal.kurtosis)}"
         axis.set_title(",\n".join((_filled(f"{name}: {shape[0]}"), shape[1])))
         axis.set_xlabel(_filled(f"{name}\xa0/\xa0{unit}"))
+        axis.locator_params(axis="x", nbins=TICKS)
         axis.set(xlim=(wide[0], wide[-1]), ylim=(0, ROOM * max(p.max(), normal.max())))
         if unit != said:
             axis.set_ylabel(f"probability density / {unit}⁻¹")

@@ -21,7 +21,7 @@ from fembeam.plot.run_signals import (
     sampling_of,
     signal_name,
 )
-from fembeam.plot.style import BLUE, CYCLE, GREEN, GREY, Vector, curve, drawable, fit_levels, styled, verbatim
+from fembeam.plot.style import BLUE, CYCLE, GREEN, GREY, Vector, curve, drawable, entry, fit_levels, short, styled
 from fembeam.response import frame_motion
 from fembeam.scene import signals_of
 from fembeam.statistics import Spectrum, psd
@@ -76,7 +76,7 @@ def spectrum(
     for axis, names in ((upper, [*bases, main]), (lower, others or [main])):
         behind = [linear[name] for name in names if name in linear]
         for name in names:
-            curve(axis, spectra[name], top, color=colours[name], label=verbatim(signal_name(run, name)))
+            curve(axis, spectra[name], top, color=colours[name], label=entry(signal_name(run, name)))
         for line in behind:  # thin, and in front: where both agree both are seen
             curve(axis, line, top, color="black", linestyle="--", linewidth=0.7, label="linear, no contact")
         axis.set_ylabel("PSD / m² s rad⁻¹")
@@ -92,7 +92,7 @@ def spectrum(
 def _about(run: Run, discard: float, line: Spectrum) -> str:
     """What the spectra rest on."""
     seconds = np.count_nonzero(run.t >= discard) * sampling_of(run)
-    about = f"{seconds:.4g} s, {line.n_segments} segments, lines {line.omega[1]:.2g} rad/s apart"
+    about = f"{seconds:.4g} s, {line.n_segments} segments, lines {short(line.omega[1])} rad/s apart"
     sure = line.estimate is not None and line.estimate.batches > 1
     return f"Power spectral densities{after(discard)} ({about}{', 95 % shaded' if sure else ''})"
 

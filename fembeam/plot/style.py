@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Callable, Sequence
 from functools import wraps
 from inspect import signature
@@ -29,6 +30,7 @@ P = ParamSpec("P")
 
 
 BLUE, RED, GREEN, ORANGE, GREY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#777777"  # Okabe and Ito
+ENTRY = 40  # characters of a line in a legend
 CYCLE = BLUE, RED, GREEN, ORANGE, "#CC79A7", "#56B4E9"
 
 
@@ -82,6 +84,29 @@ def verbatim(name: Any) -> str:
     """
     text = str(name).replace("$", r"\$")
     return f" {text}" if text.startswith("_") else text
+
+
+def entry(name: Any) -> str:
+    """A user's name as the entry of a legend, on several lines where it is long.
+
+    Examples
+    --------
+    >>> print(entry("guide of the main steam line at the turbine hall, north"))
+    guide of the main steam line at the
+    turbine hall, north
+    """
+    return verbatim(textwrap.fill(str(name), ENTRY, break_on_hyphens=False))
+
+
+def short(number: float) -> str:
+    """A number above 0 with two digits, without an exponent where it is large.
+
+    Examples
+    --------
+    >>> short(0.314), short(7.85), short(125.3)
+    ('0.31', '7.8', '125')
+    """
+    return f"{number:.0f}" if number >= 10.0 else f"{number:.2g}"
 
 
 def place_name(z: Any) -> str:
