@@ -113,6 +113,7 @@ def test_brute_force_agrees_with_the_branch(model):
     branch = model.branch("omega", (200.0, 215.0), at=200.0, step=0.5).run()
     peaks = [max(-low, high) for low, high in (branch.orbits[0].extremes(TIP), branch.orbits[-1].extremes(TIP))]
     np.testing.assert_allclose(found.peaks, np.repeat([[peaks[0]], [peaks[1]]], 4, axis=1), rtol=1e-6)
+    assert found.figure().axes[0].get_xlabel() == "drive frequency ω / rad s⁻¹"
 
 
 def test_brute_force_reduces_as_the_model_was(model):

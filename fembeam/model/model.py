@@ -77,7 +77,8 @@ class Model(Printed, ModalEquations):
     reduction_options: dict[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
-        size = f"{counted(len(self.omega), 'coordinate')}, {self.omega.min():.6g} to {self.omega.max():.6g} rad/s"
+        ends = dict.fromkeys(f"{omega:.6g}" for omega in (self.omega.min(), self.omega.max()))
+        size = f"{counted(len(self.omega), 'coordinate')}, {' to '.join(ends)} rad/s"
         return f"<model of {size}, with {counted(len(self.contact_rows), 'contact')}>"
 
     def _parts(self) -> list[Part]:

@@ -104,7 +104,7 @@ def bifurcation(found: Bifurcation, axes: Axes | None = None) -> Figure:
     figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
     scale, unit = length_for(found.cloud()[1])
     _draw_cloud(axis, found.cloud(), scale)
-    axis.set(xlabel=verbatim(found.name), ylabel=f"max |{displacement_name(found.z)}| / {unit}")
+    axis.set(xlabel=verbatim(found.title), ylabel=f"max |{displacement_name(found.z)}| / {unit}")
     return figure
 
 

@@ -175,8 +175,8 @@ def _rigid(structure: Structure) -> Iterator[str]:
         worst = max(left for _, left in free)
         yield f"K r = 0 to {worst:.1g} of |K||r| for the rigid motions {', '.join(name for name, _ in free)}"
     if held:
-        told = ", ".join(f"{name} ({left:.2g})" for name, left in held)
-        yield (f"K resists the rigid motions {told} of |K||r|: the structure is grounded there, or its dofs are in "
+        told = ", ".join(f"{name} ({left:.2g} of |K||r|)" for name, left in held)
+        yield (f"K resists the rigid motions {told}: the structure is grounded there, or its dofs are in "
                "another order than the labels")  # fmt: skip
     if not structure.nodes and len(structure.components) > 1:
         yield "rotations were not checked: give nodes, {node: (x, y, z)}"

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam import plot
 from fembeam.model import Model, extremes_of, load_period, observed
+from fembeam.plot.axis_names import axis_name
 from fembeam.scene import Place, changes_structure, path_of, with_value
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import samples_per_period
@@ -32,6 +33,7 @@ class Bifurcation(Result):
 
     Attributes
     ----------
+    name : path of the parameter. z : place whose displacement is watched. title : name of the parameter for axes.
     parameter : (k,) values. strobes : (k, p, 2n) states at t = 0 of p successive periods: the Poincaré map.
     peaks : (k, p) largest |u(z)| in each of these periods, m; between samples by cubics.
     """
@@ -41,6 +43,7 @@ class Bifurcation(Result):
     parameter: Vector
     strobes: Vector
     peaks: Vector
+    title: str
 
     def __repr__(self) -> str:
         return f"<settled motion at {len(self.parameter)} values of {self.name}, {self.peaks.shape[1]} periods each>"
@@ -109,7 +112,8 @@ def bifurcation(
             "bifurcation", "use model.state(displacement, velocity)")  # fmt: skip
     task = partial(_settled, model, path, place, settle, keep, state)
     results = spread(task, list(values), executor, "bifurcation")
-    return Bifurcation(path, place, values, np.array([r[0] for r in results]), np.array([r[1] for r in results]))
+    strobes, peaks = (np.array([result[i] for result in results]) for i in (0, 1))
+    return Bifurcation(path, place, values, strobes, peaks, axis_name(path, model.scene))
 
 
 def _settled(
