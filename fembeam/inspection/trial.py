@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import solvers
+from fembeam.inspection.units import highest_driven
 from fembeam.scene import signals_of
 from solvers.problem.whole_runs import whole_runs
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 PERIODS = 20.0  # periods of the lowest mode that swings: how long a trial usually lasts
 FEW_STOPS = 100  # stops up to which a trial lasts PERIODS; with more it is shorter in proportion
 LEAST_PERIODS = 4.0  # periods of the lowest mode that it lasts nevertheless
-MOST_PERIODS = 3000.0  # periods of the highest mode that a trial may last, which costs the time
+MOST_PERIODS = 3000.0  # periods of the highest mode, or of a faster load, that a trial may last, which costs the time
 MOST_RECORDED = 30_000.0  # periods of the highest mode under records or sweeps: the strongest part may come late
 NOMINAL_SPEED = 0.1  # m/s, speed of impact at a stop that no trial struck
 MOST_STRUCK = 40  # stops; each takes a fiftieth of a second
@@ -66,7 +67,9 @@ def _trial(model: Model) -> tuple[solvers.ContactLog | None, list[str]]:
         return None, []
     lengths = [signal.duration for signal in signals_of(model.scene).values() if hasattr(signal, "duration")]
     share = min(1.0, FEW_STOPS / max(len(model.scene.stops), 1))
-    usual = min(max(PERIODS * share, LEAST_PERIODS) / float(moving.min()), MOST_PERIODS / fastest(model))
+    driven = highest_driven(model.scene)
+    quickest = max(fastest(model), driven if math.isfinite(driven) else 0.0)
+    usual = min(max(PERIODS * share, LEAST_PERIODS) / float(moving.min()), MOST_PERIODS / quickest)
     duration = min([2 * math.pi * (MOST_RECORDED / fastest(model) if lengths else usual), *lengths])
     try:
         return model.simulate(duration, solver=solvers.Exponential(1e-6, ledger=False)).contacts, []
