@@ -108,7 +108,8 @@ def _report(job: Job, files: list[Path]) -> int:
     try:
         with interrupts.deferred():
             rig = report.write_figure(job.folder / "rig.png", job.file.scene.figure())
-            html.write_page(job.folder, job.file.source, _warnings(job), [rig, *files])
+            page = html.write_page(job.folder, job.file.source, _warnings(job), [rig, *files])
+            _wrote(job, [rig, page])
     except OSError as error:
         return _unwritten(error).code
     return 0
