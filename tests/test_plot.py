@@ -56,9 +56,15 @@ def test_every_figure_draws_with_units(run):
 
 
 @pytest.mark.parametrize("width", [5.0, 7.0])
-def test_a_long_title_is_broken_so_that_it_fits(width):
+@pytest.mark.parametrize(
+    "title",
+    [
+        "Power spectral densities after 5 s (595 s, 378 segments, lines 2 rad/s apart, 95 % shaded)",
+        "K = 2.104e+08 N/m^1.5, a = 0.554 (0.54 to 0.567), restitution 0.728 (0.723 to 0.734)",
+    ],
+)
+def test_a_long_title_is_broken_so_that_it_fits(width, title):
     figure = Figure(figsize=(width, 3.0))
-    title = "Power spectral densities after 5 s (595 s, 378 segments, lines 2 rad/s apart, 95 % shaded)"
     heading([figure.subplots()], title, True)
     figure.draw_without_rendering()
     assert figure.texts[0].get_window_extent().x1 <= figure.bbox.x1

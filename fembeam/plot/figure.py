@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
     from fembeam.model import Run
 
-TITLE = 12.0  # characters of a title on an inch of a figure
+TITLE = 12.5  # characters of a title on an inch of a figure
+NARROWEST = 20  # characters of a line
 MANY_ROOM = "the axes must be as many as the figure has panels"
 
 
@@ -60,7 +61,10 @@ def heading(axes: Sequence[Axes], title: str, own: bool, weight: str = "bold", r
     if not own:
         axes[0].set_title(title)
         return
-    figure.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight=weight)
+    drawn = figure.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight=weight)
+    while drawn.get_window_extent().x1 > figure.bbox.x1 and wide > NARROWEST:  # of many digits
+        wide -= 4
+        drawn.set_text(textwrap.fill(title, wide, break_on_hyphens=False))
     if run is not None and partial:
         figure.supxlabel(f"PARTIAL RESULT: {run.status}", color=RED, fontsize=8, wrap=True)
 
