@@ -66,8 +66,10 @@ def test_every_figure_draws_with_units(run):
 def test_a_long_title_is_broken_so_that_it_fits(width, title):
     figure = Figure(figsize=(width, 3.0))
     heading([figure.subplots()], title, True)
-    figure.draw_without_rendering()
-    assert figure.texts[0].get_window_extent().x1 <= figure.bbox.x1
+    for dpi in (120, 90, 70):
+        figure.set_dpi(dpi)
+        figure.draw_without_rendering()
+        assert figure.texts[0].get_window_extent().x1 <= figure.bbox.x1
 
 
 def test_histories_are_those_of_the_run(run):

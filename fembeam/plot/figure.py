@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 TITLE = 12.5  # characters of a title on an inch of a figure
 NARROWEST = 20  # characters of a line
+FULL = 0.96  # of the width, as letters are wider where there are fewer dots an inch
 MANY_ROOM = "the axes must be as many as the figure has panels"
 
 
@@ -62,7 +63,7 @@ def heading(axes: Sequence[Axes], title: str, own: bool, weight: str = "bold", r
         axes[0].set_title(title)
         return
     drawn = figure.suptitle(title, x=0.01, ha="left", fontsize=10, fontweight=weight)
-    while drawn.get_window_extent().x1 > figure.bbox.x1 and wide > NARROWEST:  # of many digits
+    while drawn.get_window_extent().x1 > FULL * figure.bbox.x1 and wide > NARROWEST:  # of many digits
         wide -= 4
         drawn.set_text(textwrap.fill(title, wide, break_on_hyphens=False))
     if run is not None and partial:
