@@ -31,6 +31,11 @@ def cells(text, head):
     return re.findall(r"<td>(.*?)</td>", row)
 
 
+def test_a_heading_that_begins_with_spaces_stands_over_its_table():
+    table = "                mean ± standard error\nδ std       0.0029 ± 3.8e-05"
+    assert list(html._text(f"6 realisations\n{table}")) == ["<p>6 realisations</p>", f"<pre>{table}</pre>"]
+
+
 def test_tables_have_the_units_of_the_figures_and_few_digits(folder):
     text = (folder / "report.html").read_text(encoding="utf-8")
     found = json.loads((folder / "summary.json").read_text(encoding="utf-8"))

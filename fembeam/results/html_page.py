@@ -114,7 +114,7 @@ def _status(found: dict[str, Any]) -> str:
 
 def _text(content: str) -> Iterator[str]:
     """Tables as they are, sentences as paragraphs that wrap."""
-    for is_table, lines in groupby(content.splitlines(), key=lambda line: "  " in line.strip()):
+    for is_table, lines in groupby(content.splitlines(), key=lambda line: "  " in line.rstrip()):
         if is_table:
             yield "<pre>" + escape("\n".join(lines)) + "</pre>"
         else:
