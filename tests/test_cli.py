@@ -289,6 +289,32 @@ def test_a_bad_ensemble(tmp_path, capsys, change, message):
     assert message in refused(capsys, "run", ensemble_scene(tmp_path, change), "--out", tmp_path / "out")
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("duration = 16", "duration = 0.5"), "scene.toml:42: [ensemble]: duration must be at least"),
+        (("duration = 16", "duration = 0.05"), "[ensemble]: dt must leave at least 64 samples"),
+        (("duration = 16", "duration = 0.5\ndiscard = 0.1"), ""),
+    ],
+)
+def test_an_ensemble_that_is_too_short_is_refused_by_check_too(tmp_path, capsys, change, message):
+    """Every realisation was tried, and the run failed with 1."""
+    path = ensemble_scene(tmp_path, change)
+    if not message:
+        assert printed(capsys, "check", path)
+        return
+    assert message in refused(capsys, "check", path)
+    assert message in said_on_failure(capsys, 2, "run", path, "--out", tmp_path / "out", "--quiet")
+
+
+def test_counts_beyond_the_modes_are_refused_before_a_run(tmp_path, capsys):
+    """The counts before them were computed first."""
+    path = shaken(tmp_path, "[mode_count]\ncounts = [1, 400]\nquantity = 'peak_force'\n")
+    assert "[mode_count]: modes must be at most 300, got 400" in refused(capsys, "check", path)
+    few = "--set", "mode_count.counts=[1, 99]", "--set", "reduce.elements=20"
+    assert "counts=[1, 99]: modes must be at most 40 (free dofs), got 99" in refused(capsys, "check", path, *few)
+
+
 def printed(capsys, *arguments):
     """What a command prints that succeeds."""
     assert main([str(a) for a in arguments]) == 0

@@ -197,11 +197,23 @@ def _check(arguments: argparse.Namespace) -> int:
     from fembeam.inspection import check
 
     file = _read(arguments)
-    found = check(_model(file, arguments.modes), **file.of_run)
+    model = _model(file, arguments.modes)
+    for name, study in file.studies.items():
+        if hasattr(study, "check_run"):
+            _refused_in(file, name, study.check_run, model)
+    found = check(model, **file.of_run)
     for doubt in found:
         show_warning(doubt)
     _print(found.plain() | {"warnings": warned} if arguments.json else replace(found, warnings=[]), arguments.json)
     return 0
+
+
+def _refused_in(file: SceneFile, name: str, check_run: Any, model: Model) -> None:
+    """What a study refuses before it runs, with its line in the file."""
+    try:
+        check_run(file, model)
+    except ValueError as error:
+        raise ValueError(file.placed(f"[{name}]", error)) from error
 
 
 def _draw(arguments: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from fembeam.model.equations import load_period
 from fembeam.model.extremes import extremes_of
 from fembeam.model.model import Model
 from fembeam.model.orbit import Attractor, Orbit
-from fembeam.model.reduce import check_reduction
+from fembeam.model.reduce import check_mode_count, check_reduction
 from fembeam.model.rub import Rub
 from fembeam.model.run import Run
 from fembeam.model.run_file import load

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 import reduction
+from fembeam.beams import Beam
 from fembeam.model.model import Model
 from fembeam.response import PlacedShapes, Shapes, placed_shapes
 from fembeam.scene import (
     MOST_DENSE,
+    MOST_MODES,
     BodyMatrices,
     LocalCoordinate,
     Matrices,
@@ -132,6 +134,16 @@ def check_reduction(
         require(right, "mass_share must lie in (0, 1]", mass_share, "Scene.reduce", "try 0.95")
     check_counts(elements, None)
     _check_static(scene, residual, interface)
+
+
+def check_mode_count(scene: Scene, modes: int, elements: int | None = None) -> None:
+    """Raise ValueError for more modes than the scene's meshes have, as its matrices tell, or as a beam may have."""
+    if elements is None and all(part.beam.meshed for part in (scene, *scene.bodies)):  # the mesh is as fine as needed
+        beams = any(isinstance(part.beam, Beam) for part in (scene, *scene.bodies))
+        require(modes <= MOST_MODES or not beams, f"modes must be at most {MOST_MODES}", modes, "Scene.reduce",
+                "keep the modes up to a few times the highest frequency of interest")  # fmt: skip
+    else:
+        _chosen(scene, modes, elements, False)
 
 
 def _of_beam(

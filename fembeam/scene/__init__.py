@@ -6,7 +6,7 @@ Imports: `beams`, `structures`, `excitation`, `support`, `reduction`, of `solver
 """
 
 from fembeam.scene.annular_stop import AnnularStop
-from fembeam.scene.assembly import MOST_DENSE, Matrices, check_counts, unsupported
+from fembeam.scene.assembly import MOST_DENSE, MOST_MODES, Matrices, check_counts, unsupported
 from fembeam.scene.body_assembly import BodyMatrices, respun
 from fembeam.scene.contact_rows import (
     ON,

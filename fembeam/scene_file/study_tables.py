@@ -1,7 +1,8 @@
 """Studies as tables of a scene file: what to ask, checked when read; `run` answers it.
 
 All are run in one way, ``run(file, folder, progress)``: a long study keeps its checkpoint in the folder and shows
-progress, a short one needs neither. ``check(scene)``, where there is one, refuses what the scene cannot answer.
+progress, a short one needs neither. ``check(scene)``, where there is one, refuses what the scene cannot answer, and
+``check_run(file, model)``, asked by `fembeam check`, what its model cannot.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ import numpy as np
 import solvers
 from fembeam import plot
 from fembeam.beams import on_beam
-from fembeam.model import Branch, Orbit
+from fembeam.model import Branch, Orbit, check_mode_count
 from fembeam.model.run_csv import SECTIONS, Output
 from fembeam.response import checked_damping, checked_oscillators
 from fembeam.scene import Place, is_directed, path_of, quoted, value_of
@@ -63,7 +64,7 @@ from fembeam.study.peak import check_peak
 from fembeam.study.quantities import Quantity, named
 from fembeam.study.result import Result, plain
 from fembeam.study.smallest_model import MOST, SmallestModel, check_goal, smallest_model
-from fembeam.study.stationary import FEWEST_IN_SEGMENT
+from fembeam.study.stationary import FEWEST_IN_SEGMENT, check_length
 from fembeam.study.trial import Trial
 from fembeam.study.variation import points_of
 from fembeam.support import (
@@ -110,6 +111,13 @@ class ModeStudy:
             check_goal(asked["tolerance"], asked.get("most", MOST))
         runs = {name: asked[name] for name in ("duration", "dt", "discard") if name in asked}
         Plan(**runs, seeds=self.seeds).check(scene, named(asked["quantity"]))
+
+    def check_run(self, file: SceneFile, model: Model) -> None:
+        """Raise ValueError for more modes than there are."""
+        reference = self.arguments.get("reference")
+        counts = [*self.arguments.get("counts", ()), *([reference] if is_whole(reference) else [])]
+        if counts:
+            check_mode_count(file.scene, max(counts), **_mesh_of(file))
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> ModeCount | SmallestModel:
         """The study, with its checkpoint in the folder; NotMetError when there is no such model."""
@@ -220,11 +228,16 @@ class EnsembleTable:
         require(right, f"segment must be at least {FEWEST_IN_SEGMENT} samples", self.segment, "[ensemble]",
                 "or leave it out")  # fmt: skip
 
+    def check_run(self, file: SceneFile, model: Model) -> None:
+        """Raise ValueError where every realisation would be refused."""
+        check_length(model, self.duration, self.dt, self.discard)
+
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Ensemble:
         """The ensemble, with its checkpoint ``ensemble.npz`` in the folder."""
         options = {"discard": self.discard, "segment": self.segment, "solver": self.solver}
         quantity = partial(characteristics, duration=self.duration, dt=self.dt, **options)
         model, path = file.model(), folder / "ensemble.npz"
+        self.check_run(file, model)
         with _pool(self.workers) as pool:
             found = ensemble(model, self.realisations, quantity, pool, path, until=self.until, progress=progress)
         return replace(found, title=f"{len(found)} realisations of {self.duration:g} s")

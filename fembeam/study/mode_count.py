@@ -24,6 +24,7 @@ import numpy as np
 
 import solvers
 from fembeam import plot
+from fembeam.model import check_mode_count
 from fembeam.scene import Scene
 from fembeam.study.execution.checkpoint import Checkpoint
 from fembeam.study.measure import Case, Measured, Plan, Start, identity_of, measured
@@ -241,6 +242,7 @@ def mode_count(
     elif reference is not None:
         chosen = checked_counts([*chosen, reference])
         arguments.append({"modes": reference, "residual": kinds[-1], **mesh})
+    check_mode_count(scene, max(chosen), elements)
     arguments = [a for i, a in enumerate(arguments) if a not in arguments[:i]]
     finest = arguments[-1] if reference is not None else {"modes": max(chosen), "residual": kinds[-1], **mesh}
     method = solvers.Exponential(ledger=False) if solver is None else solver

@@ -78,25 +78,14 @@ class Segments:
         state = model.rest() if start is None else numbers("start", start, "stationary", "give (2n,) numbers")
         tau = correlation_time(model, lambda seconds: _pilot(model, seconds, dt, state, solver), duration)
         found = list(signals_of(model.scene).values())
-        repeats = all(isinstance(s, BandNoise) or hasattr(s, "tones") for s in found)
+        repeats = _repeat(found)
         random = bool(noises(model))
         longest = _longest(found, tau, dt) if repeats else math.inf
         shortest = max(SHORTEST * tau, (1.5 * segment + 2.0) * dt)
         if repeats and random:
             most = max(LONGEST * tau, 8.0 * segment * dt)
             longest = min(longest, _realisation(duration, shortest, most, dt))
-        least = LEAD_IN * tau * (not repeats) + FEWEST_BATCHES * tau
-        if not repeats and discard is not None and discard > duration - FEWEST_SAMPLES * dt:
-            raise ValueError(
-                f"discard must leave at least {FEWEST_SAMPLES} samples of the duration of {duration:g} s, got "
-                f"{discard:g} s; a record, or what else cannot be continued, is run once, transient included"
-            )
-        if discard is None and duration < least:
-            raise ValueError(
-                f"duration must be at least {least:.4g} s, {least / tau:.0f} correlation times of the "
-                f"structure, to see whether the transient has died out, got {duration:g} s; simulate longer, or give "
-                "discard="
-            )
+        check_duration(found, duration, dt, discard, tau)
         short = max(0.0, FEWEST_BATCHES * tau - longest)  # of what the transient is looked for in
         lead = LEAD_IN * tau + short if discard is None else discard
         batches = 1 if repeats and random else BATCHES
@@ -175,6 +164,28 @@ class Segments:
         assert run.end is not None
         self.state = run.end if whole else np.concatenate((run.q[piece.end], run.q_dot[piece.end]))
         self.time += self.dt * piece.end
+
+
+def check_duration(found: list[Any], duration: float, dt: float, discard: float | None, tau: float) -> None:
+    """Raise ValueError for a run that is too short to see the transient die out, or that is discarded whole."""
+    repeats = _repeat(found)
+    least = LEAD_IN * tau * (not repeats) + FEWEST_BATCHES * tau
+    if not repeats and discard is not None and discard > duration - FEWEST_SAMPLES * dt:
+        raise ValueError(
+            f"discard must leave at least {FEWEST_SAMPLES} samples of the duration of {duration:g} s, got "
+            f"{discard:g} s; a record, or what else cannot be continued, is run once, transient included"
+        )
+    if discard is None and duration < least:
+        raise ValueError(
+            f"duration must be at least {least:.4g} s, {least / tau:.0f} correlation times of the "
+            f"structure, to see whether the transient has died out, got {duration:g} s; simulate longer, or give "
+            "discard="
+        )
+
+
+def _repeat(found: list[Any]) -> bool:
+    """Whether all signals can be continued."""
+    return all(isinstance(s, BandNoise) or hasattr(s, "tones") for s in found)
 
 
 @whole_runs()

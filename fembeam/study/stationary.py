@@ -32,9 +32,10 @@ from fembeam.scene import signals_of
 from fembeam.statistics import Batches, Estimate, Impacts, Signal
 from fembeam.statistics.initial_transient import Settling, settling
 from fembeam.statistics.spectra import FEWEST_OF_SLOW, FINEST_RESOLUTION
+from fembeam.study.decay import correlation_time
 from fembeam.study.execution.checkpoint import Checkpoint, model_identity
 from fembeam.study.result import Result
-from fembeam.study.segments import FEWEST_SAMPLES, SHORTEST, Segment, Segments
+from fembeam.study.segments import FEWEST_SAMPLES, SHORTEST, Segment, Segments, check_duration
 from fembeam.support import Part, bar, is_whole, note, number, numbers, require
 from fembeam.support.fingerprint import fingerprint
 
@@ -419,6 +420,13 @@ def check(model: Model, duration: float, dt: float, until: float | None, discard
         raise ValueError(
             "a stationary response needs something that drives it; give the scene base=, forces= or a spring foot="
         )
+
+
+def check_length(model: Model, duration: float, dt: float, discard: float | None) -> None:
+    """Bad input of `characteristics` that a model refuses without a run; what friction alone damps needs one."""
+    check(model, duration, dt, None, discard)
+    if not any(one.always and one.remembers for one in model.contact_rows):
+        check_duration(list(signals_of(model.scene).values()), duration, dt, discard, correlation_time(model))
 
 
 @dataclass
