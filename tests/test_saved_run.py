@@ -207,6 +207,17 @@ def test_only_what_a_run_is_made_of_is_read(run, tmp_path):
         fb.load(path)
 
 
+@pytest.mark.parametrize("suffix", [".npz", HDF5])
+def test_a_byte_that_changed_is_seen(run, tmp_path, suffix):
+    """HDF5 has no checksum by itself: one sample of q had changed, and nothing was said."""
+    path = run.save(tmp_path / f"run{suffix}")
+    content, sample = bytearray(path.read_bytes()), run.q[len(run.q) // 2].tobytes()
+    content[content.index(sample) + 5] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match="is damaged"):
+        fb.load(path)
+
+
 def test_hdf5_is_optional(run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(ImportError, match="a run in HDF5 needs h5py, which is optional: pip install h5py"):

@@ -9,6 +9,7 @@ from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -69,7 +70,21 @@ def save(run: Run, path: Path) -> Path:
             with hdf5.File(file, "w") as group:
                 for name, content in {"about": about, **arrays}.items():
                     group[name] = content
+                    group[name].attrs["crc32"] = _crc(content)
     return target
+
+
+def _crc(content: Any) -> int:
+    """Checksum of words or an array, such as an npz has of its own."""
+    return crc32(content.encode() if isinstance(content, str) else np.ascontiguousarray(content).tobytes())
+
+
+def _sound(entry: Any) -> Any:
+    """Words or an array of an HDF5 file; ValueError if its bytes are no longer those written."""
+    content = entry.asstr()[()] if entry.dtype.kind == "O" else entry[()]
+    if "crc32" in entry.attrs and _crc(content) != entry.attrs["crc32"]:
+        raise ValueError(f"{entry.name.strip('/')} differs from what was written")
+    return content
 
 
 def _contents(run: Run) -> tuple[str, dict[str, Any]]:
@@ -204,7 +219,7 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
             return _known({name: _header(data.zip, name) for name in names}, data.__getitem__)
     with optional("h5py", "a run in HDF5").File(path, "r") as group:
         headers = {name: (entry.shape, entry.dtype) for name, entry in group.items() if hasattr(entry, "shape")}
-        return _known(headers, lambda name: group[name].asstr()[()] if name == "about" else group[name][()])
+        return _known(headers, lambda name: _sound(group[name]))
 
 
 def _header(archive: Any, name: str) -> tuple[tuple[int, ...], Any]:
