@@ -55,6 +55,7 @@ DOORS = {  # methods that open what is above
     ("fembeam.scene", "fembeam.inspection"),
     ("fembeam.scene", "fembeam.study"),
     ("fembeam.model", "fembeam.scene_file"),
+    ("fembeam.model", "fembeam.plot"),
 }
 
 

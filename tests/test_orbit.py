@@ -103,7 +103,10 @@ def test_branch_marks_the_flip_and_its_copy_from_a_file_is_the_same(model, tmp_p
         with pytest.raises(ValueError, match=r"damaged\.npz is not a saved branch, or is damaged"):
             model.resume(tmp_path / "damaged.npz")
     branch.to_csv(tmp_path / "b.csv")
-    assert len((tmp_path / "b.csv").read_text().splitlines()) == 1 + len(branch.orbits)
+    head, *rows = (tmp_path / "b.csv").read_text().splitlines()
+    assert len(rows) == len(branch.orbits)
+    assert head == ("base.omega [rad/s],period,stable,largest multiplier,its angle [rad],impacts,peak indentation [m],"
+                    "peak force [N],residual,mark")  # fmt: skip
     assert fb.plot.branch(branch).axes[0].get_xlabel() == "drive frequency ω / rad s⁻¹"
     assert "1 contact, unstable" in fb.plot.orbit(flips[0])._suptitle.get_text()
 
