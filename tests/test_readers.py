@@ -610,3 +610,17 @@ def test_nodes_of_tables_and_included_files(tmp_path):
 def test_dmig_with_tabs_and_comments(tmp_path):
     text = "DMIG\tK\t0\t6\t2\t0\nDMIG\tK\t3\t1\t\t3\t1\t5. $ a\n$ b\n\t4\t2\t-1.\nDMIG,K,4,2,,4,2,7. $ c\n"
     check(read_matrices(written(tmp_path, "a.pch", text)), [[5.0, -1.0], [-1.0, 7.0]], ((3, "x"), (4, "y")))
+
+
+def test_complex_matrices_are_refused(tmp_path):
+    """Sparse ones lost their imaginary parts, of dense ones another matrix of the file was read."""
+    turned = sparse.coo_matrix(np.asarray(K) * (1.0 + 0.1j))
+    np.savez(tmp_path / "dense.npz", K=turned.toarray(), M=M)
+    np.savez(tmp_path / "parts.npz", K_data=turned.data, K_row=turned.row, K_col=turned.col)
+    np.save(tmp_path / "one.npy", turned.toarray())
+    sparse.save_npz(tmp_path / "sparse.npz", turned.tocsr())
+    for name in ("dense.npz", "parts.npz", "one.npy", "sparse.npz"):
+        with pytest.raises(ValueError, match=rf"{name}, .*: expected real numbers, and damping as C, .*, got complex"):
+            read_matrices(tmp_path / name)
+    np.savez(tmp_path / "real.npz", K=np.asarray(K) + 0j)
+    np.testing.assert_array_equal(read_matrices(tmp_path / "real.npz").matrix("K").toarray(), K)

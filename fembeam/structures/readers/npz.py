@@ -37,9 +37,11 @@ def read_npz(path: Path) -> Given:
     arrays = _arrays(path)
     if {"format", "shape", "data"} <= set(arrays):
         try:
-            return Given(path, ((path.stem, sparse.csr_matrix(sparse.load_npz(path), dtype=float)),))
+            whole = sparse.csr_matrix(sparse.load_npz(path))
         except BROKEN as error:
             raise _broken(path, error) from None
+        whole.data = _real(path, "array data", whole.data)
+        return Given(path, ((path.stem, whole.astype(float)),))
     labels = _labels(path, arrays.pop("labels")) if "labels" in arrays else None
     size = 0 if labels is None else len(labels)
     found: dict[str, Any] = {}
@@ -47,8 +49,8 @@ def read_npz(path: Path) -> Given:
         stem = name.rpartition("_")[0]
         if name.endswith("_data") and all(f"{stem}_{part}" in arrays for part in PARTS):
             found[stem] = _sparse(path, stem, size, [arrays[f"{stem}_{part}"] for part in PARTS])
-        elif array.ndim == 2 and array.shape[0] == array.shape[1] and array.dtype.kind in "fiu":
-            found[name] = sparse.csr_matrix(array, dtype=float)
+        elif array.ndim == 2 and array.shape[0] == array.shape[1] and array.dtype.kind in "fiuc":
+            found[name] = sparse.csr_matrix(_real(path, f"array {name}", array), dtype=float)
     if not found:
         raise wrong(
             path, "as a whole", "square arrays, or K_data with K_row and K_col", f"{', '.join(arrays) or 'none'}"
@@ -96,9 +98,17 @@ def read_npy(path: Path) -> Given:
     """The one matrix of a .npy."""
     try:
         found = np.load(path, allow_pickle=False)
-        return Given(path, ((path.stem, sparse.csr_matrix(found, dtype=float)),))
+        found = found if np.iscomplexobj(found) else sparse.csr_matrix(found, dtype=float)
     except (ValueError, TypeError, OSError, EOFError) as error:
         raise wrong(path, "as a whole", "a square array of numbers in a .npy", error) from None
+    return Given(path, ((path.stem, sparse.csr_matrix(_real(path, "as a whole", found), dtype=float)),))
+
+
+def _real(path: Path, where: str, values: Any) -> Any:
+    """Numbers without their imaginary parts; ValueError where there are any."""
+    if np.iscomplexobj(values) and np.any(values.imag):
+        raise wrong(path, where, "real numbers, and damping as C, as ratios of modes or as dashpots", "complex ones")
+    return values.real if np.iscomplexobj(values) else values
 
 
 def _sparse(path: Path, name: str, size: int, entries: list[Any]) -> sparse.csr_matrix:
@@ -113,7 +123,8 @@ def _sparse(path: Path, name: str, size: int, entries: list[Any]) -> sparse.csr_
     least = 1 + int(max(row.max(initial=-1), column.max(initial=-1)))
     if size and least > size:
         raise wrong(path, f"array {name}_row or {name}_col", f"at most the {size} dofs of labels", least)
-    return sparse.csr_matrix((data.astype(float), (row, column)), shape=(size or least,) * 2)
+    values = _real(path, f"array {name}_data", data)
+    return sparse.csr_matrix((values.astype(float), (row, column)), shape=(size or least,) * 2)
 
 
 def _labels(path: Path, array: Any) -> tuple[Label, ...]:
