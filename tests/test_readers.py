@@ -409,6 +409,7 @@ MARKET = [
          "as a whole: expected a real matrix, got KAA"),
         ("k.pch", ["DMIG    KAAX           0       6       2       0"],
          r"expected columns of KAAX after its head, got none; is the file truncated"),
+        ("k.pch", DMIG[:4], "k.pch, line 4: expected entries of this column, got the end; is the file truncated"),
         ("k.pch", [*DMIG[:2], *DMIG[3:]],
          "k.pch, line 3: expected a head DMIG, name, 0, form, type before the columns, got K"),
         ("k.pch", [*DMIG[:4], f"*       {3:16d}{7:16d} 1.0"],

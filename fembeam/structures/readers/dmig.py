@@ -34,7 +34,7 @@ class _Card:
 def read_dmig(path: Path) -> Given:
     """The real square matrices of a file of DMIG cards, on the dofs that any of them has, by node and component."""
     cards: dict[str, _Card] = {}
-    name, column = "", None
+    name, column, where = "", None, "line 1"
     for number, fields in _fields(path):
         where = f"line {number}"
         if fields[0]:  # DMIG: a head, or a column
@@ -51,6 +51,8 @@ def read_dmig(path: Path) -> Given:
             raise wrong(path, where, "a head DMIG, name, 0, form, type before the columns", f"{name or fields}")
         for i in range(0, len(entries), 4):
             _enter(path, where, cards[name], column, entries[i : i + 4])
+    if column is not None and not (cards[name].columns and cards[name].columns[-1] == column):
+        raise wrong(path, where, "entries of this column", "the end; is the file truncated?")
     square = {name: card for name, card in cards.items() if card.form in (SQUARE, SYMMETRIC) and card.kind < 3}
     if not square:
         listed = ", ".join(f"{name} (form {card.form}, type {card.kind})" for name, card in cards.items()) or "none"
