@@ -146,9 +146,13 @@ def _output_times(duration: Any, dt: Any) -> Array | None:
             f"dt = {dt:g} s is longer than the duration of {duration:g} s, so that only the start would be sampled; "
             "choose a smaller dt, give output times, or leave dt out for the end alone"
         )
-    count = math.floor(duration / dt * (1.0 + 1e-12)) + 1
-    if count > _MOST_SAMPLES:
-        raise ValueError(f"dt = {dt:g} s over {duration:g} s asks for {count} samples; choose a larger dt")
+    most = duration / dt * (1.0 + 1e-12)
+    if most + 1.0 > _MOST_SAMPLES:
+        raise ValueError(
+            f"dt = {dt:g} s over {duration:g} s asks for {most:.4g} samples, more than {_MOST_SAMPLES:g}; choose a "
+            "larger dt or a shorter duration"
+        )
+    count = math.floor(most) + 1
     return np.arange(count) * dt
 
 
