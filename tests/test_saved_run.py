@@ -218,6 +218,13 @@ def test_a_byte_that_changed_is_seen(run, tmp_path, suffix):
         fb.load(path)
 
 
+def test_units_that_a_run_has(run):
+    """Another name ended in a KeyError."""
+    assert run.unit("force", 0) == "N"
+    with pytest.raises(ValueError, match=r"quantity must be one of indentation, speed, .*, got 'displacement' in Run"):
+        run.unit("displacement")
+
+
 def test_hdf5_is_optional(run, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(ImportError, match="a run in HDF5 needs h5py, which is optional: pip install h5py"):
