@@ -227,7 +227,9 @@ def _forcing(system: System, duration: float, rtol: float, fixed: bool) -> Forci
 def _is_fixed(signal: Any) -> bool:
     """Whether a signal cannot change: a frozen dataclass, whose arrays are read-only."""
     options = getattr(type(signal), "__dataclass_params__", None)
-    arrays = [value for value in getattr(signal, "__dict__", {}).values() if isinstance(value, np.ndarray)]
+    names = {*getattr(signal, "__dict__", ()), *getattr(type(signal), "__dataclass_fields__", ())}  # the last of slots
+    held = (getattr(signal, name, None) for name in names)
+    arrays = [value for value in held if isinstance(value, np.ndarray)]
     return options is not None and options.frozen and not any(array.flags.writeable for array in arrays)
 
 

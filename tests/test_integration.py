@@ -1,5 +1,6 @@
 """The main loop and its two methods: order, agreement, outputs, ledger, signals, ends, refusals."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -637,3 +638,25 @@ def test_law_that_is_nan_at_rest_is_refused_before_computing():
 
     with pytest.raises(ValueError, match=r"the law of contact 0 is not finite at delta = 1e-12 m"):
         integrate(free_mass(Nowhere(1e6, 1.0)), [1.0], [0.0], 0.1)
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class SlottedTone:
+    """A tone whose amplitude is an array that may be written to."""
+
+    amplitude: np.ndarray
+
+    def __call__(self, t):
+        return self.amplitude[0] * np.cos(3.0 * np.asarray(t))
+
+    def tones(self):
+        return np.array([3.0]), self.amplitude + 0j
+
+
+def test_an_array_in_a_slot_may_change():
+    """The second run had the amplitude of the first."""
+    tone = SlottedTone(np.ones(1))
+    system = System(np.eye(1), 0.1 * np.eye(1), 4.0 * np.eye(1), loads=[([1.0], tone)])
+    once = integrate(system, [0.0], [0.0], 1.0, 0.5).q
+    tone.amplitude[0] = 2.0
+    np.testing.assert_allclose(integrate(system, [0.0], [0.0], 1.0, 0.5).q, 2.0 * once, rtol=1e-12)
