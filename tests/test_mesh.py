@@ -360,6 +360,24 @@ def test_what_is_passed_over_in_abaqus_files(tmp_path, parts, said):
     assert fb.Frame.from_mesh(path, {"steel": THICK}).nodes["n1"] == (0.0, 0.0, 1.0)
 
 
+@pytest.mark.parametrize(
+    ("suffix", "more", "said"),
+    [
+        ("bdf", "RBE2,5,7,123456,10\nRBAR,6,7,10,123456\nRBE2,8,7,1,10\nCONM2,9,7,,5.", "1 CONM2, 1 RBAR, 2 RBE2 in"),
+        ("inp", "*MPC\nBEAM,1,2\n*Rigid body, ref node=1, elset=steel\n", "1 *MPC, 1 *RIGID BODY in"),
+    ],
+)
+def test_what_is_no_line_is_counted_in_a_warning(tmp_path, suffix, more, said):
+    """Rigid elements and masses were passed over without a word."""
+    path = tmp_path / f"bar.{suffix}"
+    plain = {"kind": "B31", "nodes": "2", "moved": "", "second": more}
+    text = BARS.format(first=more, system="", more="") if suffix == "bdf" else PART.format(**plain)
+    path.write_text(text)
+    with pytest.warns(UserWarning, match=re.escape(said)) as warned:
+        fb.Frame.from_mesh(path, THICK)
+    assert warned[0].filename == __file__
+
+
 GRIDS = """$ nothing but cards
 GRID,1 $ the clamp
 GRID*,50,,.2,0.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +16,10 @@ Key = tuple[bool, int]  # whether of the assembly itself, and the number
 
 BARS = ("CBAR", "CBEAM", "CROD", "CTUBE")
 OTHERS = ("CBEND", "CBEAM3", "CONROD", "CTRI", "CTRAX", "CQUAD", "CSHEAR", "CTETRA", "CPENTA", "CHEXA", "CPYRA")
+PASSED = ("RBAR", "RBE", "RJOINT", "RROD", "RSPLINE", "RTRPLT", "MPC", "CONM", "CMASS", "CELAS", "CBUSH", "CDAMP",
+          "CVISC", "CGAP", "CFAST", "CWELD", "GENEL")  # fmt: skip
+TIES = ("RIGID BODY", "MPC", "EQUATION", "COUPLING", "KINEMATIC COUPLING", "DISTRIBUTING COUPLING", "TIE",
+        "EMBEDDED ELEMENT", "NONSTRUCTURAL MASS")  # fmt: skip
 MAKERS = ("ELGEN", "ELCOPY", "RELEASE")
 TABLES = ("NODE", "ELEMENT", "NSET", "ELSET")
 TWO_NODES = ("B23", "B23H", "B33", "B33H", "B31R")
@@ -29,6 +34,7 @@ def nastran_mesh(path: Path) -> Any:
     require(bool(cards) and cards[-1].name == "ENDDATA", "the file must end with ENDDATA",
             cards[-1].name if cards else "nothing", f"{path}", "export it again: it is cut")  # fmt: skip
     _check_nastran(cards, path)
+    _warn_of_passed([card.name for card in cards if card.name.startswith(PASSED)], path)
     grids = [card for card in cards if card.name == "GRID"]
     number = {_whole(card.words[0], card.where): i for i, card in enumerate(grids)}
     bars = [card for card in cards if card.name in BARS]
@@ -58,12 +64,21 @@ def _check_nastran(cards: list[Card], path: Path) -> None:
                     "leave them out, and give the member release= or offset=")  # fmt: skip
 
 
+def _warn_of_passed(names: list[str], path: Path) -> None:
+    """Warn of what joins nodes or has mass, but is no line: how many of each there are."""
+    if names:
+        said = ", ".join(f"{count} {name}" for name, count in sorted(Counter(names).items()))
+        warnings.warn(f"{said} in {path} are passed over: what they hold, join or weigh is not in the mesh; say it in "
+                      "the scene", UserWarning, stacklevel=6)  # fmt: skip
+
+
 def abaqus_mesh(path: Path) -> Any:
     """A mesh of *NODE and *ELEMENT with their sets; nodes of the assembly have numbers of their own beside a part's."""
     import meshio
 
     blocks = list(_levels(abaqus_blocks(path)))
     check_abaqus([block for block, _ in blocks], TABLES, MAKERS)
+    _warn_of_passed([f"*{block.keyword}" for block, _ in blocks if block.keyword in TIES], path)
     places: dict[Key, list[float]] = {}
     for block, assembly in blocks:
         for where, words in block.data if block.keyword == "NODE" else ():
