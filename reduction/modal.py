@@ -30,6 +30,7 @@ WIDER = (1.0, 1e3, 1e4)  # times that shift, where the modes do not settle
 MOST_RAISED = 8  # times by ten
 ELASTIC = 1e3  # of that shift, above which ω² is not that of a rigid-body mode
 RIGID = 1e-7  # of max √(K_ii/M_ii): rounding of K, a few √eps, hides lower frequencies
+DECIMALS = 1e-9  # of max K_ii/M_ii: what numbers of nine decimals, as of DMIG cards, make of ω² = 0
 RIGID_WITH_ROOT = 1e-12  # same, when R is given: rounding stays below 4e-14 up to 2000 elements
 ROUNDED, GAP = 10.0, 1e6  # times that: rounding of superelements reaches 1.2e-12; no elastic mode within the gap behind
 GUARDS = 6  # so many more vectors than wanted are corrected: a mode next to the last one wanted settles too slowly
@@ -160,11 +161,14 @@ def _scale(M: sparse.csc_matrix, K: sparse.csc_matrix) -> float:
 
 def _without_root(M: sparse.csc_matrix, K: sparse.csc_matrix, omega_squared: Vector, vectors: Vector) -> Basis:
     """Frequencies from ω², rigid-body modes set to zero."""
-    rigid = RIGID * _scale(M, K)
+    scale = _scale(M, K)
+    rigid = RIGID * scale
     if omega_squared[0] < -(rigid**2):
+        share = float(-omega_squared[0]) / scale**2
+        rounded = f", or K is rounded, for this is {share:.1g} of the highest: give more digits" * (share < DECIMALS)
         raise ValueError(
             f"K must be positive semi-definite, got omega² = {omega_squared[0]:.6g} in modal_basis; "
-            "the structure is unstable"
+            f"the structure is unstable{rounded}"
         )
     omega = np.sqrt(np.maximum(omega_squared, 0.0))
     return Basis(vectors, np.where(omega <= rigid, 0.0, omega))

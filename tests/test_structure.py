@@ -52,6 +52,17 @@ def test_grounded_structures_are_told():
     assert any(said.match(line) for line in fb.Structure(K, M).check())
 
 
+def test_stiffness_of_few_decimals_is_told():
+    """Nine decimals make ω² of the rigid motions negative: check ended as an error that called the body unstable."""
+    nodes = {"A": (0, 0, 0), "B": (0.31, 0.12, -0.07), "C": (0.2, 0.53, 0.11), "D": (-0.1, 0.7, 0.4)}
+    made = fb.Frame.polyline(nodes, fb.Section.rectangle(2.1e11, 7850.0, 0.013, 0.027)).reduced(list(nodes), modes=0)
+    K, M = (np.vectorize(lambda x: float(f"{x:.9e}"))(A.toarray()) for A in (made.K, made.M))
+    told = fb.Structure((K + K.T) / 2, (M + M.T) / 2, labels=made.labels).check()
+    assert any("or K is rounded, for this is" in line and "give more digits" in line for line in told)
+    wrong = fb.Structure(np.diag([4.0, -1.0]), np.eye(2)).check()
+    assert any(line.endswith("got omega² = -1 in modal_basis; the structure is unstable") for line in wrong)
+
+
 def test_a_lost_dof_shows_in_the_mass():
     truss = space_truss()
     kept = np.arange(11)

@@ -226,7 +226,11 @@ def _frequencies(structure: Structure) -> Iterator[str]:
 
     own = structure.condensed()
     count = min(FEW, own.M.shape[0])
-    omega = modal_basis(own.M, own.K, count).omega
+    try:
+        omega = modal_basis(own.M, own.K, count).omega
+    except ValueError as error:
+        yield f"no frequencies without supports: {error}"
+        return
     listed = ", ".join(f"{w / (2 * np.pi):.6g}" for w in omega)
     yield f"lowest frequencies without supports: {listed} Hz"
 
