@@ -44,6 +44,23 @@ omega = 25.0
 """
 
 
+@pytest.mark.parametrize(
+    ("told", "section"),
+    [
+        ('shape = "rectangle", width = 0.1, height = 0.2', fb.Section.rectangle(2.1e11, 7850.0, 0.1, 0.2, shear=5 / 6)),
+        ('shape = "circle", diameter = 0.1', fb.Section.circle(2.1e11, 7850.0, 0.1, shear=5 / 6)),
+        ('shape = "tube", outer = 0.1, inner = 0.08', fb.Section.tube(2.1e11, 7850.0, 0.1, 0.08, shear=5 / 6)),
+    ],
+)
+def test_sections_of_any_shape_deform_in_shear(tmp_path, told, section):
+    """Only shape = "general" knew the key."""
+    path = tmp_path / "sheared.toml"
+    member = f'nodes = ["A", "B"], section = {{ {told}, E = 2.1e11, rho = 7850.0, shear = {5 / 6} }}'
+    path.write_text(f"frame = {{ nodes = {{ A = [0, 0], B = [0, 1] }}, members = [{{ {member} }}] }}\n")
+    assert scene_file.read(path).scene.beam.members[0].section == section
+    assert section.shear == (5 / 6, 5 / 6)
+
+
 def test_the_same_as_in_python(file_of):
     """Members along chains, supports, a stop within a member, motion along one axis."""
     steel = fb.Section.rectangle(2.1e11, 7850.0, width=0.05, height=0.1)

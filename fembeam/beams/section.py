@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.support import is_finite, require, require_finite, require_positive
+
+Shear: TypeAlias = float | tuple[float, float] | None
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ class Section:
     J: float | None = field(default=None, repr=False)
     nu: float = field(default=0.3, repr=False)
     fibre2: float | None = field(default=None, repr=False)
-    shear: float | tuple[float, float] | None = field(default=None, repr=False)
+    shear: Shear = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         require_positive("E", self.E, "Section", "give Young's modulus in N/m²")
@@ -94,28 +96,30 @@ class Section:
             require(self.I12 == 0, "I12 must be 0 with shear", self.I12, "Section", "turn it to principal axes")
 
     @classmethod
-    def rectangle(cls, E: float, rho: float, width: float, height: float, nu: float = 0.3) -> Section:
+    def rectangle(
+        cls, E: float, rho: float, width: float, height: float, nu: float = 0.3, shear: Shear = None
+    ) -> Section:
         """Solid rectangle bending over its height (m): A = b h, I = b h³/12, I2 = h b³/12; J by its series."""
         require_positive("width", width, "Section.rectangle", "give the width in m")
         require_positive("height", height, "Section.rectangle", "give the height in the bending plane in m")
         I, I2, J = width * height**3 / 12, height * width**3 / 12, _rectangle_torsion(width, height)
-        return cls(E, rho, width * height, I, height / 2, I2, 0.0, J, nu, width / 2)
+        return cls(E, rho, width * height, I, height / 2, I2, 0.0, J, nu, width / 2, shear)
 
     @classmethod
-    def circle(cls, E: float, rho: float, diameter: float, nu: float = 0.3) -> Section:
+    def circle(cls, E: float, rho: float, diameter: float, nu: float = 0.3, shear: Shear = None) -> Section:
         """Solid circle (m): A = π d²/4, I = I2 = π d⁴/64, J = 2 I."""
         require_positive("diameter", diameter, "Section.circle", "give the diameter in m")
         I, fibre = math.pi * diameter**4 / 64, diameter / 2
-        return cls(E, rho, math.pi * diameter**2 / 4, I, fibre, I, 0.0, 2 * I, nu, fibre)
+        return cls(E, rho, math.pi * diameter**2 / 4, I, fibre, I, 0.0, 2 * I, nu, fibre, shear)
 
     @classmethod
-    def tube(cls, E: float, rho: float, outer: float, inner: float, nu: float = 0.3) -> Section:
+    def tube(cls, E: float, rho: float, outer: float, inner: float, nu: float = 0.3, shear: Shear = None) -> Section:
         """Round tube of outer and inner diameter (m): A = π (D² - d²)/4, I = I2 = π (D⁴ - d⁴)/64, J = 2 I."""
         require_positive("outer", outer, "Section.tube", "give the outer diameter in m")
         require_positive("inner", inner, "Section.tube", "give the inner diameter in m, or use Section.circle")
         require(inner < outer, f"inner must be below outer = {outer}", inner, "Section.tube", "swap the two")
         I, fibre = math.pi * (outer**4 - inner**4) / 64, outer / 2
-        return cls(E, rho, math.pi * (outer**2 - inner**2) / 4, I, fibre, I, 0.0, 2 * I, nu, fibre)
+        return cls(E, rho, math.pi * (outer**2 - inner**2) / 4, I, fibre, I, 0.0, 2 * I, nu, fibre, shear)
 
     @property
     def bending_stiffness(self) -> float:
