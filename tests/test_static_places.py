@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy import linalg
 
+import fembeam as fb
 import reduction
 from contacts import Hertz
 from fembeam.beams import Beam, ModalDamping, Rayleigh, Section
@@ -123,3 +124,14 @@ def test_the_twist_of_a_shaft_under_friction(way):
     model = Scene(Frame.straight(1.0, section), [Clamped("A")], stops=[hole]).reduce(4, **{way: True})
     twist = np.sum((model.directions[2] / model.omega) ** 2)
     np.testing.assert_allclose(twist, 0.8 / section.torsion_stiffness, rtol=1e-9)
+
+
+@pytest.mark.parametrize("tip", [False, True])
+def test_a_force_on_a_support_has_no_static_shape(tip):
+    """It was refused with residual=True alone."""
+    steel, push = fb.Section.circle(2e11, 7800.0, 0.02), fb.Harmonic(1.0, 5.0)
+    forces = [fb.PointForce("A", push, direction="x"), fb.PointForce("B", push, direction="x")]
+    held, tipped = (fb.Scene(fb.Frame.straight(1.0, steel), [fb.Clamped("A")], forces=some)
+                    for some in (forces[: 1 + tip], forces[1:]))  # fmt: skip
+    expected = tipped.reduce(2, residual=True) if tip else held.reduce(2)
+    np.testing.assert_allclose(held.reduce(2, residual=True).omega, expected.omega, rtol=1e-9)

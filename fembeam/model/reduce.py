@@ -155,7 +155,10 @@ def _of_beam(
     basis = _modes(beam, chosen, of)
     rows = [*([_rows(beam, places)] if residual and places else []), *beam.following_loads]
     if rows:
-        basis = reduction.with_residual(basis, beam.M, beam.K, sparse.vstack(rows).T, beam.root)
+        loads = sparse.vstack(rows).tocsr()
+        loads = loads[np.flatnonzero(abs(loads).max(axis=1).toarray())]  # what acts on a support moves nothing
+        if loads.shape[0]:
+            basis = reduction.with_residual(basis, beam.M, beam.K, loads.T, beam.root)
     return basis
 
 
