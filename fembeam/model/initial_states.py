@@ -240,7 +240,7 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
         for own, block in circles:
             stiff[own] = np.abs(block).max()
         told = ROUNDED * stiff * (np.abs(W) @ np.abs(q) + np.abs(gaps))  # N, of δ: stiff contacts multiply its rounding
-        if _balanced(residual, scale, told, W):
+        if _balanced(residual, scale, told, W, bool(f.any())):
             _check_memory(model, -W @ q - gaps)
             return q
         J = np.diag(1 / tau + K) + (W.T * slopes) @ W
@@ -269,14 +269,15 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
     )
 
 
-def _balanced(residual: Vector, scale: float, told: Vector, W: Vector) -> bool:
+def _balanced(residual: Vector, scale: float, told: Vector, W: Vector, loaded: bool) -> bool:
     """Whether forces balance but for errors of the contacts' forces, up to those `told` (r,), all along the contacts.
 
     A moment that nothing carries stays, and where a body that falls has gone so far that its contacts' forces are
-    rounding, they carry nothing.
+    rounding, they carry nothing. Of what is not ``loaded`` all forces may be rounding.
     """
     size, error = np.abs(residual).max(initial=0.0), (told @ np.abs(W)).max(initial=0.0)
-    if size == 0.0 or not (size <= SETTLED * scale + error and error <= KNOWN * scale):
+    known = error <= KNOWN * scale or not loaded
+    if size == 0.0 or not (size <= SETTLED * scale + error and known):
         return bool(size == 0.0)
     if size <= SETTLED * scale:
         return True
