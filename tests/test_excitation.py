@@ -1,6 +1,7 @@
 import dataclasses
 import math
 import pickle
+import tracemalloc
 from functools import lru_cache
 
 import numpy as np
@@ -262,6 +263,17 @@ def test_nodes_of_a_long_run_are_lean():
     j = (t / dt).astype(int)
     found = [hermite(dt, values[k : k + 2])(s - k * dt) for k, s in zip(j, t, strict=True)]
     np.testing.assert_allclose(found, noise(t), atol=4e-6 * noise.rms)
+
+
+def test_nodes_take_little_more_memory_than_they_hold():
+    """At most the transform and the lines, twice as much; sums over all blocks at once took four times."""
+    noise = BandNoise(2.5e-4, BROAD, seed=1, period=400.0)
+    noise.nodes(1.0, 1e-6)  # makes the lines
+    tracemalloc.start()
+    _, values = noise.nodes(200.0, 1e-6)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 3.3 * values.nbytes
 
 
 def test_the_last_node_closes_the_period():

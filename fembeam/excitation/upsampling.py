@@ -22,6 +22,7 @@ _WIDTH = 20  # w, samples that take part in one value
 _BETA = 0.75 * math.pi * _WIDTH  # φ̂ ends where the images of the highest line, at θ = 3π/2, begin
 _BLOCK = 16  # samples of a block
 _ONE_THREAD = 2**18  # multiplications up to which OpenBLAS keeps to one core; the others belong to other realisations
+_GROUPS = 16  # of blocks at once, which processors keep at hand
 FEWEST_POINTS = 4  # to the period of the highest line
 
 
@@ -40,12 +41,19 @@ def fine_grid(
     per_unit = _block_rows(ratio) / (ratio * step) ** np.arange(3.0)
     group = max(1, _ONE_THREAD // per_unit.size)
     groups = math.ceil(count / (group * _BLOCK * ratio))
-    blocks = groups * group
-    around = np.arange(1 - _WIDTH // 2, blocks * _BLOCK + _WIDTH // 2)
-    windows = np.lib.stride_tricks.sliding_window_view(samples.take(around, mode="wrap"), _BLOCK + _WIDTH - 1)
-    grouped = np.ascontiguousarray(windows[::_BLOCK]).reshape(groups, group, -1)
-    rows = grouped @ per_unit.reshape(len(per_unit), -1)
+    rows = np.empty((groups, group, per_unit[0].size))
+    for i in range(0, groups, _GROUPS):
+        part = rows[i : i + _GROUPS]
+        np.matmul(_windows(samples, i * group, len(part), group), per_unit.reshape(len(per_unit), -1), out=part)
     return rows.reshape(-1, 3)[:count]
+
+
+def _windows(samples: NDArray[np.float64], first: int, groups: int, group: int) -> NDArray[np.float64]:
+    """(groups, group, _BLOCK + _WIDTH - 1): the samples around each block from a first one on."""
+    begin, end = _BLOCK * first, _BLOCK * (first + groups * group)
+    around = samples.take(np.arange(begin + 1 - _WIDTH // 2, end + _WIDTH // 2), mode="wrap")
+    windows = np.lib.stride_tricks.sliding_window_view(around, _BLOCK + _WIDTH - 1)
+    return np.ascontiguousarray(windows[::_BLOCK]).reshape(groups, group, -1)
 
 
 @lru_cache(maxsize=8)
