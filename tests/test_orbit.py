@@ -1,5 +1,6 @@
 """Orbits, attractors and branches of a model; the parameters of a scene by name; the table [branch]."""
 
+import io
 import math
 import re
 from dataclasses import replace
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from differences import end_of
 from problems import TIP, paper_scene
+from tqdm import tqdm
 
 import fembeam as fb
 import solvers
@@ -51,6 +53,20 @@ def test_subharmonics_from_nothing_and_their_names(model):
     assert "3 shot(s)" in str(error.value.__cause__)
     with pytest.raises(solvers.OrbitError, match="Newton's method went to one of period 1"):
         model.orbit(period=2, start=model.orbit())
+
+
+def test_a_search_from_nothing_tells_how_far_it_is(monkeypatch):
+    """A run from rest and 12 other starts."""
+    bars = []
+
+    def counting(wanted, **options):
+        bars.append(tqdm(disable=not wanted, file=io.StringIO(), **options))
+        return bars[-1]
+
+    monkeypatch.setattr("fembeam.model.orbit.counting", counting)
+    with pytest.raises(solvers.OrbitError, match="none to period 3"):
+        paper_scene(fb.Harmonic(1e-3, 430.0)).reduce(1).orbit(period=3, progress=True)
+    assert [(bar.n, bar.total) for bar in bars] == [(13, 13)]
 
 
 def test_an_unstable_orbit_beside_a_stable_subharmonic_from_nothing():

@@ -284,7 +284,13 @@ class Model(Printed, ModalEquations):
         places = observed(self) if output is None else output
         return frequency_response(self, omega, input, places, absolute, body, slipping)
 
-    def orbit(self, period: int = 1, start: ArrayLike | Orbit | None = None, shots: int | None = None) -> Orbit:
+    def orbit(
+        self,
+        period: int = 1,
+        start: ArrayLike | Orbit | None = None,
+        shots: int | None = None,
+        progress: bool = False,
+    ) -> Orbit:
         """Find a periodic motion by shooting.
 
         Parameters
@@ -293,6 +299,7 @@ class Model(Printed, ModalEquations):
         start : (2n,) state at t = 0 or an orbit near it; None tries what a run from rest settles to, then other starts,
             then, for period 1, an orbit with more damping, followed until the damping is the model's.
         shots : per period; None takes as many as it needs.
+        progress : show a bar of the starts tried (on terminals and in notebooks only).
 
         Returns
         -------
@@ -304,7 +311,7 @@ class Model(Printed, ModalEquations):
         """
         from fembeam.model.orbit import orbit
 
-        return orbit(self, period, start, shots)
+        return orbit(self, period, start, shots, progress)
 
     def rub(self, spin: float | None = None, near: float | None = None, entry_rate: float | None = None) -> Rub:
         """The synchronous rub of an unbalanced round rotor in one `AnnularStop`: an equilibrium of the turning frame.

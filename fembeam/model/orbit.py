@@ -22,8 +22,9 @@ from fembeam.model.equations import load_period
 from fembeam.model.extremes import extremes_of
 from fembeam.response import PlacedLog
 from fembeam.scene import signals_of, with_signals
-from fembeam.support import Part, Printed, is_whole, require
+from fembeam.support import Part, Printed, counting, is_whole, require
 from solvers.orbits import (
+    MORE_DAMPING,
     at_zero,
     delayed,
     orbit_by_damping,
@@ -37,7 +38,7 @@ from solvers.problem import counted
 from solvers.problem.whole_runs import whole_runs
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from fembeam.model.model import Model
     from fembeam.model.run import Run
@@ -174,11 +175,15 @@ def _later(signal: Any, by: float) -> Any:
     return Multisine(np.abs(amplitude), omega, np.angle(amplitude) + np.asarray(omega) * by)
 
 
-def orbit(model: Model, period: int, start: ArrayLike | Orbit | None, shots: int | None) -> Orbit:
+def orbit(
+    model: Model, period: int, start: ArrayLike | Orbit | None, shots: int | None, progress: bool = False
+) -> Orbit:
     """See `Model.orbit`."""
     count, T = checked_period(period), load_period(model.scene)
     if start is None:
-        return _from_rest(model, count, T, shots)
+        most = 1 + STARTS + (len(MORE_DAMPING) if count == 1 else 0)
+        with counting(progress, total=most, unit=" starts", delay=1.0, leave=False) as bar:
+            return _from_rest(model, count, T, shots, bar.update)
     if isinstance(start, Orbit):
         start = at_zero(start.found)
     found = Orbit(model, solvers.orbit(model.system, count * T, start, shots=shots), count)
@@ -219,20 +224,24 @@ def _periods_to_repeat(orbit: Orbit, T: float) -> int:
     return orbit.period
 
 
-def _from_rest(model: Model, count: int, T: float, shots: int | None) -> Orbit:
-    """What a run from rest settles to, else the first of many attractors with that period, else one by more damping."""
+def _from_rest(model: Model, count: int, T: float, shots: int | None, tried: Callable[[], Any]) -> Orbit:
+    """What a run from rest settles to, else the first of many attractors with that period, else one by more damping.
+
+    ``tried`` is called after each start.
+    """
     try:
         start = settled(model.system, count * T, solvers.Exponential(1e-8))
         return orbit(model, count, start, shots)
     except solvers.OrbitError as error:
         refused = error
-    found = attractors(model, starts=STARTS)
+    tried()
+    found = attractors(model, starts=STARTS, tried=tried)
     for attractor in found:
         if attractor.orbit is not None and attractor.period == count:
             return attractor.orbit
     if count == 1:
         with suppress(solvers.OrbitError):
-            return Orbit(model, orbit_by_damping(model.system, T, solvers.Exponential(1e-11), shots), count)
+            return Orbit(model, orbit_by_damping(model.system, T, solvers.Exponential(1e-11), shots, tried), count)
     names = ", ".join(sorted({a.name for a in found}))
     raise solvers.OrbitError(
         f"{STARTS} starts settled to {names}, none to period {count}; shooting after a run from rest: "
@@ -267,9 +276,13 @@ class Attractor:
 
 
 def attractors(
-    model: Model, starts: int | Sequence[ArrayLike] = 12, longest: int = 8, seed: int = 0
+    model: Model,
+    starts: int | Sequence[ArrayLike] = 12,
+    longest: int = 8,
+    seed: int = 0,
+    tried: Callable[[], Any] = lambda: None,
 ) -> list[Attractor]:
-    """See `Model.attractors`."""
+    """See `Model.attractors`; ``tried`` is called after each start."""
     T = load_period(model.scene)
     method = solvers.Exponential(1e-8, ledger=False)
     found: list[Attractor] = []
@@ -281,6 +294,7 @@ def attractors(
                 break
         else:
             found.append(Attractor(orbit, 1, state))
+        tried()
     return sorted(found, key=lambda a: -a.count)
 
 

@@ -357,7 +357,7 @@ class OrbitTable:
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> FoundOrbit:
         """The orbit."""
-        return FoundOrbit(file.model().orbit(self.period))
+        return FoundOrbit(file.model().orbit(self.period, progress=progress))
 
 
 @dataclass(frozen=True, eq=False)

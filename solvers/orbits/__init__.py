@@ -9,6 +9,7 @@ from solvers.orbits.newton import newton, weights
 from solvers.orbits.open_times import is_cut, latching_stops, open_starts
 from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, orbit_of, states_at
 from solvers.orbits.shooting import (
+    MORE_DAMPING,
     checked,
     checked_start,
     orbit_by_damping,

@@ -40,8 +40,9 @@ _SETTLING = 2.0  # periods from a start without latched numbers, in which laws w
 _FRICTION = 20  # least periods of a run from rest with such laws, which may be the only damping
 _LONGEST = 400  # most periods of a run from rest
 _MOST_SETTLINGS = 4  # starts tried along a run from rest, a hundred periods apart
-_MORE_DAMPING = 0.03, 0.1, 0.3, 1.0  # μ, in turn, where none of these finds an orbit
+MORE_DAMPING = 0.03, 0.1, 0.3, 1.0  # μ, in turn, where none of these finds an orbit
 _LEAST_STEP = 2e-3  # change of μ, in units of the first, down to which the orbit is followed
+_SAME = 1e-6  # relative distance of the states of one orbit
 
 
 def orbit(
@@ -100,36 +101,59 @@ def _from_rest(system: System, period: float, method: Any, shots: int | None) ->
     return _near(problem, x, shots)
 
 
-def orbit_by_damping(system: System, period: float, method: Any, shots: int | None) -> Orbit:
+def orbit_by_damping(
+    system: System, period: float, method: Any, shots: int | None, tried: Callable[[], Any] = lambda: None
+) -> Orbit:
     """An orbit of the system with more damping, C + μ (2π/T) M, followed to μ = 0; raises OrbitError.
 
-    With it motion from rest that is chaotic, or decays slowly, settles within some periods.
+    With it motion from rest that is chaotic, or decays slowly, settles within some periods. ``tried`` is called after
+    each μ.
     """
 
     def damped(mu: float) -> System:
         return replace(system, C=system.C + mu * (2.0 * math.pi / period) * system.M)
 
-    for mu in _MORE_DAMPING:
+    passed: dict[float, Orbit] = {}
+    for mu in MORE_DAMPING:
         try:
-            return _followed(damped, mu, _from_rest(damped(mu), period, method, shots), shots)
+            return _followed(damped, mu, _from_rest(damped(mu), period, method, shots), shots, passed)
         except OrbitError:
-            continue
-    raise OrbitError(f"nor with damping of up to {_MORE_DAMPING[-1]:g} (2 pi/T) M more that is then taken away")
+            tried()
+    raise OrbitError(f"nor with damping of up to {MORE_DAMPING[-1]:g} (2 pi/T) M more that is then taken away")
 
 
-def _followed(damped: Callable[[float], System], mu: float, found: Orbit, shots: int | None) -> Orbit:
-    """The orbit of damped(0) in the vicinity of those in between; raises OrbitError."""
-    step, least = 0.5 * mu, _LEAST_STEP * mu
+def _followed(
+    damped: Callable[[float], System], mu: float, found: Orbit, shots: int | None, passed: dict[float, Orbit]
+) -> Orbit:
+    """The orbit of damped(0) in the vicinity of those in between; raises OrbitError.
+
+    ``passed`` are orbits by μ on ways that ended before. One that meets them ends where two steps in turn fail.
+    """
+    step, least, failed, way = 0.5 * mu, _LEAST_STEP * mu, 0, {mu: found}
     while mu > 0.0:
         less = mu - step if step < mu else 0.0
         problem = constant(damped(less), found.period, found.method)
         try:
-            found, mu, step = _near(problem, at_zero(found), shots), less, 2.0 * step
+            way[less] = found = _near(problem, at_zero(found), shots)
+            mu, step, failed = less, 2.0 * step, 0
         except OrbitError:
-            step *= 0.3
-            if step < least:
+            step, failed = 0.3 * step, failed + 1
+            if step < least or (failed > 1 and _meets(passed, damped, mu, found)):
+                passed.update(way)
                 raise
     return found
+
+
+def _meets(passed: dict[float, Orbit], damped: Callable[[float], System], mu: float, found: Orbit) -> bool:
+    """Whether an orbit, followed on to the next smaller μ that others have passed, is the one there."""
+    if (there := max((one for one in passed if one <= mu), default=None)) is None:
+        return False
+    known = at_zero(passed[there])
+    try:
+        x = at_zero(_near(constant(damped(there), found.period, found.method), at_zero(found), 1))
+    except OrbitError:
+        return False
+    return bool(np.linalg.norm(x - known) <= _SAME * np.linalg.norm(known))
 
 
 def _near(problem: PeriodicProblem, x: Array, shots: int | None) -> Orbit:
