@@ -194,6 +194,11 @@ def test_the_import_is_light():
     assert done.stdout.strip() == "[]", done.stderr
 
 
+def test_a_run_needs_no_optimisation():
+    done = python("import sys, fembeam.model; print('scipy.optimize' in sys.modules)")
+    assert done.stdout.strip() == "False", done.stderr
+
+
 def test_the_command_line_starts_light():
     # so that Ctrl-C is handled from the first moment on
     done = python("import sys, fembeam.cli; print([n for n in ('numpy', 'scipy', 'argparse') if n in sys.modules])")

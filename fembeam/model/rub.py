@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 import solvers
 from fembeam.scene import AnnularStop, spin_of, tangent, with_value
@@ -273,6 +272,8 @@ class _Turning:
 
     def radii(self) -> tuple[float, ...]:
         """All radii in contact, ascending; those closer together than the trials are not told apart."""
+        from scipy.optimize import brentq
+
         c, free = self.contact.gap, abs(self.free)
         deepest = c if self.contact.outer else DEEPEST * max(c, free)
         deltas = np.append(0.0, np.geomspace(LEAST * c, deepest * (1.0 - LEAST), TRIED))

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from solvers.branches.point import NO_ORBIT, metric_of
 from solvers.orbits import Chain, Orbit, OrbitError, PeriodicProblem, is_cut, orbit_of
@@ -234,6 +233,8 @@ def _moved(equations: _Equations, point: _Point, step: float, ends: Array) -> _P
 
 def _cusp(equations: _Equations, a: _Point, b: _Point) -> _Point:
     """The point between two others at which p turns."""
+    from scipy.optimize import brentq  # here: every run would take 0.06 s to load it
+
     known: dict[float, _Point] = {}
 
     def pace(s: float) -> float:
