@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bench.orbits_from_rest import drawn
 from differences import end_of, jacobian
 from oscillators import Bilinear, Duffing, Tone, from_phase, random_family
 from problems import cubic, reference
@@ -15,7 +14,7 @@ from scipy.special import ellipj, ellipk
 
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, Exponential, HenonRK2, OrbitError, System, integrate, orbit
-from solvers.orbits import orbit_by_damping, shooting
+from solvers.orbits import orbit_by_damping
 from solvers.orbits.open_times import latches, open_intervals
 from solvers.problem import ContactLog
 
@@ -247,16 +246,6 @@ def test_an_orbit_with_more_damping_is_followed_until_this_is_gone():
     assert not found.stable
     assert pytest.approx(problem.system().C, rel=0.0) == found.system.C
     closes(problem, found)
-
-
-def test_ways_with_more_damping_that_meet_are_followed_once(monkeypatch):
-    """Of a system whose orbits with more damping end at a fold: Newton's method was begun 225 times, now 113."""
-    begun, tried, plain = [], [], shooting.newton
-    monkeypatch.setattr(shooting, "newton", lambda *a, **more: begun.append(a) or plain(*a, **more))
-    with pytest.raises(OrbitError, match="nor with damping"):
-        orbit_by_damping(*drawn(161, False), Exponential(1e-11), None, lambda: tried.append(0))
-    assert len(begun) < 170
-    assert len(tried) == len(shooting.MORE_DAMPING)
 
 
 def test_orbit_at_rest_from_a_start_that_is_not():

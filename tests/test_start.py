@@ -163,7 +163,7 @@ test_what_is_no_field_of_the_beam_is_refused = refused(
 
 @pytest.mark.parametrize("stiffness", [1e2, 1e6])
 def test_what_is_not_loaded_rests_at_a_free_spring(stiffness):
-    """A bar on a hinge lies where a spring is free; of 60 gaps, five were refused for forces of rounding, of 1e-15 N."""
+    """A bar on a hinge lies where a spring is free; of 60 gaps, five were refused, for forces of 1e-15 N."""
     bar = fb.Section.rectangle(2.1e11, 7850.0, 0.02, 0.01)
     for gap in np.linspace(1e-3, 0.4, 60):
         spring = fb.Element(0.8, KelvinVoigt(stiffness, 0.0), gap=float(gap))

@@ -42,7 +42,6 @@ _LONGEST = 400  # most periods of a run from rest
 _MOST_SETTLINGS = 4  # starts tried along a run from rest, a hundred periods apart
 MORE_DAMPING = 0.03, 0.1, 0.3, 1.0  # μ, in turn, where none of these finds an orbit
 _LEAST_STEP = 2e-3  # change of μ, in units of the first, down to which the orbit is followed
-_SAME = 1e-6  # relative distance of the states of one orbit
 
 
 def orbit(
@@ -113,47 +112,27 @@ def orbit_by_damping(
     def damped(mu: float) -> System:
         return replace(system, C=system.C + mu * (2.0 * math.pi / period) * system.M)
 
-    passed: dict[float, Orbit] = {}
     for mu in MORE_DAMPING:
         try:
-            return _followed(damped, mu, _from_rest(damped(mu), period, method, shots), shots, passed)
+            return _followed(damped, mu, _from_rest(damped(mu), period, method, shots), shots)
         except OrbitError:
             tried()
     raise OrbitError(f"nor with damping of up to {MORE_DAMPING[-1]:g} (2 pi/T) M more that is then taken away")
 
 
-def _followed(
-    damped: Callable[[float], System], mu: float, found: Orbit, shots: int | None, passed: dict[float, Orbit]
-) -> Orbit:
-    """The orbit of damped(0) in the vicinity of those in between; raises OrbitError.
-
-    ``passed`` are orbits by μ on ways that ended before. One that meets them ends where two steps in turn fail.
-    """
-    step, least, failed, way = 0.5 * mu, _LEAST_STEP * mu, 0, {mu: found}
+def _followed(damped: Callable[[float], System], mu: float, found: Orbit, shots: int | None) -> Orbit:
+    """The orbit of damped(0) in the vicinity of those in between; raises OrbitError."""
+    step, least = 0.5 * mu, _LEAST_STEP * mu
     while mu > 0.0:
         less = mu - step if step < mu else 0.0
         problem = constant(damped(less), found.period, found.method)
         try:
-            way[less] = found = _near(problem, at_zero(found), shots)
-            mu, step, failed = less, 2.0 * step, 0
+            found, mu, step = _near(problem, at_zero(found), shots), less, 2.0 * step
         except OrbitError:
-            step, failed = 0.3 * step, failed + 1
-            if step < least or (failed > 1 and _meets(passed, damped, mu, found)):
-                passed.update(way)
+            step *= 0.3
+            if step < least:
                 raise
     return found
-
-
-def _meets(passed: dict[float, Orbit], damped: Callable[[float], System], mu: float, found: Orbit) -> bool:
-    """Whether an orbit, followed on to the next smaller μ that others have passed, is the one there."""
-    if (there := max((one for one in passed if one <= mu), default=None)) is None:
-        return False
-    known = at_zero(passed[there])
-    try:
-        x = at_zero(_near(constant(damped(there), found.period, found.method), at_zero(found), 1))
-    except OrbitError:
-        return False
-    return bool(np.linalg.norm(x - known) <= _SAME * np.linalg.norm(known))
 
 
 def _near(problem: PeriodicProblem, x: Array, shots: int | None) -> Orbit:
