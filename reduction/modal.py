@@ -21,17 +21,17 @@ Matrix: TypeAlias = Any  # dense or sparse
 
 LARGE = 20_000  # dofs from which factors take seconds: ordered and pivoted as symmetric ones, half of that
 TINY_PIVOT = 1e-3  # of the largest number in its column
-DENSE_LIMIT = 60  # free dofs; dense stays faster up to 300, by 1 ms, but loses low modes beside stiff springs
+DENSE_LIMIT = 60  # free dofs; dense stays faster up to 300, by 1 ms
+SOFT, CLEARED = 1e-6, 3  # of the largest ω², below which its rounding counts; times this is taken out
 ORTHONORMALITY_TOLERANCE = 1e-9
 RESIDUAL_TOLERANCE = 1e-9  # of the largest terms in K φ - ω² M φ
 SYMMETRY_TOLERANCE = 1e-9
 SHIFT = 1e-12  # of the median of K_ii/M_ii: above rounding of K, not far above the lowest elastic ω²
 WIDER = (1.0, 1e3, 1e4)  # times that shift, where the modes do not settle
-MOST_RAISED = 8  # times by ten
-ELASTIC = 1e3  # of that shift, above which ω² is not that of a rigid-body mode
-RIGID = 1e-7  # of max √(K_ii/M_ii): rounding of K, a few √eps, hides lower frequencies
-DECIMALS = 1e-9  # of max K_ii/M_ii: what numbers of nine decimals, as of DMIG cards, make of ω² = 0
-RIGID_WITH_ROOT = 1e-12  # same, when R is given: rounding stays below 4e-14 up to 2000 elements
+RIGID = 1e-7  # of √(|φ|ᵀ|K||φ|): rounding of K, a few √eps, hides lower frequencies
+DECIMALS = 1e-9  # of max K_ii/M_ii: what numbers of few decimals, as of DMIG cards, may make of ω² = 0
+SCATTER = 100.0  # of the lowest ω² below zero: what the same decimals may make of others
+RIGID_WITH_ROOT = 1e-12  # of max √(K_ii/M_ii), when R is given: rounding stays below 4e-14 up to 2000 elements
 ROUNDED, GAP = 10.0, 1e6  # times that: rounding of superelements reaches 1.2e-12; no elastic mode within the gap behind
 GUARDS = 6  # so many more vectors than wanted are corrected: a mode next to the last one wanted settles too slowly
 SETTLED = 1e-9  # relative change of the frequencies by the last correction
@@ -73,10 +73,10 @@ def modal_basis(
 
     Notes
     -----
-    Frequencies below 1e-7 max √(K_ii/M_ii) (1e-12 with `root`) are rounding and are returned as exactly 0.0:
-    rigid-body modes. Several of those are an arbitrary orthonormal set of the rigid motions. Above 60 dofs
-    modes come from sparse shift-invert Lanczos, unless more than a quarter of them is asked for. Stiffnesses
-    too far apart (a spring of 1e12 N/m used as a support, all modes asked for) end in an AccuracyError.
+    Frequencies below 1e-7 √(|φ|ᵀ|K||φ|), with `root` below 1e-12 max √(K_ii/M_ii), are rounding and are returned as
+    exactly 0.0: rigid-body modes. A soft part is so found beside any stiff one, but not behind a link 1e14 times as
+    stiff, which leaves K no digits for it. Several rigid-body modes are an arbitrary orthonormal set of the rigid
+    motions. Above 60 dofs modes come from sparse shift-invert Lanczos, unless more than a quarter is asked for.
 
     References
     ----------
@@ -104,15 +104,9 @@ def _guarded(size: int, count: int) -> int:
 def _solve(M: sparse.csc_matrix, K: sparse.csc_matrix, count: int, factor: float = 1.0) -> tuple[Vector, Vector]:
     """The lowest `count` pairs (ω², φ), dense when the problem is small or most modes are wanted."""
     size = M.shape[0]
-    if 2 * count <= size <= DENSE_LIMIT:  # the inverse problem keeps low modes clean beside stiff springs
-        shift = factor * _regular(M, K)
-        omega_squared, vectors = _inverse(M, K, shift, count)
-        elastic = omega_squared > ELASTIC * shift
-        if elastic.any() and not elastic.all():  # rounding there is eps/shift: too much for the highest modes
-            return _inverse(M, K, float(omega_squared[elastic][0]), count)
-        return omega_squared, vectors
     if size <= DENSE_LIMIT or 4 * count > size:
-        return linalg.eigh(K.toarray(), M.toarray(), subset_by_index=(0, count - 1))
+        values, vectors = _dense(M.toarray(), K.toarray())
+        return values[:count], vectors[:, :count]
     start = np.random.default_rng(0).standard_normal(size)  # fixed: the same basis every time
     shift, inverse = factor * _shift(M, K), None
     if size >= LARGE:  # else that of ARPACK
@@ -130,23 +124,21 @@ def factored(A: Any) -> Any:
     return sparse_linalg.splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=TINY_PIVOT, options=options)
 
 
-def _inverse(M: sparse.csc_matrix, K: sparse.csc_matrix, shift: float, count: int) -> tuple[Vector, Vector]:
-    """The lowest `count` pairs (ω², φ) as the largest of M φ = (K + shift M) φ / (ω² + shift), dense."""
-    size = M.shape[0]
-    inverse, vectors = linalg.eigh(M.toarray(), (K + shift * M).toarray(), subset_by_index=(size - count, size - 1))
-    return 1 / inverse[::-1] - shift, vectors[:, ::-1] / np.sqrt(inverse[::-1])
-
-
-def _regular(M: sparse.csc_matrix, K: sparse.csc_matrix) -> float:
-    """σ that makes K + σ M positive definite beyond rounding, which short elements raise."""
-    shift = _shift(M, K)
-    for _ in range(MOST_RAISED):
-        try:
-            linalg.cholesky((K + shift * M).toarray(), overwrite_a=True)
-            break
-        except np.linalg.LinAlgError:
-            shift *= 10.0
-    return shift
+def _dense(M: Vector, K: Vector) -> tuple[Vector, Vector]:
+    """All pairs; soft ones, in which there is rounding of the stiffest, are cleared of it and found again."""
+    k, phi = linalg.eigh(K, M)
+    soft = np.abs(k) < SOFT * np.abs(k).max(initial=0.0)
+    if not soft.any():
+        return k, phi
+    cleared, stiff = phi[:, soft], phi[:, ~soft]
+    for _ in range(CLEARED):
+        cleared = cleared - stiff @ ((stiff.T @ (K @ cleared)) / k[~soft, None])
+    stiff = stiff - cleared @ (cleared.T @ M @ stiff)
+    own = cleared.T @ K @ cleared
+    k[soft], turn = _dense(cleared.T @ M @ cleared, 0.5 * (own + own.T))
+    k, phi = np.concatenate((k[soft], k[~soft])), np.hstack((cleared @ turn, stiff))
+    order = np.argsort(k, kind="stable")
+    return k[order], phi[:, order]
 
 
 def _shift(M: sparse.csc_matrix, K: sparse.csc_matrix) -> float:
@@ -161,17 +153,35 @@ def _scale(M: sparse.csc_matrix, K: sparse.csc_matrix) -> float:
 
 def _without_root(M: sparse.csc_matrix, K: sparse.csc_matrix, omega_squared: Vector, vectors: Vector) -> Basis:
     """Frequencies from ω², rigid-body modes set to zero."""
-    scale = _scale(M, K)
-    rigid = RIGID * scale
-    if omega_squared[0] < -(rigid**2):
-        share = float(-omega_squared[0]) / scale**2
+    scale = _scale(M, K) ** 2
+    low = omega_squared <= RIGID**2 * scale
+    if low.any():
+        omega_squared[low] = np.sum(vectors[:, low] * (K @ vectors[:, low]), axis=0)
+    hidden = np.maximum(_hidden(K, vectors) ** 2, _of_decimals(omega_squared, scale))
+    if np.any(omega_squared < -hidden):
+        share = float(-omega_squared.min()) / scale
         rounded = f", or K is rounded, for this is {share:.1g} of the highest: give more digits" * (share < DECIMALS)
         raise ValueError(
-            f"K must be positive semi-definite, got omega² = {omega_squared[0]:.6g} in modal_basis; "
+            f"K must be positive semi-definite, got omega² = {omega_squared.min():.6g} in modal_basis; "
             f"the structure is unstable{rounded}"
         )
-    omega = np.sqrt(np.maximum(omega_squared, 0.0))
-    return Basis(vectors, np.where(omega <= rigid, 0.0, omega))
+    omega = np.sqrt(np.where(omega_squared > hidden, omega_squared, 0.0))
+    order = np.argsort(omega, kind="stable")
+    return Basis(vectors[:, order], omega[order])
+
+
+def _of_decimals(omega_squared: Vector, scale: float) -> float:
+    """ω² up to which K of few decimals hides rigid-body modes, by one below zero; 0 without elastic modes far above."""
+    below = max(0.0, -float(omega_squared.min()))
+    elastic = omega_squared[omega_squared > SCATTER * below]
+    told = below <= DECIMALS * scale and elastic.size and elastic.min() > GAP * below
+    return SCATTER * below if told else 0.0
+
+
+def _hidden(K: sparse.csc_matrix, vectors: Vector) -> Vector:
+    """The frequency below which that of each shape is rounding of K."""
+    terms: Vector = np.sum(np.abs(vectors) * (abs(K) @ np.abs(vectors)), axis=0)
+    return RIGID * np.sqrt(terms)
 
 
 def _settled(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix | None, count: int) -> Basis:
@@ -234,9 +244,9 @@ def ritz(M: Matrix, K: Matrix, root: Matrix | None, vectors: Vector) -> tuple[Ve
     """Frequencies and mass-normalised shapes of the pencil reduced to the span of the vectors, lowest first."""
     unit = vectors / np.sqrt(np.sum(vectors * (M @ vectors), axis=0))
     if root is None:
-        values, rotation = linalg.eigh(unit.T @ (K @ unit), unit.T @ (M @ unit))
+        values, rotation = _dense(unit.T @ (M @ unit), unit.T @ (K @ unit))
         omega, vectors = np.sqrt(np.maximum(values, 0.0)), unit @ rotation
-        rigid = RIGID * _scale(M, K)
+        rigid: Any = _hidden(checked_matrix(K, "K", "modal_basis"), vectors)
     else:
         omega, vectors = _ritz(M, sparse.csr_matrix(root), unit)
         rigid = _rigid_with_root(omega, _scale(M, K))

@@ -156,6 +156,26 @@ def test_modes_of_a_free_body_without_root():
     np.testing.assert_allclose(found[3:], lowest, rtol=1e-8)
 
 
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_soft_modes_behind_stiff_ones_without_root(count):
+    """Refused, or the lowest given as a rigid-body mode; exact: squared frequencies of the same K in 60 digits."""
+    springs, order = [1e12, 1e9, 1e6, 1e2, 1e-2], np.ix_([4, 3, 0, 2, 1], [4, 3, 0, 2, 1])
+    K = np.diag(np.add(springs, [*springs[1:], 0.0])) - np.diag(springs[1:], 1) - np.diag(springs[1:], -1)
+    exact = [3.3329999888596007e-3, 99.99999032334257, 999098.0088152341, 500001251.8761322, 1001000499750.1251]
+    omega = reduction.modal_basis(np.diag([3.0, 1.0, 1.0, 1.0, 2.0]), K[order], count).omega
+    np.testing.assert_allclose(omega**2, exact[:count], rtol=1e-11)
+
+
+@pytest.mark.parametrize("count", [1, 3, 30])
+def test_a_soft_mount_beside_a_stiff_support_is_no_rigid_body_mode(count):
+    """Half of a chain on a spring of 1e-2, the other held by one of 1e12; the lowest frequency was given as 0."""
+    springs = np.full(80, 1e5)
+    springs[[0, 40]] = 1e12, 1e-2
+    K = sparse.diags([-springs[1:], np.add(springs, [*springs[1:], 0.0]), -springs[1:]], [-1, 0, 1])
+    omega = reduction.modal_basis(sparse.eye(80), K, count).omega
+    assert omega[0] ** 2 == pytest.approx(1e-2 / 40, rel=1e-4)
+
+
 def test_factors_of_large_matrices(monkeypatch):
     """Ordered as symmetric ones they have little more than half the fill, and give the same modes and shapes."""
     M, K = lattice(8, 8, 15)
