@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from solvers.problem.matrices import Array
 
+_SOFT = 1e-6  # of the largest squared frequency, below which rounding of it counts
+
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
@@ -58,31 +60,32 @@ def _is_diagonal(matrix: Array) -> bool:
 
 
 def _modes(M: Array, K: Array) -> tuple[Array, Array]:
-    """Mass-normalised modes and squared frequencies; rounding-size ones become exact zeros.
+    """Mass-normalised modes and squared frequencies; those of the size of rounding become exact zeros.
 
-    What is no more than the rounding of a stiff part may be the stiffness of another one that it does not act on.
+    `eigh` leaves rounding of the stiffest modes in all others: soft ones are cleared of it and found again. What is
+    then no more than rounding of the terms it is a sum of, K having no more digits, is zero.
     """
-    from scipy.sparse.csgraph import connected_components
-
-    phi, k = _modes_of_one(M, K)
-    if k.all():
-        return phi, k
-    count, part = connected_components((M != 0.0) | (K != 0.0), directed=False)
-    own_phi, own_k = np.zeros_like(phi), np.zeros_like(k)
-    for places in (np.flatnonzero(part == i) for i in range(count)):
-        of_part = np.ix_(places, places)
-        own_phi[of_part], own_k[places] = _modes_of_one(M[of_part], K[of_part])
-    order = np.argsort(own_k, kind="stable")
-    return (own_phi[:, order], own_k[order]) if np.count_nonzero(own_k) > np.count_nonzero(k) else (phi, k)
-
-
-def _modes_of_one(M: Array, K: Array) -> tuple[Array, Array]:
-    """The same of one part."""
     from scipy.linalg import eigh
 
     k, phi = eigh(K, M)
-    k[np.abs(k) < 1e-13 * np.abs(k).max(initial=0.0)] = 0.0
-    return phi, k
+    soft = np.abs(k) < _SOFT * np.abs(k).max(initial=0.0)
+    if not soft.any():
+        return phi, k
+    cleared, stiff = _cleared(M, K, phi[:, soft], phi[:, ~soft], k[~soft])
+    own = cleared.T @ K @ cleared
+    turn, k[soft] = _modes(cleared.T @ M @ cleared, 0.5 * (own + own.T))
+    phi = np.hstack((cleared @ turn, stiff))
+    k = np.concatenate((k[soft], k[~soft]))
+    k[np.abs(k) < 1e-13 * np.sum(np.abs(phi) * (np.abs(K) @ np.abs(phi)), axis=0)] = 0.0
+    order = np.argsort(k, kind="stable")
+    return phi[:, order], k[order]
+
+
+def _cleared(M: Array, K: Array, soft: Array, stiff: Array, k: Array) -> tuple[Array, Array]:
+    """Soft modes without stiff ones, whose squared frequencies are k, in their forces, then these without soft ones."""
+    for _ in range(3):
+        soft = soft - stiff @ ((stiff.T @ (K @ soft)) / k[:, None])
+    return soft, stiff - soft @ (soft.T @ M @ stiff)
 
 
 def _terms(phi: Array, C: Array) -> Array:
