@@ -9,7 +9,7 @@ A signal is any callable t -> value that broadcasts. It becomes exactly one of
   ends;
 * nothing of either: sampled here by a quintic spline, refined until it agrees between its nodes at 4096 places or more.
   What is shorter than duration/4096, such as a pulse, may hide between these and needs ``nodes``. Where the signal or
-  its slope jumps, no spline agrees to a small tolerance, and the signal is refused.
+  its slope jumps, no spline agrees to a small tolerance, and the signal is refused, with the time of a jump.
 
 What is made of signals that are frozen dataclasses, their arrays read-only, is kept for other runs of the system; all
 other signals are asked anew by every run.
@@ -33,6 +33,7 @@ from solvers.problem.system import Signal
 
 _MOST_NODES = 20_000_000
 _FEWEST_PLACES = 4096  # where a plain callable is compared with its spline
+_JUMP_ROUNDS = 5  # each looks at a 64th of the interval before
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,6 +205,21 @@ def _values(signal: Signal, t: Any, load: int) -> Array:
     return values
 
 
+def _refuse_jumps(signal: Signal, t: Array, values: Array, load: int) -> None:
+    """ValueError where a signal changes within 1e-9 of its steepest cell nearly as much as in all of it."""
+    first = steepest = int(np.argmax(np.abs(np.diff(values))))
+    for _ in range(_JUMP_ROUNDS):
+        t = np.linspace(t[steepest], t[steepest + 1], 65)
+        found = _values(signal, t, load)
+        steepest = int(np.argmax(np.abs(np.diff(found))))
+    left = abs(found[steepest + 1] - found[steepest])
+    if left > 0.5 * abs(values[first + 1] - values[first]) > 0.0:
+        raise ValueError(
+            f"the signal of load {load} jumps at t = {t[steepest]:g} s; only slope and curvature may, at nodes(): "
+            "let it rise within a short time"
+        )
+
+
 def _sample(signal: Signal, duration: float, rtol: float, load: int) -> tuple[float, Array]:
     """Nodes of a plain callable: double a quintic spline's grid until it agrees to ``rtol`` between its nodes."""
     from scipy.interpolate import make_interp_spline
@@ -219,6 +235,8 @@ def _sample(signal: Signal, duration: float, rtol: float, load: int) -> tuple[fl
         error = np.abs(spline(between) - _values(signal, between, load)).max()
         if error <= rtol * np.abs(values).max():
             return duration / cells, np.stack([values, spline(t, 1), spline(t, 2)], axis=1)
+        if cells >= _FEWEST_PLACES:
+            _refuse_jumps(signal, t, values, load)
         cells *= 2
     raise ValueError(
         f"the signal of load {load} is too rough to sample to {rtol:g}; give it tones() or nodes(), or loosen rtol"
