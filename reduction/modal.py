@@ -33,7 +33,7 @@ DECIMALS = 1e-9  # of max K_ii/M_ii: what numbers of few decimals, as of DMIG ca
 SCATTER = 100.0  # of the lowest ω² below zero: what the same decimals may make of others
 RIGID_WITH_ROOT = 1e-12  # of max √(K_ii/M_ii), when R is given: rounding stays below 4e-14 up to 2000 elements
 ROUNDED, GAP = 10.0, 1e6  # times that: rounding of superelements reaches 1.2e-12; no elastic mode within the gap behind
-GUARDS = 6  # so many more vectors than wanted are corrected: a mode next to the last one wanted settles too slowly
+GUARDS = 6  # vectors beyond those wanted: one next to the last settles slowly, and elastic ones tell which are rigid
 SETTLED = 1e-9  # relative change of the frequencies by the last correction
 SHAPED = 1e-11  # same, of the shapes' curvature
 STALLED = 0.25  # of the correction before: the shapes' rounding, about eps (length/h)², is reached
@@ -97,8 +97,7 @@ def modal_basis(
 
 def _guarded(size: int, count: int) -> int:
     """`count` and guards behind, as many as leave `_solve` its way."""
-    share = 2 if size <= DENSE_LIMIT else 4
-    return max(count, min(count + GUARDS, size // share))
+    return max(count, min(count + GUARDS, size if size <= DENSE_LIMIT else size // 4))
 
 
 def _solve(M: sparse.csc_matrix, K: sparse.csc_matrix, count: int, factor: float = 1.0) -> tuple[Vector, Vector]:
@@ -151,8 +150,10 @@ def _scale(M: sparse.csc_matrix, K: sparse.csc_matrix) -> float:
     return float(np.sqrt(np.max(np.abs(K.diagonal()) / M.diagonal())))
 
 
-def _without_root(M: sparse.csc_matrix, K: sparse.csc_matrix, omega_squared: Vector, vectors: Vector) -> Basis:
-    """Frequencies from ω², rigid-body modes set to zero."""
+def _without_root(
+    M: sparse.csc_matrix, K: sparse.csc_matrix, omega_squared: Vector, vectors: Vector, count: int
+) -> Basis:
+    """The lowest `count` frequencies from ω², rigid-body modes set to zero."""
     scale = _scale(M, K) ** 2
     low = omega_squared <= RIGID**2 * scale
     if low.any():
@@ -166,7 +167,7 @@ def _without_root(M: sparse.csc_matrix, K: sparse.csc_matrix, omega_squared: Vec
             f"the structure is unstable{rounded}"
         )
     omega = np.sqrt(np.where(omega_squared > hidden, omega_squared, 0.0))
-    order = np.argsort(omega, kind="stable")
+    order = np.argsort(omega, kind="stable")[:count]
     return Basis(vectors[:, order], omega[order])
 
 
@@ -189,10 +190,10 @@ def _settled(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix | 
     failure = None
     for factor in WIDER:
         try:
+            values, vectors = _solve(M, K, _guarded(M.shape[0], count), factor)
             if R is None:
-                basis = _without_root(M, K, *_solve(M, K, count, factor))
+                basis = _without_root(M, K, values, vectors, count)
             else:
-                vectors = _solve(M, K, _guarded(M.shape[0], count), factor)[1]
                 basis = _with_root(M, K, R, vectors, factor * _shift(M, K), count)
             _verify(basis, M, K)
         except AccuracyError as error:

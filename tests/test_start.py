@@ -168,4 +168,4 @@ def test_what_is_not_loaded_rests_at_a_free_spring(stiffness):
     for gap in np.linspace(1e-3, 0.4, 60):
         spring = fb.Element(0.8, KelvinVoigt(stiffness, 0.0), gap=float(gap))
         model = fb.Scene(fb.Beam(0.8, bar), [fb.Pinned(0.0)], elements=[spring]).reduce(2)
-        assert model.rows[0] @ model.equilibrium()[:2] == pytest.approx(gap, rel=1e-12)
+        assert model.directions[0] @ model.equilibrium()[:2] == pytest.approx(-gap, rel=1e-12)

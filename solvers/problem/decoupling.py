@@ -76,7 +76,8 @@ def _modes(M: Array, K: Array) -> tuple[Array, Array]:
     turn, k[soft] = _modes(cleared.T @ M @ cleared, 0.5 * (own + own.T))
     phi = np.hstack((cleared @ turn, stiff))
     k = np.concatenate((k[soft], k[~soft]))
-    k[np.abs(k) < 1e-13 * np.sum(np.abs(phi) * (np.abs(K) @ np.abs(phi)), axis=0)] = 0.0
+    below = -1e-13 * k.max(initial=0.0)  # what a product such as ΦᵀKΦ leaves of a rigid-body mode
+    k[(np.abs(k) < 1e-13 * np.sum(np.abs(phi) * (np.abs(K) @ np.abs(phi)), axis=0)) | ((below < k) & (k < 0.0))] = 0.0
     order = np.argsort(k, kind="stable")
     return phi[:, order], k[order]
 
