@@ -33,7 +33,7 @@ DECIMALS = 1e-9  # of max K_ii/M_ii: what numbers of few decimals, as of DMIG ca
 SCATTER = 100.0  # of the lowest ω² below zero: what the same decimals may make of others
 RIGID_WITH_ROOT = 1e-12  # of max √(K_ii/M_ii), when R is given: rounding stays below 4e-14 up to 2000 elements
 ROUNDED, GAP = 10.0, 1e6  # times that: rounding of superelements reaches 1.2e-12; no elastic mode within the gap behind
-GUARDS = 6  # vectors beyond those wanted: one next to the last settles slowly, and elastic ones tell which are rigid
+GUARDS = 6  # so many more vectors than wanted are corrected: a mode next to the last one wanted settles too slowly
 SETTLED = 1e-9  # relative change of the frequencies by the last correction
 SHAPED = 1e-11  # same, of the shapes' curvature
 STALLED = 0.25  # of the correction before: the shapes' rounding, about eps (length/h)², is reached
@@ -190,7 +190,10 @@ def _settled(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix | 
     failure = None
     for factor in WIDER:
         try:
-            values, vectors = _solve(M, K, _guarded(M.shape[0], count), factor)
+            most = _guarded(M.shape[0], count)
+            values, vectors = _solve(M, K, count if R is None else most, factor)
+            if R is None and values[-1] <= -SCATTER * values[0]:  # elastic ones tell what is rounding
+                values, vectors = _solve(M, K, most, factor)
             if R is None:
                 basis = _without_root(M, K, values, vectors, count)
             else:
