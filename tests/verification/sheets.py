@@ -174,7 +174,7 @@ def figure(name):
 def current(written, made):
     """Whether a written page says what is made now: the same words, and numbers up to another processor's rounding.
 
-    Numbers agree to 1e-6, small ones (errors) to half their size; where more than 1 % is allowed, to what is allowed.
+    Numbers agree to 1e-6, small ones (errors) to half their size and 1e-8; where more than 1 % is allowed, to what is allowed.
     """
     written, made = (text.replace("< ", "") for text in (written, made))
     if NUMBER.split(written) != NUMBER.split(made):
@@ -189,5 +189,5 @@ def current(written, made):
 
 def same(old, new, loose):
     """Whether two numbers of a page are one, but for rounding or, in loose lines, for chance."""
-    within = 0.5 * abs(new) + 2.0 * UNSEEN if abs(new) < 1e-2 else 1e-6 * abs(new)
+    within = 0.5 * abs(new) + 10.0 * UNSEEN if abs(new) < 1e-2 else 1e-6 * abs(new)
     return abs(old - new) <= within + loose * max(abs(new), 1.0)
