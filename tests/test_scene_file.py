@@ -406,3 +406,18 @@ def test_wrong_values_of_studies_are_said_before_anything_is_computed(file_of, t
     name = table[: table.index("]") + 1].replace("[", r"\[").replace("]", r"\]")
     with pytest.raises(SceneFileError, match=f"{name}: .*{message}"):
         file_of(DRIVEN + table)
+
+
+@pytest.mark.parametrize(
+    "study",
+    [
+        "[orbit]",
+        "[branch]\nspan = [0.0, 1e-3]\nparameter = 'stops[0].gap'",
+        "[basins]\nx_span = [-1e-3, 1e-3]\ny_span = [-0.1, 0.1]\npoints = [3, 3]",
+        "[peak]\nover = 'stops[0].gap'\nvalues = [0.0, 1e-3]\nspan = [1e8, 2e8]\nparameter = 'stops[0].law.stiffness'",
+    ],
+)
+def test_orbits_under_loads_without_a_period_are_refused_when_read(file_of, study):
+    """They were refused after the studies before them had run."""
+    with pytest.raises(SceneFileError, match="an orbit needs periodic loads"):
+        file_of(EXAMPLE + study)

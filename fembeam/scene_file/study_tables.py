@@ -25,7 +25,7 @@ import numpy as np
 import solvers
 from fembeam import plot
 from fembeam.beams import on_beam
-from fembeam.model import Branch, Orbit, check_mode_count
+from fembeam.model import Branch, Orbit, check_mode_count, load_period
 from fembeam.model.run_csv import SECTIONS, Output
 from fembeam.response import checked_damping, checked_oscillators
 from fembeam.scene import Place, is_directed, path_of, quoted, value_of
@@ -355,6 +355,10 @@ class OrbitTable:
     def __post_init__(self) -> None:
         _check_period(self.period, "[orbit]")
 
+    def check(self, scene: Scene) -> None:
+        """Raise ValueError for loads without a period."""
+        load_period(scene)
+
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> FoundOrbit:
         """The orbit."""
         return FoundOrbit(file.model().orbit(self.period, progress=progress))
@@ -432,8 +436,9 @@ class BranchTable:
         _check_period(self.period, "[branch]")
 
     def check(self, scene: Scene) -> None:
-        """Raise ValueError for a parameter that the scene does not have."""
+        """Raise ValueError for a parameter that the scene does not have, or loads without a period."""
         path_of(scene, self.parameter)
+        load_period(scene)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> FoundBranch:
         """The branch, saved as ``branch.npz`` in the folder; continues where an interrupted one left that.
@@ -528,8 +533,9 @@ class BasinsTable:
             require(getattr(self, name) > 0, f"{name} must be above 0", getattr(self, name), "[basins]", "give a count")
 
     def check(self, scene: Scene) -> None:
-        """Raise ValueError for points that make no grid, and a place that the scene does not have."""
+        """Raise ValueError for points that make no grid, a place that the scene does not have, or no period."""
         checked_points(self.points)
+        load_period(scene)
         _check_place(scene, self.z)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Basins:

@@ -20,7 +20,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import minimize_scalar
 
 from fembeam import plot
-from fembeam.model import Model, Orbit, observed
+from fembeam.model import Model, Orbit, load_period, observed
 from fembeam.model.branch import Family
 from fembeam.model.sensitivity import of_amplitude
 from fembeam.plot.axis_names import axis_name
@@ -174,6 +174,7 @@ def check_peak(
     require(paths[0] != paths[1], "over must be another number than the parameter", over, where, "name both")
     pair = np.shape(span) == (2,) and all(map(is_finite, span)) and span[0] < span[1]
     require(bool(pair), "span must be two values, ascending", span, where, "give (lowest, highest)")
+    load_period(scene)
     for value in p:
         with_value(scene, over, float(value))  # what the part refuses, it refuses here
     return p

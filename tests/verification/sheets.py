@@ -174,7 +174,8 @@ def figure(name):
 def current(written, made):
     """Whether a written page says what is made now: the same words, and numbers up to another processor's rounding.
 
-    Numbers agree to 1e-6, small ones (errors) to half their size and 1e-8; where more than 1 % is allowed, to what is allowed.
+    Numbers agree to 1e-6, small ones (errors) to half their size and 1e-8; where more than 1 % is allowed, to what is
+    allowed.
     """
     written, made = (text.replace("< ", "") for text in (written, made))
     if NUMBER.split(written) != NUMBER.split(made):
