@@ -436,7 +436,7 @@ def test_a_time_history_names_what_acts(mixed):
     """The place is that of the stop of displacement; the element's moment is drawn though it has no contacts."""
     figure = fb.plot.time_history(mixed, window=(0.0, 6.0))
     _, lower = figure.axes
-    title = figure.get_suptitle()
+    title = " ".join(figure.get_suptitle().split())
     assert title.startswith("Displacement at mid-beam relative to the frame, contacts of stop at 0.5 m, below shaded")
     assert lower.get_ylabel() == "force / N or N m"
     names = {"stop of rotation at 0 m, above", "stop at 0.5 m, below", "element of rotation at 1 m"}
