@@ -12,6 +12,8 @@ from the place to the centre, r = |u|:
 
     δ = r - c,  δ̇ = u·u̇/r,  force on the rows N u/r;    of an outer one, where c is kept negative: δ = |c| - r, -N u/r
 
+Sampled signals j have a range of their own, each with a table of its nodes; ``table_load[j]`` is the load it drives.
+
 The entries of the energy balance are the integrals of input power and damping power, then for every stop of force ×
 indentation rate (work done on the stop, J) and of force (impulse, N s). Then come three for each element with friction:
 the integrals of F_t ξ̇ (J), of F_t (N s), and the path of its slider (m), ∫ σξ̇ dt in slip corrected by the change of

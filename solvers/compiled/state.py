@@ -57,7 +57,7 @@ class State(NamedTuple):
     `begin_state` fills it; from then on kernels alone write to it. Units as in `kernels.Problem`.
     """
 
-    now: Annotated[Any, "6"]  # s: time, flight step, contact step, time of the last event, end of the run, see `summed`
+    now: Annotated[Any, "6"]  # s, places named above; the steps are those of `stepping`, for LEFT see `summed`
     x: Annotated[Any, "X"]  # of the blocks, then the energy balance in J (impulses in N s), see `kernels`
     rate: Annotated[Any, "X"]  # of x, per s, where a method needs it
     segment: Annotated[Any, "int E"]  # of the law: 0 in flight, j > 0 between the stop's knots j-1 and j

@@ -1,9 +1,9 @@
 """Flight without contact, evaluated exactly, and steps that provably miss no contact.
 
-With ε_b = √(v_b² + k_b p_b²), which no damped block increases, M = Σ weight_b ε_b bounds |δ̈| from now on. A stop at
+With ε_b = √(v_b² + k_b p_b²), which no damped block increases, B = Σ weight_b ε_b bounds |δ̈| from now on. A stop at
 distance g = -δ that opens at the rate v = -δ̇ cannot be reached before
 
-    τ = (v + √(v² + 2 M g))/M,
+    τ = (v + √(v² + 2 B g))/B,
 
 so steps of at most τ are safe. Close to a contact τ tends to the root from below; within reach of a Taylor
 polynomial of order 6 the root is found on that polynomial, which is exact to rounding there.
@@ -73,7 +73,7 @@ def _bound_signals(problem, cell, count, bounds):
 
 @inlined
 def _acceleration_bound(problem, tables, r, norms, signal_bounds, horizon):
-    """M: bound of |δ̈| of row r over the time ``horizon``, signals included."""
+    """B: bound of |δ̈| of row r over the time ``horizon``, signals included."""
     n = problem.k.size
     total = dot(tables.acceleration_weight[r], norms, n)
     for j in range(problem.table_dt.size):

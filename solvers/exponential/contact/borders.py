@@ -1,9 +1,9 @@
 """Borders of laws with memory and of friction: where a step ends, and what is latched there.
 
 Such a law has margins b_j(δ, δ̇), its event functions: all are positive inside the present segment, and one falls to
-zero on border j. No step crosses a border. A step tried that would is given up; a landing in the variable TIME then
-ends on the border, and there all borders are renewed, that is, their numbers latched anew, whose margins have fallen to
-zero, also those of other elements with the same motion.
+zero on border j. No step crosses a border. A step tried that would is given up; a landing then ends on the border, see
+`landing`. There all borders are renewed, that is, their numbers latched anew, whose margins have fallen to zero, also
+those of other elements with the same motion.
 
 A margin is known at both ends and the nodes of a step. Where it is small at a node, it is also evaluated at points
 around this node. A step whose nodes do not resolve the fast blocks must keep away from zero by what these may add.

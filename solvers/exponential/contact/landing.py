@@ -14,10 +14,11 @@ about 1e-5 of its length; the correction is a short step of the midpoint rule or
 landings take one step of DOP853.
 
 The unknowns are [p, v, energy balance, t, u]. A landing lasts at most `landing_reach` radians of the fastest block, up
-to which DOP853 is exact to the tolerance for every block. The error by the forces is estimated by a tenth of the
-embedded difference of order five, in units of each stop's tolerance: in these variables this is a few times the true
-error, while DOP853's own estimate, of orders five and three, is below it. The whole difference counts where a dashpot
-is too strong for an explicit step. A landing stays within a cell of sampled signals: the difference misses their kinks.
+to which DOP853 is exact to the tolerance for every block. The error by the forces is in units of each stop's tolerance.
+In INDENTATION and ROOT it is estimated by a tenth of the embedded difference of order five: this is a few times the
+true error, while DOP853's own estimate, of orders five and three, is below it. The whole difference counts where a
+dashpot is too strong for an explicit step. In TIME and SINCE it is DOP853's estimate, see `error_in_time`. A landing
+stays within a cell of sampled signals: the difference misses their kinks.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ def land_in_time(problem, tables, state, scratch, stop, first):
     """Land on the bend or border of ``stop``, ``first`` s ahead, or on a border reached before; (stop, success).
 
     ``scratch.border`` holds the number of the border, -1 of a bend, before and after, ``scratch.ahead`` the slope of
-    its margin. "In time" as the variable is `TIME`.
+    its margin. "In time": unlike that of a landing on a knot, the length of the step has to be found.
     """
     border, guess = scratch.border[0], first
     for _ in range(problem.law.size + 1):

@@ -1,7 +1,7 @@
 """The energy balance of contact steps: whole steps by tables, the rest by `quadrature`.
 
-With one or two stops a step is one form that `contact_sums` has summed over the blocks; with more stops the forms of
-the blocks, see `contact_tables`, are evaluated and summed here.
+With a few stops and tones a step is one form that `contact_sums` has summed over the blocks; with more the forms of the
+blocks, see `contact_tables`, are evaluated and summed here.
 """
 
 from __future__ import annotations
