@@ -44,11 +44,14 @@ from solvers.exponential.contact.crossings import (
 )
 from solvers.exponential.contact.first_step import UNKNOWN
 from solvers.exponential.contact.node_response import (
+    BORDER,
     DELTAS,
+    ELEMENT,
     KNOWN,
     RATES,
     SLOPE,
     START,
+    WHEN,
     motion_of,
     rate_ripple_of,
     ripple_of,
@@ -276,9 +279,9 @@ def _expect(tables, scratch, s, j, node_set, h):
         return
     found = _ROOT_EXPECTED * scratch.largest[s, j]
     time, slope = _root_of_polynomial(tables, scratch, j, node_set, h, (1.0, last, above, below), found)
-    if time < scratch.expected[0]:
-        scratch.expected[0], scratch.expected[SLOPE] = time, slope
-        scratch.expected_of[0], scratch.expected_of[1] = s, j
+    if time < scratch.expected[WHEN]:
+        scratch.expected[WHEN], scratch.expected[SLOPE] = time, slope
+        scratch.expected_of[ELEMENT], scratch.expected_of[BORDER] = s, j
 
 
 @inlined
@@ -409,7 +412,7 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
     ``scratch.ahead`` gets the slope of its margin there, or 0. ``scratch.expected`` gets the one that the step after
     this one may cross.
     """
-    scratch.expected[0] = np.inf
+    scratch.expected[WHEN] = np.inf
     first, element, border, h = np.inf, -1, -1, tables.contact_step[level]
     for s in range(problem.law.size):
         count = problem.border_count[s]

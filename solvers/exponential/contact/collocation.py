@@ -73,7 +73,7 @@ from solvers.exponential.contact.node_response import (
     unresolved_part,
     unresolved_signal,
 )
-from solvers.exponential.contact.nodes import S
+from solvers.exponential.contact.nodes import AT_BEGIN, AT_END, S
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
 from solvers.problem.friction import STIFFNESS as FRICTION_STIFFNESS
 
@@ -409,7 +409,7 @@ def _hidden_kink(problem, state, scratch, s, largest):
     rate[1] = indentation_rate(problem, s, state.x)
     contact_forces(problem, s, delta, rate, state.entry_rate[s], scratch.trial[2:4])
     c = scratch.summary[place_of(problem, s)]
-    difference = max(abs(scratch.trial[2] - c[5]), abs(scratch.trial[3] - c[4]))
+    difference = max(abs(scratch.trial[2] - c[AT_END]), abs(scratch.trial[3] - c[AT_BEGIN]))
     return difference if difference > 2.0 * max(abs(c[2]), abs(c[3])) + 1e-12 * largest else 0.0
 
 

@@ -41,7 +41,15 @@ from solvers.compiled.state import OUTSIDE, PEAK_FORCE, T_IN, T, acts, begins_an
 from solvers.compiled.sums import above
 from solvers.exponential.circles.contact import radial_nodes, stays_in_circle
 from solvers.exponential.contact.many_stops import CONTINUING, ENTERING, add_block_motion, motion_at_nodes, uses_blocks
-from solvers.exponential.contact.node_response import DELTAS, RATES, RTOL, motion_of, respond, ripple_of_stop
+from solvers.exponential.contact.node_response import (
+    DELTAS,
+    RATES,
+    RTOL,
+    motion_of,
+    respond,
+    ripple_of_stop,
+    shortest_step,
+)
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import largest_indentation, maximum_and_place, motion_around
 from solvers.exponential.flight import energy_norms
@@ -366,7 +374,7 @@ def before_landing(problem, tables, state, scratch, stop, bends, w, x):
     output.
     """
     width = state.x.size
-    long = x[width] - w[width] > 4.0 * tables.contact_step[tables.contact_step.size - 1]
+    long = x[width] - w[width] > 4.0 * shortest_step(tables)
     for s in range(problem.law.size):
         slopes = 0.0, 0.0
         if s != stop or bends:

@@ -72,7 +72,9 @@ from solvers.exponential.contact.first_step import BALANCED, NEW, NODE_SET
 from solvers.exponential.contact.landing_step import INDENTATION, ROOT, SINCE, TIME, landing_step, start_landing
 from solvers.exponential.contact.node_response import (
     BATCH,
+    BORDER,
     DIFFERENCE,
+    ELEMENT,
     LANDED,
     REACH,
     RTOL,
@@ -485,7 +487,7 @@ def land(problem, tables, state, scratch, stop, direction, time_to_knot):
     a law with memory that is crossed before, ``scratch.landed`` holds its element and number.
     """
     size, t, rate = state.x.size, state.now[T], scratch.start_motion[stop, 1]
-    scratch.landed[0], scratch.landed[OPENED] = -1, 0
+    scratch.landed[ELEMENT], scratch.landed[OPENED] = -1, 0
     if not may_land(problem, tables, state, scratch, stop, direction, time_to_knot):
         return -1
     longest, kappa = longest_time(problem, tables, state, scratch), tables.time_exponent[1 + stop]
@@ -503,11 +505,11 @@ def land(problem, tables, state, scratch, stop, direction, time_to_knot):
         return -1
     other = before_landing(problem, tables, state, scratch, stop, np.bool_(0), w, x)
     if other == CLEAR and problem.parts[PASSED]:
-        scratch.landed[0], scratch.landed[1] = passed(problem, state, scratch, -1, -1, w, x)
-        own = scratch.landed[0] == stop and variable == ROOT
-        if own and _falls_on_surface(problem, state, scratch, stop, scratch.landed[1]):
-            scratch.landed[0] = -1
-        if scratch.landed[0] != -1:
+        scratch.landed[ELEMENT], scratch.landed[BORDER] = passed(problem, state, scratch, -1, -1, w, x)
+        own = scratch.landed[ELEMENT] == stop and variable == ROOT
+        if own and _falls_on_surface(problem, state, scratch, stop, scratch.landed[BORDER]):
+            scratch.landed[ELEMENT] = -1
+        if scratch.landed[ELEMENT] != -1:
             other = TOO_LONG
             scratch.landed[OPENED] = stop + 1 if own else 0
     if other != CLEAR:
@@ -751,7 +753,7 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
     opened, slope_in_time = scratch.landed[OPENED] == stop + 1, scratch.ahead[SLOPE] if border >= 0 else 0.0
     if border >= 0:  # if it were missed by more, the next step might cross it in the wrong direction
         largest, tolerance = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
-    scratch.landed[0], scratch.landed[OPENED] = -1, 0
+    scratch.landed[ELEMENT], scratch.landed[OPENED] = -1, 0
     variable, exponent, forward = np.int64(TIME), 1.0, 1.0  # a literal would be compiled for itself
     if border >= 0 and scratch.control[NEW] and scratch.control[NODE_SET] == stop + 1:
         variable, exponent = np.int64(SINCE), 1.0 / tables.time_exponent[stop + 1]
@@ -777,8 +779,8 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
         crossed_upward = border >= 0 and _was_below(problem, state, scratch, stop, border, value, 1e-3 * time)
     if crossed_upward or before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
         return False  # the margin was below zero before, or another surface or bend is crossed first
-    scratch.landed[0], scratch.landed[1] = passed(problem, state, scratch, stop, border, w, x)
-    if scratch.landed[0] != -1:
+    scratch.landed[ELEMENT], scratch.landed[BORDER] = passed(problem, state, scratch, stop, border, w, x)
+    if scratch.landed[ELEMENT] != -1:
         return False
     lower, upper = problem.knots[stop, state.segment[stop] - 1], problem.knots[stop, state.segment[stop]]
     if rubs(problem, stop) and indentation_rate(problem, stop, x) < 0.0:

@@ -52,7 +52,8 @@ DIFFERENCE, BATCH, LANDED, WITHIN, START = STAGES + 1, *range(STAGES + 4, STAGES
 DELTAS, RATES, FORCES, KNOWN = range(4)
 """Rows of `Scratch.local_motion`: m, m/s, N at points around a node, and the values they are interpolated from."""
 RTOL, REACH = range(2)  # places in Scratch.accuracy
-SLOPE = 1  # place in Scratch.ahead: slope, by time, of the margin of the border crossed, where it is zero; 0 if unknown
+WHEN, SLOPE = range(2)  # places in Scratch.ahead and expected: s; slope by time of the margin at its zero, 0 if unknown
+ELEMENT, BORDER, ONLY_EXPECTED = range(3)  # places in Scratch.ahead_of; the first two also in expected_of and landed
 _KINK_JUMP = 1e-2  # jump of a third derivative, over signal/dt³, that is a kink; smooth signals have a tenth
 STRAIGHT = 1e-9  # change of a law's slope on a step, in units of the slope, that is rounding
 _WORK_TOLERANCE = 10.0  # part of a force, in units of rtol × the largest force, that a step may leave out for its work
@@ -120,9 +121,9 @@ class Scratch(NamedTuple):
     margin: Annotated[Any, "B*S"]  # margins of an element's borders at points, row by row; see `borders`
     ends: Annotated[Any, "6*B"]  # margins of an element's borders at the ends of a step or landing; see `borders`
     fired: Annotated[Any, "B"]  # margins of an element's borders in one state
-    ahead: Annotated[Any, "2"]  # s: when a border is reached, known before a step, else 0; then `SLOPE`
-    ahead_of: Annotated[Any, "int 3"]  # its element and number; 1 if it is only expected
-    expected: Annotated[Any, "2"]  # the same after the start of the step tried of one expected beyond its end, else inf
+    ahead: Annotated[Any, "2"]  # border that a step is known to meet, places named above: time, 0 if there is none
+    ahead_of: Annotated[Any, "int 3"]  # its element and number; 1 if no step has crossed it yet
+    expected: Annotated[Any, "2"]  # border beyond the step tried: time after its start, inf if there is none
     expected_of: Annotated[Any, "int 2"]
     margin_begin: Annotated[Any, "E, B"]  # margins at the start of a landing, then at its end and shortly before it
     margin_end: Annotated[Any, "E, B"]
@@ -339,6 +340,12 @@ def own_accelerance(problem, tables, s):
     if is_circle(problem, s):
         return max(tables.accelerance[row, row], tables.accelerance[row + 1, row + 1])
     return tables.accelerance[row, row]
+
+
+@inlined
+def shortest_step(tables):
+    """Length, s, of the shortest contact step."""
+    return tables.contact_step[tables.contact_step.size - 1]
 
 
 @merged

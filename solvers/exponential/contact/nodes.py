@@ -25,6 +25,7 @@ S: Any = np.int64(8)  # nodes of a contact step: 6 is a little faster at 1e-6, 1
 # (numba would compile functions twice, for the literal 8 and for other integers)
 _CHECKED = (np.arange(24) + 0.5) / 24  # points of (0, 1) where the interpolant through the nodes is compared
 _NODES_FIRST = [*range(S), *range(S + 1, 2 * S + 1), S, 2 * S + 1]  # Hermite data: those at the start last
+AT_BEGIN, AT_END, SLOPE_AT_BEGIN, SLOPE_AT_END = range(4, 8)  # places in a row of Scratch.summary, see Tables.summary
 PHASES = np.geomspace(1e-2, 1e4, 600)  # ω h at which `NodeSets.alias` is tabulated
 LOCAL = -np.cos(np.pi * np.arange(S) / (S - 1))  # Chebyshev points in which a function around a node is interpolated
 MONOMIALS = np.ascontiguousarray(np.linalg.inv(np.vander(LOCAL, increasing=True)).T)  # coefficients from values

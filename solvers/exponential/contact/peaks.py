@@ -39,13 +39,13 @@ from solvers.exponential.contact.node_response import (
     motion_of,
     own_accelerance,
 )
-from solvers.exponential.contact.nodes import LOCAL, MONOMIALS, S
+from solvers.exponential.contact.nodes import AT_BEGIN, LOCAL, MONOMIALS, SLOPE_AT_BEGIN, SLOPE_AT_END, S
 from solvers.problem.friction import MU, PEAK
 
 _MOST_NEWTON_STEPS = 6  # to a maximum
 _HIDES_RATES = 1e-11  # rounding of δ, over the way on a step, above which it shows in slopes of polynomials
 _OFF_NODES = 1e-200  # keeps σ off a node where a polynomial is evaluated
-_BELOW_PEAK = 0.95  # of a peak: if all node values are below, no higher maximum is between them
+BELOW_PEAK = 0.95  # of a peak: if all node values are below, no higher maximum is between them
 
 
 @inlined
@@ -160,7 +160,7 @@ def largest_indentation(problem, tables, state, scratch, node_set, h, s):
 @inlined
 def _all_below_peak(state, s, column, values):
     """Whether all node values are so far below the peak in a column of ``state.active`` that none between is higher."""
-    return largest8(load8(values, 0)) < _BELOW_PEAK * state.active[s, column]
+    return largest8(load8(values, 0)) < BELOW_PEAK * state.active[s, column]
 
 
 @inner
@@ -176,11 +176,12 @@ def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
         if place >= 0:
             state.active[s, column] = max(known, values[place])
         if limit >= 1.0:
-            if values[place] < _BELOW_PEAK * known:
+            if values[place] < BELOW_PEAK * known:
                 continue
-            if place == S - 1 and (summary[7] if d == 0 else indentation_rate(problem, s, scratch.x_new)) >= 0.0:
+            last = place == S - 1
+            if last and (summary[SLOPE_AT_END] if d == 0 else indentation_rate(problem, s, scratch.x_new)) >= 0.0:
                 continue  # still rising at the end, where the next step begins
-            begin, slope = (summary[4], summary[6]) if d == 0 else (start[0], start[1])
+            begin, slope = (summary[AT_BEGIN], summary[SLOPE_AT_BEGIN]) if d == 0 else (start[0], start[1])
             if node_set == 0 and place == 0 and slope <= 0.0 and known >= begin:
                 continue  # falling from its start
         place = max(place, 0)

@@ -14,7 +14,7 @@ from solvers.compiled.parts import FIRST_END, GO_BEYOND, LAND, LAND_IN_TIME, par
 from solvers.exponential.contact.borders import UNRESOLVED, border_ahead, renew_all, renew_border
 from solvers.exponential.contact.crossings import first_bend
 from solvers.exponential.contact.landing import land, land_on_bend_or_border
-from solvers.exponential.contact.node_response import LANDED, SLOPE
+from solvers.exponential.contact.node_response import BORDER, ELEMENT, LANDED, SLOPE
 
 
 @part(LAND, types.UniTuple(types.int64, 2), types.int64, types.int64, REAL)
@@ -56,9 +56,9 @@ def land_in_time(problem, tables, state, scratch, stop, first):
         if land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess):
             scratch.border[0] = border
             return stop, True
-        if scratch.border[0] < 0 or scratch.landed[0] < 0:
+        if scratch.border[0] < 0 or scratch.landed[ELEMENT] < 0:
             break
-        stop, border = scratch.landed[0], scratch.landed[1]
+        stop, border = scratch.landed[ELEMENT], scratch.landed[BORDER]
         scratch.ahead[SLOPE] = 0.0
     return stop, False
 

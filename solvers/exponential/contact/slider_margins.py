@@ -55,8 +55,8 @@ from solvers.exponential.circles.friction import (
 from solvers.exponential.contact.crossings import REST, ROUNDING
 from solvers.exponential.contact.first_step import NEW
 from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, rate_ripple_of, ripple_of
-from solvers.exponential.contact.nodes import LOCAL_SLOPES, S
-from solvers.exponential.contact.peaks import local_maximum, motion_around
+from solvers.exponential.contact.nodes import AT_BEGIN, AT_END, LOCAL_SLOPES, SLOPE_AT_BEGIN, SLOPE_AT_END, S
+from solvers.exponential.contact.peaks import BELOW_PEAK, local_maximum, motion_around
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR
 from solvers.exponential.tables import STIFFNESS as ELASTICITY
 from solvers.problem.friction import CODE, CUT, FREE, MU, PEAK, PRESSES, SLIDES, STICK, STIFFNESS
@@ -228,7 +228,7 @@ def _ends_by_polynomial(problem, tables, scratch, s):
     for j in range(problem.border_count[s]):
         end, margin = scratch.ends[ENDS * j : ENDS * j + 2], scratch.margin[S * j : S * j + S]
         combine(tables.summary[0], margin, S, None, summary)
-        end[0], end[1], values = summary[4], summary[5], load8(margin, 0)
+        end[0], end[1], values = summary[AT_BEGIN], summary[AT_END], load8(margin, 0)
         zero = max(_LEFT_OUT * max(abs(summary[2]), abs(summary[3])), _CLEAR_OF_ZERO * largest8(size8(values)))
         begin_told &= end[0] > zero
         end_told &= abs(end[1]) > zero
@@ -358,7 +358,7 @@ def peak_of_friction(problem, tables, state, scratch, node_set, h, s, limit):
         return
     known, largest = slider[PEAK], abs(slid[TANGENTIAL, highest])
     slider[PEAK] = max(known, largest)
-    if largest < 0.95 * slider[PEAK] or (
+    if largest < BELOW_PEAK * slider[PEAK] or (
         limit >= 1.0 and _maximum_outside(tables, scratch, node_set, s, highest, known)
     ):
         return
@@ -385,9 +385,10 @@ def peak_of_friction(problem, tables, state, scratch, node_set, h, s, limit):
 @merged
 def _maximum_outside(tables, scratch, node_set, s, highest, known):
     """Whether |F_t| rises out of the step at its highest node, an end node, so that no maximum is inside."""
-    forces, slopes = scratch.slid[s, TANGENTIAL], scratch.trial
-    combine(tables.summary[node_set], forces, S, None, slopes)
+    forces, summary = scratch.slid[s, TANGENTIAL], scratch.trial
+    combine(tables.summary[node_set], forces, S, None, summary)
     sign = 1.0 if forces[highest] > 0.0 else -1.0
     if highest == S - 1:
-        return sign * slopes[7] >= 0.0  # still rising at the end, where the next step begins
-    return node_set == 0 and highest == 0 and sign * slopes[6] <= 0.0 and known >= sign * slopes[4]
+        return sign * summary[SLOPE_AT_END] >= 0.0  # still rising at the end, where the next step begins
+    falls = highest == 0 and sign * summary[SLOPE_AT_BEGIN] <= 0.0
+    return node_set == 0 and falls and known >= sign * summary[AT_BEGIN]

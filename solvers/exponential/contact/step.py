@@ -72,7 +72,17 @@ from solvers.exponential.contact.first_step import (
 )
 from solvers.exponential.contact.kinks import land_on_kink_or_limit
 from solvers.exponential.contact.landing import LAST_RESORT, may_land
-from solvers.exponential.contact.node_response import SLOPE, force_of, free_response, own_accelerance
+from solvers.exponential.contact.node_response import (
+    BORDER,
+    ELEMENT,
+    ONLY_EXPECTED,
+    SLOPE,
+    WHEN,
+    force_of,
+    free_response,
+    own_accelerance,
+    shortest_step,
+)
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_run, finish_step, record_forces, sample_step
 from solvers.exponential.contact.segment_ends import first_end, go_beyond, land_first, land_in_time
@@ -141,12 +151,12 @@ def _leave_or_rest(problem, tables, state, scratch, stop, time_to_knot):
         if in_contact(state):
             begin_steps(problem, tables, state, scratch, latest_entered(state))
         return MOVES_OUT
-    if not time_to_knot < tables.contact_step[tables.contact_step.size - 1]:
+    if not time_to_knot < shortest_step(tables):
         return NEITHER
     rate, rounding = abs(scratch.start_motion[stop, 1]), surface_tolerance(problem, stop, state.x)
     if abs(time_to_knot) * rate <= OUTSIDE * rounding and rate <= rate_tolerance(problem, stop, state.x):
         return RESTS
-    scratch.landed[LAST_RESORT] = rounding <= tables.contact_step[tables.contact_step.size - 1] * rate
+    scratch.landed[LAST_RESORT] = rounding <= shortest_step(tables) * rate
     return NEITHER
 
 
@@ -217,10 +227,10 @@ def _attempt(problem, tables, state, scratch, node_set, level):
 @merged
 def _try_friction_border(problem, tables, state, scratch, time_to_knot):
     """Land on a border of friction that a landing on a knot would have crossed; returns whether it was done."""
-    stop, level = scratch.landed[0], scratch.control[NEXT_LEVEL]
+    stop, level = scratch.landed[ELEMENT], scratch.control[NEXT_LEVEL]
     if stop < 0 or not rubs(problem, stop):
         return False
-    scratch.border[0], scratch.ahead[SLOPE] = scratch.landed[1], 0.0
+    scratch.border[0], scratch.ahead[SLOPE] = scratch.landed[BORDER], 0.0
     stop, landed = land_in_time(problem, tables, state, scratch, stop, time_to_knot)
     if landed:
         _continue_after(problem, tables, state, scratch, stop, level, False)
@@ -233,17 +243,17 @@ def _try_border_ahead(problem, tables, state, scratch, time_to_knot):
 
     Returns whether it was done, and the longest step, s, that ends well before a border that is only expected.
     """
-    at, level, expected = scratch.ahead[0], scratch.control[NEXT_LEVEL], scratch.ahead_of[2] > 0
+    at, level, expected = scratch.ahead[WHEN], scratch.control[NEXT_LEVEL], scratch.ahead_of[ONLY_EXPECTED] > 0
     time = at - state.now[T]
-    scratch.ahead[0] = 0.0
+    scratch.ahead[WHEN] = 0.0
     if not 0.0 < time < time_to_knot or scratch.control[NEW]:
         return False, np.inf
-    scratch.border[0] = scratch.ahead_of[1]
-    stop, landed = land_in_time(problem, tables, state, scratch, scratch.ahead_of[0], time)
+    scratch.border[0] = scratch.ahead_of[BORDER]
+    stop, landed = land_in_time(problem, tables, state, scratch, scratch.ahead_of[ELEMENT], time)
     if landed:
         _continue_after(problem, tables, state, scratch, stop, level, False)
     elif expected:
-        scratch.ahead[0], scratch.ahead_of[2] = at, 0
+        scratch.ahead[WHEN], scratch.ahead_of[ONLY_EXPECTED] = at, 0
         return False, _SHORTLY_BEFORE * time
     return landed, np.inf
 
@@ -251,12 +261,12 @@ def _try_border_ahead(problem, tables, state, scratch, time_to_knot):
 @inlined
 def _expect_border(state, scratch):
     """Keep the border that the accepted step lets expect, but one that a step has crossed."""
-    time, known = state.now[T] + scratch.expected[0], scratch.ahead[0] > 0.0
-    same = scratch.ahead_of[0] == scratch.expected_of[0] and scratch.ahead_of[1] == scratch.expected_of[1]
+    time, known = state.now[T] + scratch.expected[WHEN], scratch.ahead[WHEN] > 0.0
+    ahead, expected = scratch.ahead_of, scratch.expected_of
+    same = ahead[ELEMENT] == expected[ELEMENT] and ahead[BORDER] == expected[BORDER]
     if time < np.inf and (same or not known):
-        scratch.ahead[0], scratch.ahead[SLOPE] = time, scratch.expected[SLOPE]
-        scratch.ahead_of[0], scratch.ahead_of[1] = scratch.expected_of[0], scratch.expected_of[1]
-        scratch.ahead_of[2] = 0 if known else 1
+        scratch.ahead[WHEN], scratch.ahead[SLOPE] = time, scratch.expected[SLOPE]
+        ahead[ELEMENT], ahead[BORDER], ahead[ONLY_EXPECTED] = expected[ELEMENT], expected[BORDER], 0 if known else 1
 
 
 @merged
@@ -294,7 +304,7 @@ def _try_landing_now(problem, tables, state, scratch, stop, direction, time_to_k
     Returns whether it was done, and the longest step, s, that ends well before both.
     """
     longest = 0.8 * time_to_knot
-    if scratch.ahead[0] > 0.0:
+    if scratch.ahead[WHEN] > 0.0:
         landed, before = _try_border_ahead(problem, tables, state, scratch, time_to_knot)
         if landed:
             return True, longest
@@ -335,8 +345,9 @@ def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wan
 @inlined
 def _end_before(tables, state, scratch, level, stop, first):
     """Level of a step that ends shortly before what the step tried crosses, so that the next one can land there."""
-    scratch.ahead[0] = state.now[T] + first if scratch.border[0] >= 0 else 0.0
-    scratch.ahead_of[0], scratch.ahead_of[1], scratch.ahead_of[2] = stop, scratch.border[0], 0
+    scratch.ahead[WHEN] = state.now[T] + first if scratch.border[0] >= 0 else 0.0
+    ahead = scratch.ahead_of
+    ahead[ELEMENT], ahead[BORDER], ahead[ONLY_EXPECTED] = stop, scratch.border[0], 0
     return min(max(level + 1, level_of(tables, _SHORTLY_BEFORE * first)), level + _CROSSING_KNOWN)
 
 
@@ -346,7 +357,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
     control, shortest = scratch.control, tables.contact_step.size - 1
     time_to_knot, stop, direction = _nearest_knot(problem, state, scratch)
     scratch.landed[LAST_RESORT] = 0
-    if time_to_knot < tables.contact_step[shortest] or control[NEXT_LEVEL] == shortest:
+    if time_to_knot < shortest_step(tables) or control[NEXT_LEVEL] == shortest:
         found = _leave_or_rest(problem, tables, state, scratch, stop, time_to_knot)
         if found == MOVES_OUT:
             return RUNNING
@@ -402,7 +413,7 @@ def _is_too_brief(problem, tables, state, scratch):
     Those of a stop that comes to rest may become shorter and shorter.
     """
     s = scratch.control[STOP]
-    brief = scratch.duration[s] < _FEWEST_STEPS * tables.contact_step[tables.contact_step.size - 1]
+    brief = scratch.duration[s] < _FEWEST_STEPS * shortest_step(tables)
     return brief and indentation_rate(problem, s, state.x) > _COUNTS * scratch.reference_speed[s]
 
 
@@ -413,7 +424,7 @@ def _relaxes_within(problem, tables, state, scratch):
     for s in range(problem.law.size):
         if state.segment[s] > 0 and scratch.viscous[s] > 0.0:
             rate = scratch.viscous[s] * own_accelerance(problem, tables, s)
-            found |= rate * tables.contact_step[tables.contact_step.size - 1] > 1.0
+            found |= rate * shortest_step(tables) > 1.0
     return found
 
 
