@@ -260,37 +260,40 @@ def slider_margins_on_step(problem, tables, state, scratch, s, node_set, level):
     xi_and_rate_at_nodes(problem, scratch, s)
     slider_margins_at_nodes(problem, tables, state, scratch, s, node_set, h)
     ripple, faster = _ripples(problem, tables, state, s, tables.alias[tables.kind[node_set], level])
-    begin_told, end_told, by = False, False, (0.0, 0.0, 0.0, 0.0)
+    begin_told, end_told, slopes = False, False, (0.0, 0.0, 0.0, 0.0)
     if node_set == 0 and ripple == 0.0 and faster == 0.0 and tables.bend[s] == 0.0:  # beyond a bend nothing is smooth
         begin_told, end_told, far = _ends_by_polynomial(problem, tables, scratch, s)
     begin_told &= scratch.control[NEW] == 0  # a segment begins on its border
     far &= scratch.control[NEW] == 0
     if not far:
-        by = _margin_slopes(problem, tables, state, scratch, s)
+        slopes = _margin_slopes(problem, tables, state, scratch, s)
     _ends_in_states(problem, state, scratch, s, h, begin_told, end_told)
     for j in range(problem.border_count[s]):
         end = scratch.ends[ENDS * j : ENDS * (j + 1)]
         end[2], end[3], end[4], end[5] = end[0], end[0], end[0], end[0]
         scratch.largest[s, j] = max(abs(end[0]), abs(end[1]), largest8(size8(load8(scratch.margin[S * j :], 0))))
     if not far:
-        _add_rounding(problem, state, scratch, s, by, ripple, faster)
+        _add_rounding(problem, state, scratch, s, slopes, ripple, faster)
 
 
 @merged
-def _add_rounding(problem, state, scratch, s, by, ripple, faster):
-    """Rounding of the margins by that of δ, δ̇, ξ and ξ̇, and at the start the ripple of fast blocks."""
-    of_delta, of_rate, of_normal, of_its_rate = by
+def _add_rounding(problem, state, scratch, s, slopes, ripple, faster):
+    """Rounding of the margins by that of δ, δ̇, ξ and ξ̇, and at the start the ripple of fast blocks.
+
+    ``slopes`` are those of `_margin_slopes`.
+    """
+    own_by_delta, own_by_rate, normal_by_delta, normal_by_rate = slopes
     slider, slips = slider_of(problem, s), _slips(slider_of(problem, s))
     xi, xi_rate = xi_tolerances(problem, s, state.now[T], state.x)
-    rest, of_way = REST * scratch.reference_speed[s], slider[STIFFNESS] if slider[CODE] == STICK else 0.0
+    rest, own_by_way = REST * scratch.reference_speed[s], slider[STIFFNESS] if slider[CODE] == STICK else 0.0
     delta, rate = surface_tolerance(problem, s, state.x), max(rate_tolerance(problem, s, state.x), rest)
     for j in range(problem.border_count[s]):
-        by, of_speed = (of_delta, of_rate, of_way), 1.0 if slips else 0.0
+        by_delta, by_rate, by_way, by_speed = own_by_delta, own_by_rate, own_by_way, 1.0 if slips else 0.0
         if j == PRESSES:
-            by, of_speed = (of_normal, of_its_rate, 0.0), 0.0
+            by_delta, by_rate, by_way, by_speed = normal_by_delta, normal_by_rate, 0.0, 0.0
         if j == SLIDES or slips:
-            scratch.ends[ENDS * j + 4] += (by[0] + by[2]) * ripple + of_speed * faster
-        noise = by[0] * delta + by[1] * rate + by[2] * xi + of_speed * max(xi_rate, rest)
+            scratch.ends[ENDS * j + 4] += (by_delta + by_way) * ripple + by_speed * faster
+        noise = by_delta * delta + by_rate * rate + by_way * xi + by_speed * max(xi_rate, rest)
         differenced = j == SLIDES and slips and _rate_dependent(problem, s)
         share = _SLOPE_ROUNDING if differenced else ROUNDING
         scratch.noise[s, j] = max(share * scratch.largest[s, j], 2.0 * noise)
