@@ -356,8 +356,8 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
     rate[size + 1] = _damping_power(problem, x)
     add_loads(problem, t, x, rate)
     for s in range(problem.law.size):
-        rate[size + 2 + 2 * s] = 0.0
-        rate[size + 3 + 2 * s] = 0.0
+        work = work_column(problem, s)
+        rate[work], rate[work + 1] = 0.0, 0.0
         if rubs(problem, s):
             calls += _add_element_with_friction(problem, s, t, segment[s], entry_rate[s], x, rate, batch)
         elif segment[s] > 0:
@@ -365,8 +365,7 @@ def rhs(problem, t, x, segment, entry_rate, rate, batch):
             delta = off_knots(problem, s, segment[s], delta)
             force = force_at(problem, s, delta, delta_dot, entry_rate[s], batch)
             add_push(problem, s, force, x, rate)
-            rate[size + 2 + 2 * s] = force * delta_dot
-            rate[size + 3 + 2 * s] = force
+            rate[work], rate[work + 1] = force * delta_dot, force
             calls += 1
     return calls
 
@@ -377,11 +376,11 @@ def _add_element_with_friction(problem, s, t, segment, entry_rate, x, rate, batc
     if segment == 0:
         no_friction(problem, s, rate)
         return 0
-    rows, size = rows_at(problem, s, x), 2 * problem.k.size
+    rows, work = rows_at(problem, s, x), work_column(problem, s)
     delta, delta_dot = delta_of(radius_of(problem, s), rows)
     normal = force_at(problem, s, off_knots(problem, s, segment, delta), delta_dot, entry_rate, batch)
     add_friction(problem, s, t, rows, normal, rate)
-    rate[size + 2 + 2 * s], rate[size + 3 + 2 * s] = normal * delta_dot, normal
+    rate[work], rate[work + 1] = normal * delta_dot, normal
     return 1
 
 
@@ -394,6 +393,12 @@ def width_of(problem):
             if problem.friction[s, 0] > 0:
                 width = problem.friction[s, 1] + ACCOUNTS
     return width
+
+
+@inlined
+def work_column(problem, s):
+    """Place of the work of element s in a state; that of its impulse is the next one."""
+    return 2 * problem.k.size + 2 + 2 * s
 
 
 @inlined

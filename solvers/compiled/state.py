@@ -25,6 +25,7 @@ from solvers.compiled.kernels import (
     rubs,
     slider_of,
     surface_tolerance,
+    work_column,
     xi_and_rate_at,
 )
 from solvers.compiled.parts import addresses_of
@@ -187,12 +188,15 @@ def acting_segment(problem, state, s):
 
 @kernel
 def event_row(problem, state, s, t, guard, delta, delta_dot, row):
-    """Write into a row of the log which event stop s has, and its motion, force and sums just before."""
-    balance = 2 * problem.k.size + 2 + 2 * s
+    """Write into a row of the log which event stop s has, and its motion, angle and sums just before.
+
+    Where a border is met, its force then takes the place of the angle, see `renew` and `renew_slider_row`.
+    """
+    work = work_column(problem, s)
     row[at.ELEMENT], row[at.TIME], row[at.GUARD] = s, t, guard
     row[at.FROM], row[at.TO] = acting_segment(problem, state, s), 0.0
     row[at.DELTA], row[at.RATE], row[at.FORCE], row[at.CODE] = delta, delta_dot, angle_of(problem, s, state.x), -1.0
-    row[at.IMPULSE], row[at.WORK] = state.x[balance + 1], state.x[balance]
+    row[at.IMPULSE], row[at.WORK] = state.x[work + 1], state.x[work]
     row[at.DEEPEST], row[at.LARGEST] = state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE]
     row[at.CLIPPED] = 1.0 if abs(delta_dot) < problem.floor[s] else 0.0
 

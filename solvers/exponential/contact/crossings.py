@@ -34,6 +34,7 @@ from solvers.compiled.kernels import (
     push_of,
     row_of,
     surface_tolerance,
+    work_column,
 )
 from solvers.compiled.parts import BOUNDS, LEAVES, SIDE, part
 from solvers.compiled.simd import largest8, least8, load8, splat8, store8
@@ -345,7 +346,7 @@ def _passes_cut(problem, tables, state, scratch, stop, s, w, x):
 
     The force of a light dashpot may change its sign behind the last stage.
     """
-    if _pulls_inside(scratch.stages, 2 * problem.k.size + 3 + 2 * s, state.x.size):
+    if _pulls_inside(scratch.stages, work_column(problem, s) + 1, state.x.size):
         return True
     if s != stop:
         return False
@@ -361,7 +362,7 @@ def _peaks_on_landing(problem, tables, state, scratch, stop, s, slopes):
     rest = -_AS_ANOTHER_LANDS * slopes[0] if problem.opening[s] >= 0 else 0.0
     if slopes[0] > 0.0 and slopes[1] < rest and (s != stop or tables.bend[s] != RATE):
         return True
-    column, known = 2 * problem.k.size + 3 + 2 * s, state.active[s, PEAK_FORCE]
+    column, known = work_column(problem, s) + 1, state.active[s, PEAK_FORCE]
     return force_turns(scratch.stages, column, state.x.size, known, 1.0)
 
 

@@ -50,6 +50,7 @@ from solvers.compiled.kernels import (
     rubs,
     slider_of,
     surface_tolerance,
+    work_column,
 )
 from solvers.compiled.parts import PASSED
 from solvers.compiled.sliding import WITHIN_ROUNDING, XI, XI_RATE, slider_force
@@ -176,7 +177,7 @@ def _memory_force_error(problem, state, scratch, s, span):
     The embedded differences of the impulse over the span are errors of the mean force. 0 if the slopes of the law are
     equal at both ends: then the force is as exact as the motion.
     """
-    work, impulse, largest_force = scratch.stages, 2 * problem.k.size + 3 + 2 * s, 1e-300
+    work, impulse, largest_force = scratch.stages, work_column(problem, s) + 1, 1e-300
     deltas, rates, slope = scratch.clipped[0:2], scratch.trial[0:2], scratch.slope[s, :, 0:2]
     deltas[0], rates[0] = indentation_and_rate(problem, s, work[START])
     deltas[1], rates[1] = indentation_and_rate(problem, s, work[LANDED])
@@ -274,10 +275,10 @@ def _length_to(problem, tables, state, scratch, variable, stop, span, landed, ti
 @merged
 def _begin_peaks(problem, state, scratch):
     """Raise the peak forces by the forces at the start of a landing, which are rates of its first stage."""
-    work, size, first = scratch.stages, state.x.size, 2 * problem.k.size + 3
+    work, size = scratch.stages, state.x.size
     for s in range(state.segment.size if work[0, size] != 0.0 else 0):
         if state.segment[s] > 0:
-            column = first + 2 * s
+            column = work_column(problem, s) + 1
             state.active[s, PEAK_FORCE] = max(state.active[s, PEAK_FORCE], work[0, column] / work[0, size])
             if rubs(problem, s):
                 slider, column = slider_of(problem, s), problem.friction[s, 1] + 1

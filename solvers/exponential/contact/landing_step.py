@@ -32,6 +32,7 @@ from solvers.compiled.kernels import (
     rubs,
     table_value,
     width_of,
+    work_column,
 )
 from solvers.compiled.parts import LANDING_STEP, part
 from solvers.compiled.simd import WIDTH, load8, splat8, store8
@@ -104,8 +105,8 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
                 add_push(problem, s, force, w, out)
         elif rubs(problem, s):
             no_friction(problem, s, out)
-        out[size + 2 + 2 * s] = force * rate
-        out[size + 3 + 2 * s] = force
+        work = work_column(problem, s)
+        out[work], out[work + 1] = force * rate, force
     factor = span
     if variable in (ROOT, SINCE):
         kappa = tables.time_exponent[1 + stop]

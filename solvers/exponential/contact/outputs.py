@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solvers.compiled.kernels import copy, indentation, inner, is_circle, merged, rubs
+from solvers.compiled.kernels import copy, indentation, inner, is_circle, merged, rubs, work_column
 from solvers.compiled.simd import load8, sum8
 from solvers.compiled.state import (
     HEAD,
@@ -94,8 +94,9 @@ def finish_step(problem, tables, state, scratch, node_set, level):
             else:
                 ends = scratch.start_motion[s, 0], indentation(problem, s, scratch.x_new)
                 work = work_by_places(tables, node_set, force, motion[0], ends, scratch.trial)
-            state.x[size + 2 + 2 * s] += work
-            state.x[size + 3 + 2 * s] += h * sum8(weights_of(tables, node_set, s) * load8(force, 0))
+            column = work_column(problem, s)
+            state.x[column] += work
+            state.x[column + 1] += h * sum8(weights_of(tables, node_set, s) * load8(force, 0))
             if is_open(problem, s):
                 continue
             if begins_and_ends(problem, s):

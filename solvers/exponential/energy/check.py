@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 
-from solvers.compiled.kernels import inner, merged, row_of, rubs, slider_of
+from solvers.compiled.kernels import inner, merged, row_of, rubs, slider_of, work_column
 from solvers.compiled.state import PEAK_FORCE, T
 from solvers.problem import Array, Record, System, dense
 from solvers.problem import event_list as at
@@ -64,7 +64,7 @@ def note_energy(problem, tables, state, scratch):
                 steady += speed * np.hypot(
                     state.x[b], state.x[n + b] / np.sqrt(problem.k[b]) if problem.k[b] > 0.0 else 0.0
                 )
-        work, impulse = state.x[2 * n + 2 + 2 * s], abs(state.x[2 * n + 3 + 2 * s])
+        work, impulse = state.x[work_column(problem, s)], abs(state.x[work_column(problem, s) + 1])
         if rubs(problem, s):  # |F_t| <= μN; the work of a prescribed spin is given
             slider, account = slider_of(problem, s), problem.friction[s, 1]
             impulse *= 1.0 + slider[MU]

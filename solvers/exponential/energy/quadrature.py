@@ -33,6 +33,7 @@ from solvers.compiled.kernels import (
     row_of,
     rubs,
     table_value,
+    work_column,
 )
 from solvers.compiled.parts import WITHIN_STEP, part
 from solvers.compiled.simd import WIDTH, load8, splat8, store8, sum8
@@ -203,7 +204,6 @@ def _move_blocks(problem, tables, state, scratch, row):
 @merged
 def _add_works(problem, tables, state, scratch, row):
     """Add works and impulses of the contacts over the panel to ``row``."""
-    size = 2 * problem.k.size
     for s in range(problem.law.size):
         if state.segment[s] > 0:
             r = row_of(problem, s)
@@ -217,11 +217,11 @@ def _add_works(problem, tables, state, scratch, row):
             elif is_circle(problem, s):
                 work, impulse = work_within_circle(problem, tables, scratch, s, PACE + 1)
             else:
-                combine(scratch.along, problem.read_rate[r], size, None, scratch.trial)
+                combine(scratch.along, problem.read_rate[r], 2 * problem.k.size, None, scratch.trial)
                 impulses = load8(tables.gauss[1], 0) * load8(scratch.between[PACE + 1 + r], 0)
                 work, impulse = sum8(impulses * load8(scratch.trial, 0)), sum8(impulses)
-            row[size + 2 + 2 * s] += work
-            row[size + 3 + 2 * s] += impulse
+            column = work_column(problem, s)
+            row[column], row[column + 1] = row[column] + work, row[column + 1] + impulse
 
 
 @merged
