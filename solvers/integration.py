@@ -10,7 +10,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -49,6 +49,7 @@ _SAMPLES = 64  # of a run that is made again for its balance
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
 _IDLE, _MOST_IDLE = 1e-6, 50  # of shortened steps: part of the duration a block must pass; blocks in turn that may not
 _MOST_KEPT = 1 << 22  # bytes of sampled signals that are kept for other runs: of longer ones the run takes the time
+_NEARLY_HALF_A_TURN = 0.95  # of it: to which a spring of friction may be drawn in a circle
 _NOTHING = np.empty(0)  # latched by a law without memory
 
 
@@ -144,10 +145,7 @@ def integrate(
     >>> bool(abs(end.q[-1, 0] - 1.0) < 1e-7)
     True
     """
-    if method is None:
-        from solvers.exponential.method import Exponential
-
-        method = Exponential()
+    method = _chosen(method)
     duration = number(duration, "duration")
     arguments = system, q0, q_dot0, duration, dt, method, tangent, memory
     run = prepared_run(*arguments)
@@ -160,9 +158,8 @@ def integrate(
     solution = run.solution(status, time.perf_counter() - started)
     status = solution.status
     if isinstance(tangent, Parameter) and status is Status.DONE and not run.tangent.exact:
-        ends = [_end(s, q0, q_dot0, duration, method, memory) for s in (tangent.behind, tangent.ahead)]
-        known: Any = solution.tangent
-        column = (ends[1] - ends[0]) / (2.0 * tangent.step)
+        behind, ahead = (_end(s, q0, q_dot0, duration, method, memory) for s in (tangent.behind, tangent.ahead))
+        column, known = (ahead - behind) / (2.0 * tangent.step), cast(Array, solution.tangent)
         solution = replace(solution, tangent=np.column_stack((known, column)))
     if check and status not in (Status.DONE, Status.INTERRUPTED):
         raise SolverError(
@@ -170,6 +167,15 @@ def integrate(
         )
     run.engine.release()
     return solution
+
+
+def _chosen(method: Any) -> Any:
+    """The method, the default one instead of None."""
+    if method is not None:
+        return method
+    from solvers.exponential.method import Exponential
+
+    return Exponential()
 
 
 def prepared_run(
@@ -239,10 +245,7 @@ def loads_taken(system: System, duration: float, t: Array, method: Any = None) -
     Where a load is much larger than what it leaves, as that of a support's displacement on a stiff shape that follows
     it, the motion goes by these and not by the signal itself.
     """
-    if method is None:
-        from solvers.exponential.method import Exponential
-
-        method = Exponential()
+    method = _chosen(method)
     return sampled_values(prepared_once(system, method, duration)[0], t)
 
 
@@ -432,9 +435,6 @@ class _Run:
             logged[i, at.FORCE] = 0.0  # the slider's way, which began with what its spring was drawn
 
 
-_NEARLY = 0.95  # of half a turn
-
-
 def _overdrawn(record: Record) -> bool:
     """Whether F_t has come to k_t π c in a circle of radius c: ξ is known up to whole turns there, and so is ξ - s."""
     of_friction = record.rows[record.rows[:, at.GUARD] == at.FRICTION]
@@ -442,7 +442,7 @@ def _overdrawn(record: Record) -> bool:
         if contact.friction is not None and contact.circle:
             largest = of_friction[of_friction[:, at.ELEMENT] == s, at.LARGEST].max(initial=0.0)
             law: Any = contact.law
-            if largest > _NEARLY * law.friction.stiffness * math.pi * abs(contact.circle):
+            if largest > _NEARLY_HALF_A_TURN * law.friction.stiffness * math.pi * abs(contact.circle):
                 return True
     return False
 

@@ -65,6 +65,7 @@ from solvers.exponential.contact.node_response import (
     error_of_work,
     force_of,
     largest_size,
+    law_slopes_at_nodes,
     motion_of,
     node_forces,
     own_accelerance,
@@ -190,10 +191,8 @@ def _largest_force(problem, tables, state, scratch, s):
     if problem.knots[s, 0] == 0.0:
         largest = max(largest8(load8(force, 0)), 0.0)
         return largest, tables.exponent[s] * largest / max(largest8(load8(motion[0], 0)), 1e-300)
-    copy(motion[0], scratch.clipped, S)
-    slope = scratch.slope[s]
-    contact_gradient(problem, s, scratch.clipped, motion[1], state.entry_rate[s], slope[0], slope[1], slope[2])
-    return largest_size(force), largest_size(slope[0])
+    law_slopes_at_nodes(problem, state, scratch, s)
+    return largest_size(force), largest_size(scratch.slope[s, 0])
 
 
 @inlined

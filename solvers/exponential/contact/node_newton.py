@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numba import types
 
-from solvers.compiled.kernels import contact_gradient, copy, element_of, inner, is_circle, merged, row_of, rubs
+from solvers.compiled.kernels import element_of, inner, is_circle, merged, row_of, rubs
 from solvers.compiled.parts import NEWTON, part
 from solvers.compiled.state import CALLS, acts, rate_tolerance
 from solvers.exponential.circles.contact import linearise_circle
 from solvers.exponential.circles.friction import linearise_rubbing
 from solvers.exponential.contact.many_stops import pair_response
-from solvers.exponential.contact.node_response import motion_of, node_forces, respond_all
+from solvers.exponential.contact.node_response import law_slopes_at_nodes, node_forces, respond_all
 from solvers.exponential.contact.nodes import S
 
 MOST_ITERATIONS = 16
@@ -23,9 +23,7 @@ def linearise(problem, tables, state, scratch, node_set, level):
     """Write J = 1 - ∂law/∂(δ, δ̇) ∂(δ, δ̇)/∂F, over nodes and rows in contact, into ``scratch.jacobian``; its size."""
     for s in range(problem.law.size):
         if state.segment[s] > 0:
-            motion, slope = motion_of(problem, scratch, s), scratch.slope[s]
-            copy(motion[0], scratch.clipped, S)
-            contact_gradient(problem, s, scratch.clipped, motion[1], state.entry_rate[s], slope[0], slope[1], slope[2])
+            law_slopes_at_nodes(problem, state, scratch, s)
             state.count[CALLS] += S
     size = 0
     for r in range(problem.gap.size):

@@ -8,6 +8,8 @@ from typing import Annotated, Any, NamedTuple
 from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.kernels import (
     cell_ends,
+    contact_gradient,
+    copy,
     inlined,
     inner,
     is_circle,
@@ -161,13 +163,15 @@ def largest_size(values):
 
 
 @inlined
-def unresolved_part(coefficients, largest, power):
-    """Estimate of the part of a function that its polynomial leaves out, from its last four coefficients.
+def _last_sizes(coefficients):
+    """A₂ and A₁ of the last four coefficients of a polynomial: the larger one of the first two, and of the last two."""
+    return max(abs(coefficients[0]), abs(coefficients[1])), max(abs(coefficients[2]), abs(coefficients[3]))
 
-    With A₁ the larger of the last two, A₂ that of the two before: A₁ max((A₁/A₂)^power, A₁/largest).
-    """
-    before = max(abs(coefficients[0]), abs(coefficients[1]))
-    last = max(abs(coefficients[2]), abs(coefficients[3]))
+
+@inlined
+def unresolved_part(coefficients, largest, power):
+    """A₁ max((A₁/A₂)^power, A₁/largest), see `_last_sizes`: estimate of what a polynomial of a function leaves out."""
+    before, last = _last_sizes(coefficients)
     if last <= 1e-14 * largest:
         return 0.0
     decay = min(last / before, 1.0) if before > 0.0 else 1.0
@@ -176,9 +180,8 @@ def unresolved_part(coefficients, largest, power):
 
 @inlined
 def next_coefficient(coefficients):
-    """Estimate of the coefficient behind the last four, A₁ √(A₁/A₂) with A₁ and A₂ as in `unresolved_part`."""
-    before = max(abs(coefficients[0]), abs(coefficients[1]))
-    last = max(abs(coefficients[2]), abs(coefficients[3]))
+    """A₁ √(A₁/A₂), see `_last_sizes`: estimate of the coefficient behind the last four."""
+    before, last = _last_sizes(coefficients)
     return last * math.sqrt(min(last / before, 1.0)) if before > 0.0 else last
 
 
@@ -358,6 +361,14 @@ def motion_of(problem, scratch, s):
 def force_of(problem, scratch, s):
     """(S,) force, N, of stop s at the nodes; of a circle that along the radius."""
     return scratch.force[row_of(problem, s)] if not is_circle(problem, s) else scratch.law_force[place_of(problem, s)]
+
+
+@inlined
+def law_slopes_at_nodes(problem, state, scratch, s):
+    """Derivatives of the law of stop s at the nodes by δ, δ̇ and entry rate, into ``scratch.slope``."""
+    motion, slope = motion_of(problem, scratch, s), scratch.slope[s]
+    copy(motion[0], scratch.clipped, S)
+    contact_gradient(problem, s, scratch.clipped, motion[1], state.entry_rate[s], slope[0], slope[1], slope[2])
 
 
 @inlined

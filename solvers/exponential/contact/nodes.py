@@ -165,7 +165,7 @@ def node_sets_of(series: tuple[tuple[float, float], ...]) -> NodeSets:
         local_interpolation=each(lambda f: [_interpolate_locally(f, *bracket) for bracket in _brackets(f)]),
         local_interval=each(_brackets),
         extrapolation=each(lambda f: _extensions(f, found[0])),
-        lagrange=each(lambda f: _weights(f.nodes) * [np.ones(S), f.nodes ** (-f.weight_exponent)]),
+        lagrange=each(lambda f: lagrange_weights(f.nodes) * [np.ones(S), f.nodes ** (-f.weight_exponent)]),
         alias=each(_alias),
     )
 
@@ -242,7 +242,7 @@ def _tail(nodes: Any) -> Any:
 
 def _differentiation(nodes: Any) -> Any:
     """Slopes at the nodes of the polynomial through values there (Trefethen, Spectral Methods in MATLAB, Chapter 6)."""
-    apart, weights = nodes[:, None] - nodes + np.eye(len(nodes)), _weights(nodes)
+    apart, weights = nodes[:, None] - nodes + np.eye(len(nodes)), lagrange_weights(nodes)
     out = weights / (weights[:, None] * apart)
     np.fill_diagonal(out, 0.0)
     np.fill_diagonal(out, -out.sum(axis=1))
@@ -257,7 +257,7 @@ def _alias(node_set: _NodeSet) -> Any:
     return np.minimum(np.abs(found - exact).max(axis=0), 2.0)
 
 
-def _weights(nodes: Any) -> Any:
+def lagrange_weights(nodes: Any) -> Any:
     """1/Π (σ_j - σ_i) of the Lagrange polynomials."""
     return 1.0 / (nodes[:, None] - nodes + np.eye(len(nodes))).prod(axis=1)
 
@@ -265,7 +265,7 @@ def _weights(nodes: Any) -> Any:
 def _interpolation(nodes: Any, points: Any) -> Any:
     """(points, nodes) values at points of the polynomial through node values."""
     out = np.empty((len(points), len(nodes)))
-    row, weights = np.empty(len(nodes)), _weights(nodes)
+    row, weights = np.empty(len(nodes)), lagrange_weights(nodes)
     for i, x in enumerate(points):
         lagrange(nodes, weights, float(x), row)
         out[i] = row

@@ -16,7 +16,7 @@ import numpy as np
 
 from solvers.compiled.kernels import inner, kernel
 from solvers.compiled.simd import load8, splat8, store8
-from solvers.exponential.contact.nodes import S, gauss, lagrange, so_far
+from solvers.exponential.contact.nodes import S, gauss, lagrange, lagrange_weights, so_far
 from solvers.exponential.responses import propagate
 
 _PANEL, _POINTS = 1.5, 16  # radians of a panel and its points: exact to rounding
@@ -36,7 +36,7 @@ def contact_table(
     rows of G and x to be multiplied by G.
     """
     k, c, h, nodes = (np.frombuffer(part) for part in (stiffness, damping, steps, places))
-    apart = 1.0 / (nodes[:, None] - nodes + np.eye(len(nodes))).prod(axis=1)
+    apart = lagrange_weights(nodes)
     weights = np.array([apart, apart * nodes ** (-weight_exponent)])
     points = gauss(_POINTS)
     out = np.zeros((len(h), len(k), SQUARES + S + 2, 2 * S))
