@@ -201,38 +201,52 @@ def _slope_changes(slope, largest):
     return largest8(load8(slope, 0)) - least8(load8(slope, 0)) > STRAIGHT * largest
 
 
-@part(ERROR, REAL, types.int64, types.int64)
-def step_error(problem, tables, state, scratch, node_set, level):
-    """Largest error of an indentation rate over the step just solved, in units of its tolerance rtol × speed.
+@merged
+def _left_out(problem, tables, state, scratch, node_set, u, largest):
+    """Estimate of the part of the force on row u, N, that its polynomial leaves out.
 
     On an entry step the nodes are those of Gauss's rule for the stop that enters, not for the others, whose forces are
     estimated at half the order.
     """
-    n, h, worst = problem.k.size, tables.contact_step[level], 0.0
-    for u in range(problem.gap.size):
-        scratch.unresolved[u], s = 0.0, element_of(problem, u)
-        if state.segment[s] == 0:
-            continue
-        combine(tables.summary[node_set], scratch.force[u], S, None, scratch.summary[u])
-        if is_circle(problem, s) and u == row_of(problem, s):
-            own = place_of(problem, s)
-            combine(tables.summary[node_set], scratch.law_force[own], S, None, scratch.summary[own])
-        largest, stiffness = _largest_force(problem, tables, state, scratch, s)
-        if node_set == 0 or s == node_set - 1:
-            unresolved = unresolved_part(scratch.summary[u], largest, S // 2)
-        else:
-            combine(tables.tail[node_set], scratch.force[u], S, None, scratch.trial)
-            unresolved = unresolved_part(scratch.trial, largest, 1)
-        if node_set == 0 and u == row_of(problem, s) and tables.power_law[s, EXPONENT] == 0.0:
-            unresolved += 0.01 * _hidden_kink(problem, state, scratch, s, largest)
-        if unresolved == 0.0:
-            continue
-        if node_set > 0 and s != node_set - 1 and problem.border_count[s] > 0:
-            worst = max(worst, error_of_work(problem, state, scratch, s, unresolved, largest, (stiffness, 0.0)))
-        elif node_set == 0 and problem.border_count[s] > 0 and problem.knots[s, 0] < 0.0:
-            viscous = largest_size(scratch.slope[s, 1])
-            if _slope_changes(scratch.slope[s, 0], stiffness) or _slope_changes(scratch.slope[s, 1], viscous):
-                worst = max(worst, error_of_work(problem, state, scratch, s, unresolved, largest, (stiffness, viscous)))
+    s = element_of(problem, u)
+    if node_set == 0 or s == node_set - 1:
+        left_out = unresolved_part(scratch.summary[u], largest, S // 2)
+    else:
+        combine(tables.tail[node_set], scratch.force[u], S, None, scratch.trial)
+        left_out = unresolved_part(scratch.trial, largest, 1)
+    if node_set == 0 and u == row_of(problem, s) and tables.power_law[s, EXPONENT] == 0.0:
+        left_out += 0.01 * _hidden_kink(problem, state, scratch, s, largest)
+    return left_out
+
+
+@merged
+def _memory_error(problem, state, scratch, node_set, s, left_out, largest, stiffness):
+    """Error of the work of element s by the part of its force left out, in units of its tolerance; 0 without memory."""
+    error = 0.0
+    if node_set > 0 and s != node_set - 1 and problem.border_count[s] > 0:
+        error = error_of_work(problem, state, scratch, s, left_out, largest, (stiffness, 0.0))
+    elif node_set == 0 and problem.border_count[s] > 0 and problem.knots[s, 0] < 0.0:
+        viscous = largest_size(scratch.slope[s, 1])
+        if _slope_changes(scratch.slope[s, 0], stiffness) or _slope_changes(scratch.slope[s, 1], viscous):
+            error = error_of_work(problem, state, scratch, s, left_out, largest, (stiffness, viscous))
+    return error
+
+
+@merged
+def _find_unresolved(problem, tables, state, scratch, node_set, level, u):
+    """Write the impulse, N s, that the polynomial of the force on row u leaves out into ``scratch.unresolved``.
+
+    Returns its `_memory_error`.
+    """
+    s, n, h = element_of(problem, u), problem.k.size, tables.contact_step[level]
+    combine(tables.summary[node_set], scratch.force[u], S, None, scratch.summary[u])
+    if is_circle(problem, s) and u == row_of(problem, s):
+        own = place_of(problem, s)
+        combine(tables.summary[node_set], scratch.law_force[own], S, None, scratch.summary[own])
+    largest, stiffness = _largest_force(problem, tables, state, scratch, s)
+    unresolved, error = _left_out(problem, tables, state, scratch, node_set, u, largest), 0.0
+    if unresolved != 0.0:
+        error = _memory_error(problem, state, scratch, node_set, s, unresolved, largest, stiffness)
         if unresolved > _TOO_MUCH * scratch.force_tolerance[s]:
             rounding = _force_rounding(problem, state, scratch, s)
             unresolved = max(unresolved - rounding, _LITTLE * scratch.force_tolerance[s])
@@ -242,6 +256,17 @@ def step_error(problem, tables, state, scratch, node_set, level):
             damped, stiffness = False, max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
         span = h * _undamped_part(problem, tables, scratch, node_set, h, s) if damped else h
         scratch.unresolved[u] = span * (unresolved + _MEAN_OF_RIPPLE * stiffness * ripple)
+    return error
+
+
+@part(ERROR, REAL, types.int64, types.int64)
+def step_error(problem, tables, state, scratch, node_set, level):
+    """Largest error of an indentation rate over the step just solved, in units of its tolerance rtol × speed."""
+    h, worst = tables.contact_step[level], 0.0
+    for u in range(problem.gap.size):
+        scratch.unresolved[u] = 0.0
+        if acts(problem, state, u):
+            worst = max(worst, _find_unresolved(problem, tables, state, scratch, node_set, level, u))
     worst = max(worst, _sum_errors(problem, tables, state, scratch, node_set, h))
     for r in range(problem.gap.size):
         speed = scratch.reference_speed[element_of(problem, r)]

@@ -743,6 +743,15 @@ def _locate(problem, tables, state, scratch, stop, border, search):
 
 
 @merged
+def _is_within_segment(problem, state, stop, x):
+    """Whether δ of a stop lies inside its segment in the state x; with friction also clearly above the surface."""
+    lower, upper = problem.knots[stop, state.segment[stop] - 1], problem.knots[stop, state.segment[stop]]
+    if rubs(problem, stop) and indentation_rate(problem, stop, x) < 0.0:
+        lower += _least_distance(problem, state, stop, x)
+    return lower < indentation(problem, stop, x) < upper
+
+
+@merged
 def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess):
     """Try to land on border ``border`` of ``stop``, on its bend if that is -1, about ``guess`` s ahead; whether it did.
 
@@ -783,9 +792,6 @@ def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess)
     scratch.landed[ELEMENT], scratch.landed[BORDER] = passed(problem, state, scratch, stop, border, w, x)
     if scratch.landed[ELEMENT] != -1:
         return False
-    lower, upper = problem.knots[stop, state.segment[stop] - 1], problem.knots[stop, state.segment[stop]]
-    if rubs(problem, stop) and indentation_rate(problem, stop, x) < 0.0:
-        lower += _least_distance(problem, state, stop, x)
-    if not lower < indentation(problem, stop, x) < upper:
+    if not _is_within_segment(problem, state, stop, x):
         return False
     return accept_landing(problem, tables, state, scratch, variable, stop, np.inf, forward * span)
