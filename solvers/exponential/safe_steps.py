@@ -113,11 +113,21 @@ def _sample(problem, tables, energy_tables, state, scratch, t):
         state.count[SAMPLED], t = state.count[SAMPLED] + 1, wanted
 
 
+@merged
+def _sample_here(problem, tables, energy_tables, state, scratch):
+    """Write the output that is due in the present state."""
+    row = state.out[state.count[SAMPLED]]
+    copy(state.x, row, state.x.size)
+    if energy_tables.active > 0.0:
+        account_output(problem, tables, energy_tables, state, scratch, state.now[T], row)
+    state.count[SAMPLED] += 1
+
+
 @inner
 def _fly_unsampled(problem, tables, state, scratch, longest, budget):
     """Tabulated steps without signals or output, until a stop is near, ``longest`` has passed or the budget is spent.
 
-    Returns (time flown, its rounding error for `summed`, steps, safe time left).
+    Returns the number of steps, and the safe time left.
     """
     x, flown, rounding, count = scratch.split_state[0], 0.0, 0.0, 0
     split(problem, state.x, x)
@@ -139,7 +149,10 @@ def _fly_unsampled(problem, tables, state, scratch, longest, budget):
         flown, rounding = summed(flown, rounding, tables.flight_step[level])
         count += 1
     join(problem, x, state.x)
-    return flown, rounding, count, span
+    state.now[LEFT] += rounding
+    move_clock(state.now, flown)
+    state.count[STEPS] += count
+    return count, span
 
 
 @inlined
@@ -225,11 +238,25 @@ def _safe_span(problem, tables, state, scratch, span, horizon, renew_bounds):
     return span
 
 
+@inlined
+def _place_in_cell(problem, t):
+    """(cell of the sampled signals, time since its begin, time to its end, s) at t; (0, 0, inf) without signals."""
+    cell, offset, rest = 0, 0.0, np.inf
+    if problem.table_dt.size > 0:
+        cell, offset = cell_of(problem, t)
+        rest = max(problem.table_dt[0] - offset, 1e-9 * problem.table_dt[0])
+    return cell, offset, rest
+
+
 @merged
-def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell, dt_cell):
-    """Move by up to ``span``: Taylor step with a search for roots, whole cell, or table. (time, stop or -1)."""
+def _fly_step(problem, tables, state, scratch, span, target, place):
+    """Move by up to ``span``: Taylor step with a search for roots, whole cell, or table. (time, stop or -1).
+
+    ``place`` is the `_place_in_cell` of the start.
+    """
     size, now, stop, x = 2 * problem.k.size, state.now, -1, scratch.split_state
-    sampled = problem.table_dt.size > 0
+    sampled, (cell, offset, rest) = problem.table_dt.size > 0, place
+    dt_cell = problem.table_dt[0] if sampled else np.inf
     shortest = min(tables.flight_step[tables.flight_step.size - 1], _PART_OF_CELL * dt_cell)
     if span < shortest:
         taylor_terms(problem, state.x, now[T], scratch.terms, scratch.signal_terms)
@@ -266,34 +293,25 @@ def _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell,
 def fly(problem, tables, energy_tables, state, scratch, budget):
     """Fly until a stop is reached (returns its index), to the end (-1), or until the budget is spent (-2)."""
     now, due = state.now, state.due
-    sampled, with_energy = problem.table_dt.size > 0, energy_tables.active > 0.0
-    dt_cell, count = problem.table_dt[0] if sampled else np.inf, 0
+    sampled, with_energy, count = problem.table_dt.size > 0, energy_tables.active > 0.0, 0
     while count < budget:
         if sampled:
             count += _cross_cells(problem, tables, energy_tables, state, scratch, budget - count)
         if due[state.count[SAMPLED]] <= now[T]:
-            row = state.out[state.count[SAMPLED]]
-            copy(state.x, row, state.x.size)
-            if with_energy:
-                account_output(problem, tables, energy_tables, state, scratch, now[T], row)
-            state.count[SAMPLED] += 1
+            _sample_here(problem, tables, energy_tables, state, scratch)
         if now[T] >= now[T_END]:
             return -1
 
         # --- the time up to the next output, the end, or the end of the signals' cell
         first = due[state.count[SAMPLED]]
         target = _target(tables, state, first)
-        begin, span, rest, offset, cell = now[T], target - now[T], np.inf, 0.0, 0
+        begin, span, place = now[T], target - now[T], _place_in_cell(problem, now[T])
+        cell, _, rest = place
         if sampled:
-            cell, offset = cell_of(problem, now[T])
-            rest = max(dt_cell - offset, 1e-9 * dt_cell)
             _bound_signals(problem, cell, 1, scratch.signal_bounds)
         # --- the time within which no stop can be reached
         if first == np.inf and not sampled:  # neither outputs nor cells limit the steps
-            flown, left, steps, span = _fly_unsampled(problem, tables, state, scratch, span, budget)
-            now[LEFT] += left
-            move_clock(now, flown)
-            state.count[STEPS] += steps
+            steps, span = _fly_unsampled(problem, tables, state, scratch, span, budget)
             if steps >= budget:
                 return -2
         else:
@@ -303,7 +321,7 @@ def fly(problem, tables, energy_tables, state, scratch, budget):
                     account_state(problem, tables, energy_tables, state, scratch)
                 split(problem, state.x, scratch.split_state[2])
             span = _safe_span(problem, tables, state, scratch, span, rest, sampled or count % _REFRESH == 0)
-        h, stop = _fly_step(problem, tables, state, scratch, span, target, rest, offset, cell, dt_cell)
+        h, stop = _fly_step(problem, tables, state, scratch, span, target, place)
         move_clock(now, h)
         now[T] = min(now[T], target)
         state.count[STEPS] += 1
