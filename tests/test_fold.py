@@ -104,7 +104,10 @@ def test_it_prints_and_is_drawn(tmp_path):
     assert "cusp" in str(found)
     assert found.table()[0].keys() == {"value", "at", "amplitude", "mark"}
     assert len(found.plain()["folds"]) == len(found.values)
+    said = " ".join(str(found).split())
+    assert f"{FORCE} / N fold at forces[0].signal.omega / rad s⁻¹ amplitude / m" in said
     found.save(tmp_path / "folds.csv")
+    assert (tmp_path / "folds.csv").read_text().startswith("value [N],at [rad/s],amplitude [m],mark\n")
     figure = found.figure()
     assert figure.axes[1].get_xlabel().startswith("drive amplitude")
     fb.plot.fold_curve(found, figure.axes)

@@ -1,5 +1,6 @@
 """Laws with memory from synthetic loops whose truth is known."""
 
+import re
 import warnings
 
 import numpy as np
@@ -240,8 +241,9 @@ def test_slopes_are_those_of_the_forces(model, main):
 def test_it_prints():
     found = identify_loop(PATH, WEN.along(PATH), BoucWen)
     said = str(found)
-    assert "BoucWen from 1 records, 95 % intervals" in said
+    assert "BoucWen from 1 record, 95 % intervals" in said
     assert "A, n           1 (chosen: loops tell A and beta, gamma together only), 1" in said
+    assert re.search(r"  stiffness +20000.* N/m\n  alpha +0\.1[^/]*\n  beta .* 1/m\n", said)
     assert "stiffness 20000" in repr(found)
 
 

@@ -171,10 +171,15 @@ def test_the_derivative_of_an_amplitude():
 # --- results, files, bad input ---------------------------------------------------------------------------------------
 
 
-def test_what_is_found_prints_and_draws():
+def test_what_is_found_prints_and_draws(tmp_path):
     found = best()
     assert [list(row) for row in found.table()] == 3 * [["value", "at", "amplitude", "slope", "stable"]]
     assert "least" in str(found)
+    said = "elements[damper].law.limit / N peak at forces[0].signal.omega / rad s⁻¹ amplitude / m slope / m/N stable"
+    assert said in " ".join(str(found).split())
+    found.save(tmp_path / "peak.csv")
+    head = (tmp_path / "peak.csv").read_text().splitlines()[0]
+    assert head == "value [N],at [rad/s],amplitude [m],slope [m/N],stable"
     assert set(found.plain()) == {"parameter", "over", "peaks", "least"}
     upper, lower = found.figure().axes
     assert upper.get_ylabel() == "amplitude of u(0.5 m) / mm"

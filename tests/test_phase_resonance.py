@@ -97,10 +97,13 @@ def test_a_hardening_spring_beyond_its_folds():
     assert found.omega[-1] > 1.08 * model.omega[0]
 
 
-def test_what_is_found_prints_and_draws():
+def test_what_is_found_prints_and_draws(tmp_path):
     found = of_a_slider()
     assert [list(row) for row in found.table()] == 5 * [["level", "amplitude", "omega", "zeta", "energy", "stable"]]
-    assert "energy per period" in str(found)
+    assert "amplitude / N amplitude / m ω / rad/s ζ energy per period / J stable" in " ".join(str(found).split())
+    found.save(tmp_path / "backbone.csv")
+    head = (tmp_path / "backbone.csv").read_text().splitlines()[0]
+    assert head == "level [N],amplitude [m],omega [rad/s],zeta,energy [J],stable"
     assert set(found.plain()) == {"level", "resonances"}
     assert [axis.get_ylabel() for axis in found.figure().axes] == ["ω / rad s⁻¹", "equivalent damping ratio ζ"]
 

@@ -492,6 +492,8 @@ PATHS = {
     "supports[0].motion.rz.amplitude": "motion amplitude along rz of support 0 / rad",
     "beam.nodes.B[1]": "y of node B / m",
     "beam.members[0].section.fibre": "distance of the outer fibre / m",
+    "elements[0].law.coefficients[0]": "coefficient 1 of the contact law of element 0 / N/m",
+    "elements[0].law.coefficients[2]": "coefficient 3 of the contact law of element 0 / N/m^3",
     "stops[0].friction.mu": "coefficient of friction of stop 0",
     "stops[0].law.something": "stops[0].law.something",
 }

@@ -412,6 +412,24 @@ def test_tables_have_the_units_of_the_parameters():
     assert "stops[0].gap / m" in str(least)
     made = fb.study.vary(lambda gap: paper_scene(), {"gap": [0.0]}, **run)
     assert made.units == ("",)
+    assert made.value_units == ("m",)
+
+
+def test_values_have_units_in_tables_figures_and_files(tmp_path):
+    """Of the stop that is asked for, of rotation or not; a function has none."""
+    hinge = fb.Stop(0.5, Hertz(1e4), of="rotation", name="hinge")
+    scene = replace(swung(), stops=[fb.Stop(0.5, Hertz(1e7)), hinge])
+    asked = {"F": "peak_force", "M": PeakForce("hinge"), "M1": PeakForce(1), "M2": PeakForce(-1),
+             "turn": Amplitude("hinge"), "own": lambda run: 1.0}  # fmt: skip
+    found = fb.study.vary(scene, {"omega": [100.0, 110.0]}, asked, 0.05, 1e-3)
+    assert found.value_units == ("N", "N m", "N m", "N m", "rad", "")
+    assert re.search(r"omega / rad s⁻¹ +F / N +M / N m +M1 / N m +M2 / N m +turn / rad +own\n", str(found))
+    assert found.figure().axes[1].get_ylabel() == "M / N m"
+    found.save(tmp_path / "table.csv")
+    head = (tmp_path / "table.csv").read_text().splitlines()[0]
+    assert head == "base.omega [rad/s],F [N],M [N m],M1 [N m],M2 [N m],turn [rad],own"
+    least = fb.study.minimise(scene, {"omega": (100.0, 110.0)}, "rms", {"energy": 1e9}, 0.05, 1e-3, tolerance=0.05)
+    assert re.search(r"rms / m .*\n.*omega / rad s⁻¹.*\nenergy / J", str(least))
 
 
 FILE = (

@@ -47,13 +47,23 @@ class IdentifiedLoop:
     confidence: float
 
     def __repr__(self) -> str:
-        told = ", ".join(f"{name} {estimate}" for name, estimate in self.estimates.items())
-        return f"<{type(self.law).__name__} from {len(self.records)} records: {told}>"
+        told = ", ".join(f"{name} {self._with_unit(name)}" for name in self.estimates)
+        return f"<{self._head()}: {told}>"
 
     def __str__(self) -> str:
-        lines = [f"{type(self.law).__name__} from {len(self.records)} records, {100 * self.confidence:g} % intervals"]
-        lines += [f"  {name:<14} {estimate}" for name, estimate in self.estimates.items()]
+        lines = [f"{self._head()}, {100 * self.confidence:g} % intervals"]
+        lines += [f"  {name:<14} {self._with_unit(name)}" for name in self.estimates]
         if "alpha" in self.estimates:
             lines.append(f"  A, n           1 (chosen: loops tell A and beta, gamma together only), {self.law.n}")  # type: ignore[attr-defined]
         lines += [f"  force offset   {self.force_offset} N", f"  noise          {self.noise:.3g} N"]
         return "\n".join(lines + [f"  beware: {remark}" for remark in self.remarks])
+
+    def _head(self) -> str:
+        """The law and how many records."""
+        count = len(self.records)
+        return f"{type(self.law).__name__} from {count} record{'s' * (count != 1)}"
+
+    def _with_unit(self, name: str) -> str:
+        """An estimate and the unit of it, if it has one."""
+        unit = self.law.units.get(name.partition("[")[0], "").replace("^n", f"^{getattr(self.law, 'n', '')}")
+        return f"{self.estimates[name]} {unit.removesuffix('^1')}".rstrip()

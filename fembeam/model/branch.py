@@ -154,8 +154,7 @@ class Branch(Printed):
 
     def to_csv(self, path: str | Path) -> None:
         """Write the table, units in the heads of its columns; the file is written whole or not at all."""
-        heads = {name: f"{name} [{unit}]" for name, unit in self._units().items() if unit}
-        write_rows(Path(path), [{heads.get(name, name): one for name, one in row.items()} for row in self.table()])
+        write_rows(Path(path), self.table(), self._units())
 
     def _units(self) -> dict[str, str]:
         """Units of the columns that have one."""
@@ -163,7 +162,7 @@ class Branch(Printed):
 
         name, log = self.family.name, self._orbit(self.found.orbits[0]).contacts
         peaks = {words: log.unit(words.replace(" ", "_")) for words in ("peak indentation", "peak force")}
-        return {name: parameter_unit(name, self.family.model.scene).replace(" s⁻¹", "/s"), "its angle": "rad"} | peaks
+        return {name: parameter_unit(name, self.family.model.scene), "its angle": "rad"} | peaks
 
     def __repr__(self) -> str:
         known = self.parameter

@@ -19,7 +19,7 @@ LAWS = {"stiffness": ("contact stiffness", "N/m^p"), "exponent": ("exponent of t
         "limit": ("limit of slip", "N"), "limits": ("limit of slip", "N"), "yield_force": ("yield force", "N"),
         "static_limit": ("limit of stick", "N"), "hardening": ("hardening", "N/m"), "knots": ("knee", "m"),
         "slopes": ("slope of the contact law", "N/m"), "loading": ("stiffness in loading", "N/m"),
-        "unloading": ("stiffness in unloading", "N/m"),
+        "coefficients": ("coefficient of the contact law", "N/m"), "unloading": ("stiffness in unloading", "N/m"),
         "entry_rate_floor": ("floor of entry rates", "m/s")}  # fmt: skip
 PARTS = {
     "gap": ("gap", "m"), "clearance": ("clearance", "m"), "centre": ("centre of the circle", "m"),
@@ -87,6 +87,9 @@ def _named(path: str, scene: Scene) -> tuple[str, str]:
         name, unit = f"{'xyz'[int(component)]} of node {last}", "m"
     else:
         name, unit = _of_part(scene, beam, kind, int(number or 0), last, ".law." in path)
+        if last == "coefficients":  # N/m^j of the j-th
+            j = int(path.removesuffix("]").rpartition("[")[2]) + 1
+            name, unit = name.replace("coefficient", f"coefficient {j}"), unit if j == 1 else f"{unit}^{j}"
     return name + (f" of beam {int(beam) + 1}" if name and beam else ""), unit
 
 

@@ -38,7 +38,7 @@ def variation(found: Variation, axes: Axes | Sequence[Axes] | None = None, best:
     d, q = found.points.shape[1], len(found.quantities)
     columns = 1 if d <= 2 else d
     figure, panels = sheet(q, columns, (6.4 if d <= 2 else 2.8 * d, 0.8 + 2.8 * q), axes)
-    for i, name in enumerate(found.quantities):
+    for i, name in enumerate(found.value_heads):
         row = panels[i * columns : (i + 1) * columns]
         if d == 2:
             _map(row[0], found, i)
@@ -63,7 +63,7 @@ def minimum(found: Minimum, axes: Axes | Sequence[Axes] | None = None) -> Figure
     ...                  base=fb.Harmonic(1e-3, 100.0), damping=fb.ModalDamping(0.05))
     >>> found = fb.study.minimise(scene, {"base.amplitude": (1e-3, 2e-3)}, "amplitude", {}, 0.5, 1e-3, modes=1)
     >>> minimum(found).axes[0].get_ylabel()
-    'amplitude'
+    'amplitude / m'
     """
     return variation(found.tried, axes, found.number)
 
@@ -84,7 +84,7 @@ def _map(axis: Axes, found: Variation, i: int) -> None:
         image: Any = axis.pcolormesh(*found.axes, found[found.quantities[i]].T, shading="nearest")
     else:
         image = axis.scatter(found.points[:, 0], found.points[:, 1], c=found.values[:, i], s=12)
-    figure.colorbar(image, ax=axis, label=verbatim(found.quantities[i]))
+    figure.colorbar(image, ax=axis, label=verbatim(found.value_heads[i]))
     axis.set(xlabel=verbatim(found.titles[0]), ylabel=verbatim(found.titles[1]))
     axis.locator_params(axis="x", nbins=5)  # long numbers would meet
 

@@ -50,6 +50,7 @@ from fembeam.scene.places import (
     place_words,
     quoted,
     split,
+    turns_at,
 )
 from fembeam.scene.rotors import Disk, Unbalance
 from fembeam.scene.rubbing import Friction, spin_of

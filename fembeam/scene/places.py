@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from fembeam.structures import COMPONENTS, Six, direction_of, named
+from fembeam.structures import COMPONENTS, Six, direction_of, named, turns
 from fembeam.support import is_finite, is_name, is_numbered, is_pair, is_whole, require
 
 if TYPE_CHECKING:
@@ -103,6 +103,17 @@ def place_words(place: Any) -> str:
     if is_pair(place):
         return f"{place[0]} + {place[1]:g} m"
     return f"{place:.6g} m" if is_finite(place) else str(place)
+
+
+def turns_at(at: Any) -> bool:
+    """Whether a place stands with a rotation: rad, not m.
+
+    Examples
+    --------
+    >>> [turns_at(at) for at in (0.3, ("lever", "-x"), ("lever", "rx"), ("A-B", 0.4))]
+    [False, False, True, False]
+    """
+    return is_directed(at) and turns(direction_of(at[1], "place"))
 
 
 def is_directed(at: Any) -> bool:

@@ -485,9 +485,8 @@ class FoundBranch(Result):
         """One orbit a row."""
         return self.branch.table()
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the table as CSV with units, whole or not at all."""
-        self.branch.to_csv(Path(path))
+    def _units(self) -> dict[str, str]:
+        return self.branch._units()
 
     def plain(self) -> dict[str, Any]:
         """Orbits and how each direction ended, as JSON has them."""

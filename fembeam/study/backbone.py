@@ -21,11 +21,13 @@ from scipy.optimize import brentq
 from fembeam import plot
 from fembeam.model import Model, Orbit, observed
 from fembeam.model.branch import Family
-from fembeam.scene import Scene, called, path_of
+from fembeam.plot.axis_names import parameter_unit
+from fembeam.scene import Scene, called, path_of, turns_at
 from fembeam.study.peak import check_peak
 from fembeam.study.response_curve import ResponseCurve, Seen
 from fembeam.study.result import Result, column
 from fembeam.support import Part, counting, require
+from solvers.problem import counted
 
 Vector = NDArray[np.float64]
 WHERE = "study.backbone"
@@ -54,7 +56,7 @@ class Backbone(Result):
     Attributes
     ----------
     level : name of the tone's amplitude. resonances : one for each level, each with its `orbit`.
-    z : where the amplitude is taken.
+    z : where the amplitude is taken. unit : of the tone's amplitude.
     """
 
     INDEX: ClassVar[str] = "level"
@@ -62,6 +64,7 @@ class Backbone(Result):
     level: str
     resonances: tuple[Resonance, ...]
     z: Any
+    unit: str = ""
 
     levels = column("resonances", "level", "(k,) amplitudes of the tone.")
     omega = column("resonances", "omega", "(k,) rad/s, of phase resonance.")
@@ -72,7 +75,9 @@ class Backbone(Result):
 
     def __repr__(self) -> str:
         low, high = self.amplitude.min(), self.amplitude.max()
-        return f"<backbone at {len(self.resonances)} levels of {self.level}, {low:.4g} to {high:.4g} m>"
+        length = self._units()["amplitude"]
+        levels = counted(len(self.resonances), "level")
+        return f"<backbone at {levels} of {self.level}, {low:.4g} to {high:.4g} {length}>"
 
     def table(self) -> list[dict[str, Any]]:
         """A row for each level, in SI units."""
@@ -83,8 +88,13 @@ class Backbone(Result):
         """What was found, as JSON has it, without orbits."""
         return {"level": self.level, "resonances": self.table()}
 
+    def _units(self) -> dict[str, str]:
+        length = "rad" if turns_at(self.z) else "m"
+        return {"level": self.unit, "amplitude": length, "omega": "rad/s", "energy": "J"}
+
     def _parts(self) -> list[Part]:
-        head = (self.level, "amplitude / m", "ω / rad/s", "ζ", "energy per period / J", "stable")
+        level = f"{self.level} / {self.unit}" if self.unit else self.level
+        head = (level, f"amplitude / {self._units()['amplitude']}", "ω / rad/s", "ζ", "energy per period / J", "stable")
         rows = [(*list(row.values())[:-1], "yes" if row["stable"] else "no") for row in self.table()]
         return [repr(self), (head, rows)]
 
@@ -151,7 +161,8 @@ def backbone(
     search = _Search(family, path_of(model.scene, parameter), (float(span[0]), float(span[1])), place)
     with counting(progress, given, unit=" levels") as bar:
         found = [search.at(float(value)) for value in bar]
-    return Backbone(called(model.scene, level), tuple(found), place)
+    unit = parameter_unit(search.levels.name, model.scene)
+    return Backbone(called(model.scene, level), tuple(found), place, unit)
 
 
 def check_backbone(scene: Scene, levels: ArrayLike, span: Any, level: str, parameter: str) -> Vector:

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from fembeam import plot
 from fembeam.model import Branch, Orbit, observed
 from fembeam.model.branch import Family
-from fembeam.plot.axis_names import axis_name
-from fembeam.scene import called, path_of, value_of
+from fembeam.plot.axis_names import axis_name, parameter_unit
+from fembeam.scene import called, path_of, turns_at, value_of
 from fembeam.study.result import Result
 from fembeam.support import Part, by_rows, is_finite, is_whole, require
 from solvers.branches import fold_curve
@@ -40,6 +40,7 @@ class Fold(Result):
     amplitude : (k,) m, half the range of the displacement at z.
     orbits : the motions, ``mark`` "fold", or "cusp" where two folds meet.
     endings : how both directions ended, in words. titles : of p and λ, for axes.
+    units : of p and λ, empty where not known.
     """
 
     INDEX: ClassVar[str] = "value"
@@ -53,6 +54,7 @@ class Fold(Result):
     endings: tuple[str, ...]
     z: Any
     titles: tuple[str, str]
+    units: tuple[str, str] = ("", "")
 
     @property
     def cusps(self) -> list[int]:
@@ -72,8 +74,13 @@ class Fold(Result):
         """What was found, as JSON has it, without orbits."""
         return {"parameter": self.parameter, "over": self.over, "folds": self.table(), "endings": list(self.endings)}
 
+    def _units(self) -> dict[str, str]:
+        return {"value": self.units[0], "at": self.units[1], "amplitude": "rad" if turns_at(self.z) else "m"}
+
     def _parts(self) -> list[Part]:
-        head = (self.over, f"fold at {self.parameter}", "amplitude / m", "")
+        names = {"value": self.over, "at": f"fold at {self.parameter}"}
+        head = [f"{names.get(name, name)} / {unit}" if unit else names[name] for name, unit in self._units().items()]
+        head.append("")
         rows = [(*list(row.values())[:-1], row["mark"] if row["mark"] == "cusp" else "") for row in self.table()]
         return [repr(self), (head, rows), "; ".join(dict.fromkeys(self.endings))]
 
@@ -147,7 +154,8 @@ def fold(branch: Branch, over: str, span: tuple[float, float], number: int = 0, 
     at = np.array([one.parameter for one in orbits])
     titles = axis_name(path, model.scene), axis_name(name, model.scene)
     amplitude = 0.5 * (ends[:, 1] - ends[:, 0])
-    return Fold(name, called(model.scene, over), found.values, at, amplitude, orbits, found.endings, z, titles)
+    units = parameter_unit(path, model.scene), parameter_unit(name, model.scene)
+    return Fold(name, called(model.scene, over), found.values, at, amplitude, orbits, found.endings, z, titles, units)
 
 
 @dataclass

@@ -88,11 +88,12 @@ class Minimum(Result):
 
     def _parts(self) -> list[Part]:
         """What was found, which bounds are active, how many evaluations it took."""
-        name = self.tried.quantities[0]
+        name, *bounded = self.tried.value_heads
         value = self.value if np.isnan(self.standard_error) else repr(Estimate(self.value, self.standard_error, 2))
         at = zip(self.tried.heads, self.at.items(), strict=True)
         ends = [(head, x, "at its bound" if path in self.active else "") for head, (path, x) in at]
-        limits = [(one.name, one.value, f"at most {one.bound:g}{', active' * one.active}") for one in self.limits]
+        words = (f"at most {one.bound:g}{', active' * one.active}" for one in self.limits)
+        limits = [(head, one.value, said) for head, one, said in zip(bounded, self.limits, words, strict=True)]
         used = f", {counted(self.gradients, 'gradient')}" if self.gradients else ""
         done = "converged" if self.converged else "NOT CONVERGED: allow more evaluations"
         return [
@@ -103,6 +104,9 @@ class Minimum(Result):
     def table(self) -> list[dict[str, Any]]:
         """All points tried, one a row."""
         return self.tried.table()
+
+    def _units(self) -> dict[str, str]:
+        return self.tried._units()
 
     def plain(self) -> dict[str, Any]:
         """What was found, and all points, as JSON has them."""

@@ -23,8 +23,8 @@ from fembeam import plot
 from fembeam.model import Model, Orbit, load_period, observed
 from fembeam.model.branch import Family
 from fembeam.model.sensitivity import of_amplitude
-from fembeam.plot.axis_names import axis_name
-from fembeam.scene import Scene, called, path_of, with_value
+from fembeam.plot.axis_names import axis_name, parameter_unit
+from fembeam.scene import Scene, called, path_of, turns_at, with_value
 from fembeam.study.response_curve import ResponseCurve, Seen
 from fembeam.study.result import Result, column
 from fembeam.support import Part, counting, is_finite, numbers, require
@@ -60,7 +60,7 @@ class Peak(Result):
     tops : one for each value of p, each with its `orbit`.
     least : where the peak is least between the values, refined; None where it is so at the first or last value.
     z : where the amplitude is taken.
-    titles : of p and ω, for axes.
+    titles : of p and ω, for axes. units : of these alone, empty where not known.
     """
 
     INDEX: ClassVar[str] = "value"
@@ -71,6 +71,7 @@ class Peak(Result):
     least: Top | None
     z: Any
     titles: tuple[str, str]
+    units: tuple[str, str] = ("", "")
 
     values = column("tops", "value", "(k,) of p.")
     at = column("tops", "at", "(k,) ω of the peaks.")
@@ -92,12 +93,20 @@ class Peak(Result):
         least = None if self.least is None else {name: getattr(self.least, name) for name in self.table()[0]}
         return {"parameter": self.parameter, "over": self.over, "peaks": self.table(), "least": least}
 
+    def _units(self) -> dict[str, str]:
+        length, (unit, of_place) = "rad" if turns_at(self.z) else "m", self.units
+        slope = f"{length}/{unit if unit.isalpha() else f'({unit})'}" if unit else length
+        return {"value": unit, "at": of_place, "amplitude": length, "slope": slope}
+
     def _parts(self) -> list[Part]:
-        head = (self.over, f"peak at {self.parameter}", "amplitude / m", "slope", "stable")
+        names = {"value": self.over, "at": f"peak at {self.parameter}"}
+        head = [f"{names.get(name, name)} / {unit}" if unit else names[name] for name, unit in self._units().items()]
+        head.append("stable")
         rows = [(*list(row.values())[:-1], "yes" if row["stable"] else "no") for row in self.table()]
         one, least = self.least, "least at the end of the values: widen them"
         if one is not None:
-            least = f"least {one.amplitude:.6g} m at {self.over} = {one.value:.6g}, {self.parameter} = {one.at:.6g}"
+            unit, at = self._units()["amplitude"], f"{self.over} = {one.value:.6g}, {self.parameter} = {one.at:.6g}"
+            least = f"least {one.amplitude:.6g} {unit} at {at}"
         return [repr(self), (head, rows), least]
 
     figure = plot.peak_curve
@@ -160,7 +169,8 @@ def peak(
         tops = [search.top(float(value)) for value in bar]
     titles = axis_name(search.over, model.scene), axis_name(search.parameter, model.scene)
     names = called(model.scene, parameter), called(model.scene, over)
-    return Peak(*names, tuple(tops), _least(search, tops), search.z, titles)
+    units = parameter_unit(search.over, model.scene), parameter_unit(search.parameter, model.scene)
+    return Peak(*names, tuple(tops), _least(search, tops), search.z, titles, units)
 
 
 def check_peak(

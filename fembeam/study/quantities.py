@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from fembeam.model import Run, extremes_of, places
 from fembeam.model.extremes import of_top
-from fembeam.scene import Place
+from fembeam.plot.axis_names import TURNED
+from fembeam.scene import Place, Scene, turns_at
 from fembeam.statistics import psd
 from fembeam.support import is_finite, is_pair, is_whole, require
 
@@ -65,6 +66,8 @@ class OfContacts:
 class Amplitude(OfSignal):
     """Half the range of δ (or u at `z`), m; extremes between samples by cubics."""
 
+    unit: ClassVar[str] = "m"
+
     def __call__(self, run: Run) -> float:
         """Value of a run."""
         lowest, highest = extremes_of(run.t, *self.signal(run))
@@ -78,6 +81,8 @@ class Amplitude(OfSignal):
 
 class Rms(OfSignal):
     """Root mean square of δ (or u at `z`) about its mean, m; by trapezia over the samples, so their times matter."""
+
+    unit: ClassVar[str] = "m"
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
@@ -94,6 +99,8 @@ class Rms(OfSignal):
 class PeakForce(OfContacts):
     """Largest contact force of one stop, N; 0 without contact."""
 
+    unit: ClassVar[str] = "N"
+
     def __call__(self, run: Run) -> float:
         """Value of a run."""
         return float(run.contacts.peak_force[self.mine(run)].max(initial=0.0))
@@ -108,6 +115,8 @@ class PeakForce(OfContacts):
 class MeanForce(OfContacts):
     """Mean of the peak forces of one stop's contacts, N; NaN without contact. Random response: far less scatter."""
 
+    unit: ClassVar[str] = "N"
+
     def __call__(self, run: Run) -> float:
         """Value of a run."""
         return _mean(run.contacts.peak_force[self.mine(run)])
@@ -119,6 +128,8 @@ class MeanForce(OfContacts):
 
 class ContactTime(OfContacts):
     """Mean duration of one stop's contacts that ended, s; NaN without contact."""
+
+    unit: ClassVar[str] = "s"
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
@@ -134,6 +145,8 @@ class ContactTime(OfContacts):
 
 class ImpactRate(OfContacts):
     """Contacts of one stop per second."""
+
+    unit: ClassVar[str] = "1/s"
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
@@ -201,6 +214,7 @@ class MeanEnergy:
     """
 
     sampled: ClassVar[bool] = True
+    unit: ClassVar[str] = "J"
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
@@ -223,6 +237,7 @@ class Power:
 
     stop: int | str = 0
     sampled: ClassVar[bool] = True
+    unit: ClassVar[str] = "W"
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
@@ -298,6 +313,32 @@ def label(quantity: Quantity) -> str:
     plain = QUANTITIES[name]()
     changed = ", ".join(f"{key}={value}" for key, value in own if value != getattr(plain, key))
     return f"{name}({changed})" if changed else name
+
+
+def unit_of(quantity: Quantity, scene: Scene) -> str:
+    """The unit of a named quantity of a scene's runs; empty of others.
+
+    Examples
+    --------
+    >>> from fembeam import Beam, Scene, Section
+    >>> scene = Scene(Beam(0.5, Section.circle(2.1e11, 7800.0, 0.01)))
+    >>> unit_of(PeakForce(), scene), unit_of(Rms(), scene), unit_of(max, scene)
+    ('N', 'm', '')
+    """
+    unit: str = getattr(quantity, "unit", "") if type(quantity) in QUANTITIES.values() else ""
+    z, stop = getattr(quantity, "z", None), getattr(quantity, "stop", 0)
+    turning = turns_at(z) if z is not None else stop in _turning(scene)
+    return TURNED.get(unit, unit) if turning else unit
+
+
+def _turning(scene: Scene) -> list[int | str]:
+    """Names and numbers of the contacts that act on a rotation, in the order of the log."""
+    found: list[tuple[str, bool]] = []
+    for body, part in enumerate((scene, *scene.bodies)):
+        found += [(one.label_on(body), one.coordinate.rotation) for one in part.acting]
+        found += [(one.label_on(body), False) for one in part.impactors for _ in one.pushes]
+    numbers = [i for i, (_, rotation) in enumerate(found) if rotation]
+    return [*numbers, *(i - len(found) for i in numbers), *(name for name, rotation in found if rotation)]
 
 
 def signal(run: Run, stop: int | str = 0, z: Place | None = None) -> tuple[Vector, Vector]:

@@ -33,14 +33,18 @@ class Result(Printed, ABC):
     def figure(self) -> Figure:
         """A figure of it, made by `fembeam.plot`."""
 
+    def _units(self) -> dict[str, str]:
+        """Units of the table's columns, of those that have one."""
+        return {}
+
     def to_dataframe(self) -> Any:
         """The table as one of pandas; ImportError without pandas."""
         frame = dataframe(self.table())
         return frame.set_index(self.INDEX) if self.INDEX else frame
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the table as CSV, whole or not at all."""
-        write_rows(Path(path), self.table())
+        """Write the table as CSV with units, whole or not at all."""
+        write_rows(Path(path), self.table(), self._units())
 
     def plain(self) -> dict[str, Any]:
         """What was found as JSON has it, without models, runs and functions."""

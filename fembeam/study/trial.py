@@ -18,7 +18,7 @@ from fembeam.model import Model, Run
 from fembeam.plot.axis_names import axis_name, parameter_unit
 from fembeam.scene import Scene, changes_structure, numbered, path_of, with_value
 from fembeam.study.measure import Plan, runs, values_of
-from fembeam.study.quantities import Quantity, label, named
+from fembeam.study.quantities import Quantity, label, named, unit_of
 from fembeam.support import require
 from reduction import AccuracyError
 from solvers.problem.whole_runs import whole_runs
@@ -89,6 +89,7 @@ class Trial:
     method: Any
     reduction: dict[str, Any]
     model: Model | None = field(default=None, compare=False)
+    value_units: tuple[str, ...] = field(default=(), compare=False)  # of what is asked
     called: tuple[str, ...] = ()  # the parameters as results have them: by the names of parts where these were given
 
     @classmethod
@@ -145,9 +146,10 @@ class Trial:
     def prepared(self, points: Vector) -> Trial:
         """Ready for these points, after all their scenes have been made and checked."""
         scenes = self.check(points)
+        ready = replace(self, value_units=tuple(unit_of(one, scenes[0]) for _, one in self.asked.parts))
         if not isinstance(self.scene, Scene) or any(map(changes_structure, self.names)):
-            return self
-        return replace(self, model=scenes[0].reduce(**self.reduction))
+            return ready
+        return replace(ready, model=scenes[0].reduce(**self.reduction))
 
     def __call__(self, point: Sequence[float]) -> Vector | str:
         """(k, q) independent values of every quantity, or why the run failed."""

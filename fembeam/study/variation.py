@@ -41,6 +41,7 @@ class Variation(Result):
     axes : (d,) values along each parameter of a grid, the last one running fastest; empty of samples.
     failures : (number of the point, reason) of runs that failed.
     titles : (d,) names of the parameters for axes, with units. units : (d,) these alone, SI, empty where not known.
+    value_units : (q,) of the quantities, empty of functions.
     """
 
     names: tuple[str, ...]
@@ -52,6 +53,7 @@ class Variation(Result):
     failures: tuple[tuple[int, str], ...] = ()
     titles: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
+    value_units: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.points)
@@ -80,14 +82,18 @@ class Variation(Result):
     def _parts(self) -> list[Part]:
         """Every point where they are few, the extremes of each quantity, and of samples their scatter."""
         rows = [(*point, *cells) for point, cells in zip(self.points.tolist(), self._cells(), strict=True)]
-        listed: list[Part] = [((*self.heads, *self.quantities), rows)] if len(rows) <= LONGEST else []
+        listed: list[Part] = [((*self.heads, *self.value_heads), rows)] if len(rows) <= LONGEST else []
         return [repr(self), *listed, (("", "", "value", *self.heads), self._extremes()), *self._scatter()]
 
     @property
     def heads(self) -> list[str]:
         """Paths of the parameters with their units, as tables have them."""
-        units = self.units or [""] * len(self.names)
-        return [f"{name} / {unit}" if unit else name for name, unit in zip(self.names, units, strict=True)]
+        return _with_units(self.names, self.units)
+
+    @property
+    def value_heads(self) -> list[str]:
+        """Names of the quantities with their units, as tables and figures have them."""
+        return _with_units(self.quantities, self.value_units)
 
     def _cells(self) -> list[list[Any]]:
         """Values with their standard errors, as printed."""
@@ -97,7 +103,7 @@ class Variation(Result):
     def _extremes(self) -> list[tuple[Any, ...]]:
         """Least and largest value of each quantity, and where."""
         found = []
-        for name, column in zip(self.quantities, self.values.T, strict=True):
+        for name, column in zip(self.value_heads, self.values.T, strict=True):
             if np.isfinite(column).any():
                 for word, i in (("least", np.nanargmin(column)), ("largest", np.nanargmax(column))):
                     found.append((name, word, float(column[i]), *self.points[i].tolist()))
@@ -109,9 +115,11 @@ class Variation(Result):
             return []
         head = "over the samples", "mean ± standard error", "standard deviation", "5 %", "median", "95 %"
         rows = []
-        for name, column in zip(self.quantities, self.values.T, strict=True):
+        for name, column, mean in zip(
+            self.value_heads, self.values.T, map(self.estimate, self.quantities), strict=True
+        ):
             deviation = float(column.std(ddof=1)) if len(column) > 1 else None
-            rows.append((name, repr(self.estimate(name)), deviation, *np.quantile(column, (0.05, 0.5, 0.95)).tolist()))
+            rows.append((name, repr(mean), deviation, *np.quantile(column, (0.05, 0.5, 0.95)).tolist()))
         return [(head, rows)]
 
     def table(self) -> list[dict[str, Any]]:
@@ -122,7 +130,16 @@ class Variation(Result):
         columns = np.hstack((self.points, self.values, self.standard_error[:, shown]))
         return [dict(zip(names, row, strict=True)) for row in columns.tolist()]
 
+    def _units(self) -> dict[str, str]:
+        units = dict(zip((*self.names, *self.quantities), (*self.units, *self.value_units), strict=False))
+        return units | {f"standard error of {name}": units.get(name, "") for name in self.quantities}
+
     figure = plot.variation
+
+
+def _with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
+    """Names with units where there are any, as heads of tables."""
+    return [f"{name} / {unit}" if unit else name for name, unit in zip(names, units or [""] * len(names), strict=True)]
 
 
 def vary(
@@ -229,7 +246,8 @@ def collected(
         if (one := kept.values.get(_key(point))) is not None:
             estimate = Estimate.of_mean(one["values"])
             values[i], errors[i] = estimate.value, estimate.standard_error
-    return Variation(trial.called, points, trial.asked.names, values, errors, axes, failures, trial.titles, trial.units)
+    told = trial.titles, trial.units, trial.value_units
+    return Variation(trial.called, points, trial.asked.names, values, errors, axes, failures, *told)
 
 
 def _key(point: Vector) -> str:

@@ -57,11 +57,16 @@ def written_beside(target: Path) -> Iterator[str]:
             os.replace(os.path.join(folder, name), target.with_name(name))
 
 
-def write_rows(target: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Rows with the same keys as a CSV file that appears whole or not at all."""
+def write_rows(target: Path, rows: Sequence[Mapping[str, Any]], units: Mapping[str, str]) -> None:
+    """Rows with the same keys as a CSV file that appears whole or not at all, units in the heads of its columns."""
     text = io.StringIO()
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
+    writer.writerow({name: _head(name, units.get(name, "")) for name in rows[0]})
     writer.writerows(rows)
     with written_whole(target) as file:
         file.write(text.getvalue().encode())
+
+
+def _head(name: str, unit: str) -> str:
+    """A column's name with its unit, if it has one: "omega [rad/s]"."""
+    return f"{name} [{unit.replace(' s⁻¹', '/s')}]" if unit else name
