@@ -148,7 +148,7 @@ test_bad_measurements_are_refused = refused_by(
     lambda change: identify(**{**exact(), **change}),
     ({"delta_dot": None}, "either delta_dot or time"),
     ({"force": None}, "needs the force"),
-    ({"force": [np.ones(60)] * 2}, "force has 2 records, delta has 3"),
+    ({"force": [np.ones(60)] * 2}, "force must have as many records as delta, 3, got 2"),
     ({"force": [np.ones(59)] * 3}, "record 1 has arrays of different lengths"),
     ({"force": [np.full(60, np.nan)] * 3}, "force of record 1 must be a finite vector, got nan"),
     ({"force": [["a"] * 60] * 3}, "force of record 1 must be a number, got"),

@@ -259,7 +259,7 @@ test_bad_records_are_refused = refused(
     (lambda: identify_loop(PATH, FORCE, BoucWen, n=3), "must be 1 or 2, got 3"),
     (lambda: identify_loop(PATH, FORCE, confidence=0.0), r"confidence must lie in \(0, 1\)"),
     (lambda: identify_loop(PATH, FORCE[:-1]), "record 1 has 600 samples of delta and 599 of force"),
-    (lambda: identify_loop([PATH], [FORCE, FORCE]), "force has 2 records, delta has 1"),
+    (lambda: identify_loop([PATH], [FORCE, FORCE]), "force must have as many records as delta, 1, got 2"),
     (lambda: identify_loop(np.full(600, np.nan), FORCE), "delta of record 1 must be a finite vector, got nan"),
     (lambda: identify_loop(["a"] * 600, FORCE), "delta of record 1 must be a number, got"),
     (lambda: identify_loop(0.0 * PATH, FORCE), "delta of record 1 does not move"),

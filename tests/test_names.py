@@ -222,7 +222,7 @@ def test_names_in_scene_files(tmp_path, file_of):
     again = fb.load(replace(file.model().simulate(0.05, 1e-3), source=file.source).save(tmp_path / "run"))
     assert again.scene_file.scene == file.scene
     for change, message in (
-        ("stops[valv].gap=1", "stops has 1 entries, counted from 0, none of the name 'valv'"),
+        ("stops[valv].gap=1", "stops has 1 item, counted from 0, none of the name 'valv'"),
         ("stops[0].name=3", r"\[\[stops\]\] number 1: name must be text, got 3"),
         ("stops[0].name=wall", r"names must be unique, got 'wall' in supports\[0\] and stops\[0\] of Scene"),
         ("stops[0].name=''", r"name must be text of one line, not empty"),

@@ -298,7 +298,7 @@ def test_mistakes_are_found_by_their_line(file_of, old, new, line):
     [
         ("simulate", "write table.key=value"),
         ("=3", "write table.key=value"),
-        ("stops[1].gap=0", r"stops has 1 entries"),
+        ("stops[1].gap=0", r"stops has 1 item, "),
         ("gravity.x.y=0", r"unknown|gravity"),
         ("beam.length.x=0", r"beam.length is no table"),
         ("simulate.durtion=1", "did you mean 'duration'"),

@@ -27,7 +27,7 @@ class Measured:
     def __init__(self, delta: Any, force: Any, offset: bool) -> None:
         self.delta, self.force = records_of("delta", delta), records_of("force", force)
         if len(self.delta) != len(self.force):
-            raise ValueError(f"force has {len(self.force)} records, delta has {len(self.delta)}")
+            raise ValueError(f"force must have as many records as delta, {len(self.delta)}, got {len(self.force)}")
         for number, (d, f) in enumerate(zip(self.delta, self.force, strict=True), 1):
             if len(d) != len(f) or len(d) < 2:
                 raise ValueError(

@@ -79,7 +79,7 @@ def collisions_of(delta: Any, delta_dot: Any, force: Any, time: Any) -> list[Sam
     count = len(records["delta"])
     for name, values in records.items():
         if len(values) != count:
-            raise ValueError(f"{name} has {len(values)} records, delta has {count}")
+            raise ValueError(f"{name} must have as many records as delta, {count}, got {len(values)}")
     found = [part for i in range(count) for part in _split({n: r[i] for n, r in records.items()}, i)]
     for number, one in enumerate(found, 1):
         touching = int(np.count_nonzero(one.delta > 0.0))

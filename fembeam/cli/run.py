@@ -232,7 +232,7 @@ def _simulation(job: Job) -> Outcome:
         say(f"{done.status}; wrote what was computed to {job.folder}")
     elif not job.quiet:
         spent = f"{done.cost.seconds:.3g} s of {time.perf_counter() - started:.3g} s"
-        say(f"{len(done.contacts)} contacts in {done.t[-1]:g} s, integrated in {spent}")
+        say(f"{counted(len(done.contacts), 'contact')} in {done.t[-1]:g} s, integrated in {spent}")
         _wrote(job, outcome.files)
     return outcome
 

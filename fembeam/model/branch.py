@@ -174,7 +174,7 @@ class Branch(Printed):
         found = [(one, one.mark) for one in self.found.special] + [(one.found, "end") for one, _ in self.ends]
         rows = [(mark, f"{one.parameter:.9g}", "yes" if one.stable else "no") for one, mark in found]
         stable = int(np.sum(self.stable))
-        count = f"{len(self.found.special)} special among {len(self.parameter)} orbits"
+        count = f"{len(self.found.special)} special among {counted(len(self.parameter), 'orbit')}"
         head = f"{count} of period {self.family.period}, {stable} stable"
         return [head, (("", self.family.name, "stable"), rows), self.status]
 

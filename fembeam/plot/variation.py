@@ -8,6 +8,7 @@ import numpy as np
 
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.style import BLUE, RED, styled, verbatim
+from solvers.problem import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -48,7 +49,7 @@ def variation(found: Variation, axes: Axes | Sequence[Axes] | None = None, best:
             _line(axis, found, i, j)
             _star(axis, found.points, best, j, found.values[:, i])
             axis.set_ylabel(verbatim(name))
-    heading(panels, f"{', '.join(map(verbatim, found.quantities))} at {len(found)} points", axes is None)
+    heading(panels, f"{', '.join(map(verbatim, found.quantities))} at {counted(len(found), 'point')}", axes is None)
     return figure
 
 

@@ -12,6 +12,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from solvers.problem import counted
+
 TABLE = re.compile(r"\[\[?(\w+)(?:\.(\w+))?\]\]?(?: number (\d+))?(.*)")  # what messages call tables
 HEADER = re.compile(r"^\s*\[\[?\s*([\w.\"' -]+?)\s*\]")
 
@@ -124,8 +126,8 @@ def _override(tables: dict[str, Any], text: str) -> None:
         if isinstance(item, list):
             called = [number for number, one in enumerate(item) if isinstance(one, dict) and one.get("name") == name]
             if not called and not (name.isdecimal() and int(name) < len(item)):
-                raise ValueError(f"--set {text}: {'.'.join(path[:i])} has {len(item)} entries, counted from 0, "
-                                 f"none of the name {name!r}")  # fmt: skip
+                has = f"{'.'.join(path[:i])} has {counted(len(item), 'item')}"
+                raise ValueError(f"--set {text}: {has}, counted from 0, none of the name {name!r}")
             name = called[0] if called else int(name)  # type: ignore[assignment]
         elif not isinstance(item, dict):
             raise ValueError(f"--set {text}: {'.'.join(path[:i])} is no table")

@@ -23,6 +23,7 @@ from fembeam.study.execution.executors import spread
 from fembeam.study.measure import samples_per_period
 from fembeam.study.result import Result
 from fembeam.support import Part, is_whole, require
+from solvers.problem import counted
 
 Vector = NDArray[np.float64]
 
@@ -46,7 +47,8 @@ class Bifurcation(Result):
     title: str
 
     def __repr__(self) -> str:
-        return f"<settled motion at {len(self.parameter)} values of {self.name}, {self.peaks.shape[1]} periods each>"
+        at, each = counted(len(self.parameter), "value"), counted(self.peaks.shape[1], "period")
+        return f"<settled motion at {at} of {self.name}, {each} each>"
 
     def _parts(self) -> list[Part]:
         """Smallest and largest peak at each value."""

@@ -18,6 +18,7 @@ from fembeam.scene import Scene
 from fembeam.structures import COMPONENTS, Frame
 from fembeam.study.result import Result
 from fembeam.support import Part, is_whole, require, vector
+from solvers.problem import counted
 
 Vector = NDArray[np.float64]
 WHERE = "campbell"
@@ -50,7 +51,7 @@ class Campbell(Result):
     critical: Vector
 
     def __repr__(self) -> str:
-        return f"<Campbell diagram of {self.omega.shape[1]} modes over {len(self.spins)} spins>"
+        return f"<Campbell diagram of {counted(self.omega.shape[1], 'mode')} over {len(self.spins)} spins>"
 
     @property
     def signed(self) -> Vector:

@@ -31,6 +31,7 @@ from fembeam.study.measure import Case, Measured, Plan, Start, identity_of, meas
 from fembeam.study.quantities import Quantity, label, named
 from fembeam.study.result import Result
 from fembeam.support import Part, is_whole, require
+from solvers.problem import counted
 
 LOOSER = 10.0  # times the tolerance, in the second run of the reference
 LOOSEST = 1e-2  # the largest tolerance that methods take
@@ -144,7 +145,7 @@ class ModeCount(Result):
         raise ValueError(f"no row with {modes} modes, residual={residual}, in this study; rows are {names}")
 
     def __repr__(self) -> str:
-        return f"<convergence of {self.quantity} with modes, {len(self.rows)} models>"
+        return f"<convergence of {self.quantity} with modes, {counted(len(self.rows), 'model')}>"
 
     def _parts(self) -> list[Part]:
         rates = f"observed rate: {self.rate:.2f} modes alone, {self.rate_residual:.2f} with static shapes"

@@ -17,6 +17,7 @@ from fembeam import plot
 from fembeam.model import Model, Run, places
 from fembeam.study.result import Result
 from fembeam.support import Part, counting, require, require_positive
+from solvers.problem import counted
 from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
@@ -110,7 +111,7 @@ class SpeedAccuracy(Result):
         reached = any(point.error < better_than for point in self.points)
         if method not in methods or len(methods) < 2 or not reached:
             return ""
-        others = sorted({f"{p.method} with {p.modes} modes" for p in self.beaten(method, better_than)})
+        others = sorted({f"{p.method} with {counted(p.modes, 'mode')}" for p in self.beaten(method, better_than)})
         claim = f"below {better_than:g} {method} is the front"
         return claim + (", but for " + ", ".join(others) if others else " everywhere")
 
@@ -127,12 +128,12 @@ class SpeedAccuracy(Result):
         ]  # fmt: skip
 
     def __repr__(self) -> str:
-        return f"<speed against accuracy of {len(self.points)} points, {self.quantity}>"
+        return f"<speed against accuracy of {counted(len(self.points), 'point')}, {self.quantity}>"
 
     def _parts(self) -> list[Part]:
         head = "method", "setting", "modes", "µs", "error", "total", "law calls", ""
-        known = [f"{n} modes: reduction error {self.reduction[n]:.1e}, reference known to {self.floor[n]:.0e}"
-                 for n in self.reduction]  # fmt: skip
+        known = [f"{counted(n, 'mode')}: reduction error {error:.1e}, reference known to {self.floor[n]:.0e}"
+                 for n, error in self.reduction.items()]  # fmt: skip
         return [(head, [_cells(row) for row in self.table()]), *known, *filter(None, [self.claim()])]
 
     figure = plot.speed_accuracy
