@@ -115,3 +115,10 @@ def test_an_mp4_without_ffmpeg_is_refused(run, tmp_path, monkeypatch):
     monkeypatch.setattr(FFMpegWriter, "isAvailable", classmethod(lambda cls: False))
     with pytest.raises(ValueError, match=r"an .mp4 needs the program ffmpeg"):
         fb.plot.animate(run, tmp_path / "run.mp4")
+
+
+def test_without_contacts_there_is_no_panel_of_forces():
+    scene = fb.Scene(fb.Beam(0.4, STEEL), [fb.Clamped(0.0)], base=fb.Harmonic(1e-3, 100.0))
+    upper, lower = animation.frame(scene.reduce(1).simulate(0.02, 1e-3), 0.01).axes
+    assert lower.get_ylabel() == ""
+    assert lower.get_position().height < 0.1 * upper.get_position().height

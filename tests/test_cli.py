@@ -430,6 +430,9 @@ def test_the_new_scene_is_checked_and_runs(tmp_path, capsys):
     path, out = tmp_path / "new.toml", tmp_path / "out"
     printed(capsys, "new", path)
     assert "exists: give another name, or delete it" in refused(capsys, "new", path)
+    assert f"there is no folder {tmp_path / 'none'} for x.toml; make it first" in refused(
+        capsys, "new", tmp_path / "none" / "x.toml"
+    )
     found = json.loads(printed(capsys, "check", path, "--json"))
     omega = [row["omega"] for row in found["modes"]][:3]
     assert omega == pytest.approx([106.945812, 813.508628, 2384.149653], rel=1e-6)

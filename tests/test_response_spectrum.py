@@ -163,3 +163,11 @@ test_bad_input = refused_by(
     ({"zeta": 1.0}, "zeta must be"),
     ({"zeta": [0.1, np.nan]}, "zeta must be"),
 )
+
+
+@pytest.mark.filterwarnings("error")
+def test_spectra_of_no_motion_are_drawn_at_zero():
+    t = np.linspace(0.0, 1.0, 101)
+    upper, lower = fb.plot.response_spectrum(fb.response_spectrum(t, 0.0 * t, periods=[0.1, 0.5])).axes
+    assert [axis.get_yscale() for axis in (upper, lower)] == ["linear", "linear"]
+    assert not lower.lines[0].get_ydata().any()

@@ -251,7 +251,7 @@ def test_quantities_of_a_run_are_those_of_its_file(tmp_path):
             quantity = Psd((10.0, 1000.0), 4) if name == "psd" else kind()
             np.testing.assert_allclose(quantity(back), quantity(run), rtol=1e-14, err_msg=name)
     bare = scene.reduce(modes=2).simulate(0.1)
-    with pytest.raises(ValueError, match="the run must have samples, got 1 in Psd; give dt"):
+    with pytest.raises(ValueError, match="the run must have samples, got 1 in Psd; give a dt below the duration"):
         Psd()(bare)
 
 

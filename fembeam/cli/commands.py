@@ -164,6 +164,8 @@ def _new(arguments: argparse.Namespace) -> int:
 
     if arguments.path.exists():
         raise ValueError(f"{arguments.path} exists: give another name, or delete it")
+    if not arguments.path.parent.is_dir():
+        raise ValueError(f"there is no folder {arguments.path.parent} for {arguments.path.name}; make it first")
     with arguments.path.open("x", encoding="utf-8") as file:  # x: what exists by now is kept
         file.write(template(arguments.path.name))
     say(f"wrote {arguments.path}; next: fembeam check {arguments.path}")

@@ -87,9 +87,10 @@ class Check(Printed):
         seen = f"{one.contacts} contacts in a trial" if one.contacts else "no contact in a trial"
         row = self.model.contact_rows[one.stop]
         speed, force = (unit_of(of, [row.rotation]) for of in ("speed", "force"))
+        lasts = f"lasts {one.time:.3g} s ({one.periods:.2g} periods of the highest mode kept)"
+        lasts = lasts if math.isfinite(one.time) else "outlasts the trial"
         return (
-            f"{row.name}: {seen}; at {one.speed:.3g} {speed} a contact lasts {one.time:.3g} s "
-            f"({one.periods:.2g} periods of the highest mode kept), peak force {one.peak_force:.3g} {force}"
+            f"{row.name}: {seen}; at {one.speed:.3g} {speed} a contact {lasts}, peak force {one.peak_force:.3g} {force}"
         )
 
     @property

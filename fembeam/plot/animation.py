@@ -208,7 +208,8 @@ class _Stage:
         from fembeam.plot.window import Figure
 
         self.figure = Figure(figsize=(7.0, 4.4), layout="constrained")
-        self.beam_axis, self.force_axis = self.figure.subplots(2, 1, height_ratios=[2.2, 1])
+        heights = [2.2, 1.0 if self.contact_rows else 0.1]  # without contacts the time alone
+        self.beam_axis, self.force_axis = self.figure.subplots(2, 1, height_ratios=heights)
         self.span = self._limits(self.beam_axis)
         self.curves = [self.beam_axis.plot([], [], color=BLUE, linewidth=2.2)[0] for _ in self.lines]
         self.balls = [
@@ -228,6 +229,8 @@ class _Stage:
         self.cursor = self.force_axis.axvline(t[0], color=ORANGE)
         self.force_axis.set(xlabel=f"time / {self.second}", ylabel=f"peak contact\nforce / {unit}")
         self.force_axis.set_xlim(*self.tick * self.run.t[self.samples[[0, -1]]])
+        if not self.forces:
+            self.force_axis.set(yticks=[], ylabel="")
         if len(self.forces) > 1:
             handles, labels = self.force_axis.get_legend_handles_labels()
             longest = max(len(line) for label in labels for line in label.splitlines())

@@ -48,19 +48,23 @@ def response_spectrum(
     >>> [axis.get_ylabel() for axis in response_spectrum(found).axes]
     ['largest acceleration / m s⁻²', 'largest displacement / mm']
     """
+    from matplotlib.axes import Axes
+
     figure, (upper, lower) = sheet(2, 1, (7.0, 5.2), axes, sharex=True)
     several = spectrum if isinstance(spectrum, Mapping) else {"": spectrum}
     require(bool(several), "nothing to draw", spectrum, "plot.response_spectrum", "give one spectrum or more")
     scale, unit = length_for([one.displacement for one in several.values()])
+    moves = any(one.acceleration.any() or one.displacement.any() for one in several.values())
+    draw = Axes.loglog if moves else Axes.semilogx
     for name, one in several.items():
         order = np.argsort(one.period)
         period = one.period[order]
         for i, zeta in enumerate(one.zeta):
             label = verbatim(f"{name}, ζ = {zeta:g}".removeprefix(", "))
-            (line,) = upper.loglog(period, one.acceleration[i, order], label=label)
+            (line,) = draw(upper, period, one.acceleration[i, order], label=label)
             colour = line.get_color()
-            upper.loglog(period, one.pseudo_acceleration[i, order], "k--", linewidth=0.7)  # seen where they coincide
-            lower.loglog(period, scale * one.displacement[i, order], color=colour)
+            draw(upper, period, one.pseudo_acceleration[i, order], "k--", linewidth=0.7)  # seen where they coincide
+            draw(lower, period, scale * one.displacement[i, order], color=colour)
     upper.lines[-1].set_label("pseudo-acceleration ω² max |x|")
     upper.set(ylabel="largest acceleration / m s⁻²", title="Response spectrum")
     lower.set(xlabel="period / s", ylabel=f"largest displacement / {unit}")

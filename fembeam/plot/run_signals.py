@@ -82,7 +82,7 @@ def coordinates(run: Run) -> list[str]:
 def sampling_of(run: Run) -> float:
     """Output sampling, s."""
     require(len(run.t) > 1, "figures and spectra of a run need output samples", len(run.t), "plot",
-            "give simulate a dt")  # fmt: skip
+            "give simulate a dt below the duration")  # fmt: skip
     return float(run.t[1] - run.t[0])
 
 

@@ -33,7 +33,8 @@ BLOCK = 2**17  # cubics at once, in some 100 MB
 def mean_force(run: Histories, stop: int) -> Vector:
     """Mean contact force (k,) of a stop over the cells of the samples, N; `Run.force` explains it."""
     t = run.t
-    require(len(t) > 1, "the mean force needs samples", len(t), "Run.force", "give simulate a dt")
+    require(len(t) > 1, "the mean force needs samples", len(t), "Run.force",
+            "give simulate a dt below the duration")  # fmt: skip
     if run.readout.means is not None:
         return run.readout.means[stop]
     stop %= len(run.stops)

@@ -131,7 +131,7 @@ def floor_spectrum(
 ) -> ResponseSpectrum:
     """The spectrum of the absolute acceleration at z; `Run.floor_spectrum` explains it."""
     require(len(run.t) > 1, "a floor spectrum needs output samples", len(run.t), "Run.floor_spectrum",
-            "give simulate a dt")  # fmt: skip
+            "give simulate a dt below the duration")  # fmt: skip
     lengths = run.contacts.t_out - run.contacts.t_in
     shortest, step = float(np.nanmin(lengths, initial=np.inf)), float(run.t[1] - run.t[0])
     if shortest < FEW * step:

@@ -175,7 +175,7 @@ class Psd:
 
     def __call__(self, run: Run) -> Vector:
         """Value of a run."""
-        require(len(run.t) > 1, "the run must have samples", len(run.t), "Psd", "give dt")
+        require(len(run.t) > 1, "the run must have samples", len(run.t), "Psd", "give a dt below the duration")
         dt = float(run.t[1] - run.t[0])
         fits = self.band[1] * dt < np.pi
         require(fits, f"dt must be below {np.pi / self.band[1]:.3g} s for a band to {self.band[1]:g} rad/s", dt, "Psd",
@@ -241,7 +241,8 @@ class Power:
 
     def __call__(self, run: Run) -> float:
         """Value of a run."""
-        require(len(run.t) > 1, "the run must have samples", len(run.t), type(self).__name__, "give dt")
+        require(len(run.t) > 1, "the run must have samples", len(run.t), type(self).__name__,
+                "give a dt below the duration")  # fmt: skip
         work = self.work(run, run.number(self.stop))
         return float((work[-1] - work[0]) / (run.t[-1] - run.t[0]))
 
@@ -343,7 +344,7 @@ def _turning(scene: Scene) -> list[int | str]:
 
 def signal(run: Run, stop: int | str = 0, z: Place | None = None) -> tuple[Vector, Vector]:
     """δ and its rate at a stop, or u and u̇ at z, or at the tip of a scene without stops."""
-    require(len(run.t) > 1, "the run must have samples", len(run.t), "quantity", "give dt")
+    require(len(run.t) > 1, "the run must have samples", len(run.t), "quantity", "give a dt below the duration")
     if z is None and len(run.stops):
         return run.indentation(stop), run.indentation_rate(stop)
     place = place_of(run, z)
@@ -358,7 +359,7 @@ def place_of(run: Run, z: Place | None) -> Any:
 
 def mean_in_time(run: Run, values: Vector) -> float:
     """Mean over the time of the samples by trapezia: of a period, whose last sample is its first, each counts once."""
-    require(len(run.t) > 1, "the run must have samples", len(run.t), "quantity", "give dt")
+    require(len(run.t) > 1, "the run must have samples", len(run.t), "quantity", "give a dt below the duration")
     return float(np.trapezoid(values, run.t) / (run.t[-1] - run.t[0]))
 
 
