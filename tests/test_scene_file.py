@@ -421,3 +421,16 @@ def test_orbits_under_loads_without_a_period_are_refused_when_read(file_of, stud
     """They were refused after the studies before them had run."""
     with pytest.raises(SceneFileError, match="an orbit needs periodic loads"):
         file_of(EXAMPLE + study)
+
+
+@pytest.mark.parametrize(
+    ("study", "message"),
+    [
+        ("[ensemble]\nrealisations = 8\nduration = 1.0\ndt = 1e-3", "an ensemble needs a BandNoise"),
+        ("[campbell]\nspins = [0.0, 100.0]", "a Campbell diagram needs one shaft"),
+    ],
+)
+def test_studies_of_other_scenes_are_refused_when_read(file_of, study, message):
+    """They were refused after the studies before them had run, and passed the check."""
+    with pytest.raises(SceneFileError, match=message):
+        file_of(DRIVEN + study)

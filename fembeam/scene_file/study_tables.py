@@ -56,7 +56,8 @@ from fembeam.study import (
 )
 from fembeam.study.backbone import check_backbone
 from fembeam.study.basins import checked_points
-from fembeam.study.campbell import check_modes
+from fembeam.study.campbell import check_modes, check_shaft
+from fembeam.study.ensemble import check_noise
 from fembeam.study.measure import Plan
 from fembeam.study.minimum import box_of, check_search, limits_of
 from fembeam.study.mode_count import ModeCount, checked_counts, mode_count
@@ -227,6 +228,10 @@ class EnsembleTable:
         right = self.segment is None or self.segment >= FEWEST_IN_SEGMENT
         require(right, f"segment must be at least {FEWEST_IN_SEGMENT} samples", self.segment, "[ensemble]",
                 "or leave it out")  # fmt: skip
+
+    def check(self, scene: Scene) -> None:
+        """Raise ValueError for a scene without noise."""
+        check_noise(scene)
 
     def check_run(self, file: SceneFile, model: Model) -> None:
         """Raise ValueError where every realisation would be refused."""
@@ -560,6 +565,10 @@ class CampbellTable:
         require(low < high, "spins must be two values, ascending", self.spins, "[campbell]", "give [lowest, highest]")
         require(self.points > 1, "points must be at least 2", self.points, "[campbell]", "e.g. 41")
         check_modes(self.modes)
+
+    def check(self, scene: Scene) -> None:
+        """Raise ValueError for a scene that is no shaft."""
+        check_shaft(scene)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Campbell:
         """The diagram."""

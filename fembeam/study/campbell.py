@@ -131,6 +131,16 @@ def check_modes(modes: Any) -> None:
     require(modes <= MOST, f"modes must be at most {MOST}", modes, WHERE, "ask for fewer, e.g. 8")
 
 
+def check_shaft(scene: Scene) -> Frame:
+    """The shaft of a scene; ValueError where there is none."""
+    body = scene.beam
+    shaft = isinstance(body, Frame) and body.axis is not None and not body.in_plane and not scene.bodies
+    require(shaft, "a Campbell diagram needs one shaft: a straight Frame in space", type(body).__name__, WHERE,
+            "use Frame.straight")  # fmt: skip
+    assert isinstance(body, Frame)
+    return body
+
+
 def _bends(found: reduction.Whirl, across: tuple[Any, Any]) -> NDArray[np.bool_]:
     """(c,) whether a motion moves the shaft across its axis; twist and stretch meet the spin without being whirls."""
     moved = sum(np.sum(np.abs(rows @ found.shapes) ** 2, axis=0) for rows in across)
@@ -139,15 +149,7 @@ def _bends(found: reduction.Whirl, across: tuple[Any, Any]) -> NDArray[np.bool_]
 
 def _at_unit_spin(scene: Scene, modes: int, elements: int | None) -> tuple[reduction.Basis, Any, tuple[Any, Any]]:
     """Modes at standstill without rigid motions that do not tilt the shaft, G per rad/s, rows across the shaft."""
-    body = scene.beam
-    shaft = isinstance(body, Frame) and body.axis is not None and not body.in_plane and not scene.bodies
-    require(
-        shaft,
-        "a Campbell diagram needs one shaft: a straight Frame in space",
-        type(body).__name__,
-        WHERE,
-        "use Frame.straight",
-    )
+    body = check_shaft(scene)
     spun = replace(scene, beam=replace(body, spin=1.0), stops=(), elements=(), forces=(), base=None, gravity=0.0)
     wanted = 2 * modes + SPARE
     matrices: Any = spun.matrices(elements, wanted)

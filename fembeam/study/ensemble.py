@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from fembeam import plot
 from fembeam.model import Model
+from fembeam.scene import Scene, signals_of
 from fembeam.statistics import Estimate, Spectrum
 from fembeam.study.execution.checkpoint import Checkpoint, Values, identity
 from fembeam.study.execution.executors import spread
@@ -277,13 +278,18 @@ def _rounds(count: int, until: float | None) -> list[int]:
     return [*looks, count]
 
 
-def _seeds(model: Model, seeds: int | Sequence[Seed]) -> list[Seed]:
-    """The seeds of the realisations, checked."""
-    own = noises(model)
-    if not own:
+def check_noise(scene: Scene) -> None:
+    """Raise ValueError for a scene without noise."""
+    if not any(hasattr(signal, "seed") for signal in signals_of(scene).values()):
         raise ValueError(
             "an ensemble needs a BandNoise as base motion, force or foot; without it all realisations are equal"
         )
+
+
+def _seeds(model: Model, seeds: int | Sequence[Seed]) -> list[Seed]:
+    """The seeds of the realisations, checked."""
+    check_noise(model.scene)
+    own = noises(model)
     if is_whole(seeds):
         if seeds < 1:
             raise ValueError(f"seeds must be a number of at least 1 or a list of seeds, got {seeds}")
