@@ -504,6 +504,12 @@ def test_a_record_is_not_all_left_out():
         stationary(cantilever(1, base=record), 6.0, 2e-3, discard=5.9)
 
 
+def test_more_samples_than_can_be_computed_are_refused():
+    """It ran without end."""
+    with pytest.raises(ValueError, match=r"dt must leave fewer than 1e\+13 samples of the duration of 1e\+300 s"):
+        stationary(cantilever(1, base=fb.Harmonic(2e-4, 160.0)), 1e300, 1e-3)
+
+
 def test_few_samples_under_tones():
     """What is left after the last free flight may be a few samples, and a lead-in longer than the rest of the run."""
     stop = fb.Stop(0.5, KelvinVoigt(1e5, 50.0))

@@ -22,6 +22,7 @@ from fembeam.support import is_finite, is_whole, number
 
 AUTOMATIC_LINES = 4096  # kurtosis 3 - 1.5/4096: Gaussian to far below any sampling error
 FEWEST_LINES = 8  # below this a sum of cosines is visibly not Gaussian (kurtosis under 2.8)
+MOST_LINES = 10**8  # numbers of 1.6 GB
 
 
 @dataclass(frozen=True, repr=False)
@@ -92,6 +93,9 @@ class BandNoise(NoiseLines):
                 f"BandNoise needs at least {FEWEST_LINES} lines in the band, got {max(0, last - first + 1)} "
                 f"in {band} rad/s at a spacing of {self._spacing:.6g} rad/s; make the period longer"
             )
+        if last - first > MOST_LINES:
+            raise ValueError(f"BandNoise takes at most {MOST_LINES:.0e} lines in the band, got {last - first:.3g} "
+                             f"in {band} rad/s; make the period shorter")  # fmt: skip
         if self.psd is None:
             std = number("BandNoise std", self.std, above=0.0)
         elif self.std is None or self.std == computed_std:

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 Watch = Callable[[Run], Any]
+MOST_SAMPLES = 1e13  # months of computing
 FEWEST_BATCHES = 16  # before `until` is asked
 FEWEST_IN_SEGMENT = 8  # samples, as of `statistics.psd`
 TRIES = 4  # segments dropped while the transient lasts
@@ -412,6 +413,9 @@ def check(model: Model, duration: float, dt: float, until: float | None, discard
         raise ValueError(
             f"dt must leave at least {FEWEST_SAMPLES} samples of the duration of {duration:g} s, got {dt:g} s"
         )
+    if not duration / dt < MOST_SAMPLES:
+        raise ValueError(f"dt must leave fewer than {MOST_SAMPLES:.0e} samples of the duration of {duration:g} s, "
+                         f"got {dt:g} s")  # fmt: skip
     if until is not None and not 0.0 < number("until", until, above=0.0) < 1.0:
         raise ValueError(f"until must be a relative standard error below 1, got {until!r}")
     if discard is not None:
