@@ -90,8 +90,9 @@ def integrate_many(
     progress : called with the number of starts finished now and then.
     gaps : (k, m) of every stop in each run, m (rad about an axis), in place of those of the system.
     factors : (k, p) what multiplies the signal of each load in each run; a complex one, r e^{iφ}, turns tones by φ
-        besides. Loads that are sampled, or at resonance with an undamped mode, take 1 only. The numbers are those of
-        `integrate` with such signals to rounding.
+        besides, counted at positive frequency: on a tone of negative ω it acts as its conjugate. Loads that are
+        sampled, or at resonance with an undamped mode, take 1 only. The numbers are those of `integrate` with such
+        signals to rounding.
     check : raise when a run fails; False returns all of them, with their status.
 
     Returns
