@@ -16,6 +16,7 @@ from solvers.problem.matrices import number
 _MOST_SAMPLES = 500_000_000
 _FEW_SAMPLES = 10_000  # up to which an even sampling is kept
 _SHORTEST = 1e-50  # s, of a run: derivatives of sampled loads are fifth powers of parts of it
+_LONGEST = 1e50  # s: its square, and times a frequency, must be numbers
 
 
 def check_tangent(tangent: Any, method: Any, system: System) -> None:
@@ -134,6 +135,8 @@ def _output_times(duration: Any, dt: Any) -> Array | None:
             f"duration must be at least {_SHORTEST:g} s, got {duration!r}: fifth powers of shorter times are no "
             "numbers; give it in other units of time"
         )
+    if duration > _LONGEST:
+        raise ValueError(f"duration must be at most {_LONGEST:g} s, got {duration!r}; give it in other units of time")
     if dt is None:
         return None
     if np.ndim(dt) > 0:
