@@ -1,6 +1,7 @@
 """Outputs by place and quantity: from Python, of a scene file's run and of `export`; schema, check, messages."""
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from test_cli import check_against
 import fembeam as fb
 from fembeam.cli import main
 from fembeam.model.run_csv import UNITS, extremes_table, histories
+from fembeam.results.files import prepared
 from fembeam.scene_file import SceneFileError, json_schema
 
 SCENE = """
@@ -134,3 +136,14 @@ def test_every_quantity_and_extremes_from_python(folder):
     for options, says in (({"places": ["B"]}, "must be numbers"), ({"quantities": ["section forces"]}, "of a frame")):
         with pytest.raises(ValueError, match=says):
             run.to_csv(folder, **options)
+
+
+def test_drafts_of_a_run_that_was_killed_are_removed(tmp_path):
+    """Those of the last hour may be another run's."""
+    old, new, other = (tmp_path / name for name in (".a.png.abcd1234.part", ".b.png.abcd1234.part", ".c.png.original"))
+    for one in (old, new, other):
+        one.touch()
+    for one in (old, other):
+        os.utime(one, (0.0, 0.0))
+    assert prepared(tmp_path) == tmp_path
+    assert sorted(tmp_path.iterdir()) == [new, other]

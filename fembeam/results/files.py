@@ -6,6 +6,7 @@ import json
 import math
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
@@ -22,20 +23,24 @@ from fembeam.plot.figure import after
 from fembeam.plot.run_signals import FEWEST_BATCHES, MEMORIES
 from fembeam.scene import unit_of
 from fembeam.statistics import Batches, Estimate, moments
-from fembeam.support import aligned, require, versions, written_whole
+from fembeam.support import DRAFT, aligned, require, versions, written_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 UNDATED: dict[str, dict[str, Any]] = {"png": {"Software": None}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+ABANDONED = 3600.0  # s: age of a draft that no run works on
 FEWEST_SAMPLES = 64  # below this neither a spectrum nor a density says anything
 
 
 def prepared(folder: str | Path) -> Path:
-    """The folder, made if need be, and proved writable; ValueError when it is not."""
+    """The folder, made if need be, cleared of old drafts and proved writable; ValueError when it is not."""
     folder = Path(folder)
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        for left in folder.glob(f".*.????????{DRAFT}"):  # of a run that was killed
+            if time.time() - left.stat().st_mtime > ABANDONED:
+                left.unlink(missing_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError as error:

@@ -14,6 +14,7 @@ from typing import Any
 
 from fembeam.support.cards import included_files
 
+DRAFT = ".part"  # end of the name of a file that is not complete
 MAPPING = (".mapping", ".MAPPING")  # of Harwell–Boeing files
 BESIDE = {
     **{".sti": (".dof",), ".mas": (".dof",), ".xdmf": (".h5",), ".xmf": (".h5",)},
@@ -35,7 +36,7 @@ def written_whole(target: Path) -> Iterator[Any]:
     """A binary file that appears under its name only once it is complete; FileNotFoundError without its folder."""
     if not target.parent.is_dir():
         raise FileNotFoundError(ENOENT, f"no such folder to write {target.name} to; make it first", str(target.parent))
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=DRAFT)
     try:
         with os.fdopen(handle, "w+b") as file:
             yield file
