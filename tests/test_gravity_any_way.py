@@ -79,3 +79,15 @@ test_refused = refused(
     (lambda: fb.Scene(portal(), gravity=(1,)), "or two along x and y"),
     (lambda: fb.Scene(fb.Beam(1.0, fb.Section.circle(2e11, 7800.0, 0.01)), gravity=(0, 1, 0)), "of a Beam must be one"),
 )  # fmt: skip
+
+
+@pytest.mark.parametrize("gravity", [9.81, (0.0, -9.81, 0.0)])
+def test_gravity_on_a_frame_joined_to_what_only_turns_is_refused(gravity):
+    """It was a KeyError of the run, or said to be that of a Beam."""
+    frame = fb.Frame({"A": (0, 0, 0), "B": (1, 0, 0)},
+                     [fb.Member("A", "B", fb.Section.circle(2.1e11, 7800.0, 0.01))])  # fmt: skip
+    wheel = fb.Structure(np.eye(3), 10.0 * np.eye(3), labels=[("P", c) for c in ("rx", "ry", "rz")])
+    joined = {"bodies": [fb.Scene(wheel)], "joints": [fb.Joint("B", (1, "P"))]}
+    assert fb.Scene(frame, [fb.Clamped("A")], **joined).gravity == 0.0
+    with pytest.raises(ValueError, match="gravity needs a body that moves along x, y or z"):
+        fb.Scene(frame, [fb.Clamped("A")], gravity=gravity, **joined)
