@@ -128,7 +128,9 @@ class Run(Histories, Printed):
         """Whether the run reached its end."""
         return self.status == solvers.Status.DONE.value
 
-    def sensitivity(self, parameter: str | None = None, start: ArrayLike | None = None) -> Sensitivity:
+    def sensitivity(
+        self, parameter: str | None = None, start: ArrayLike | None = None, progress: bool = False
+    ) -> Sensitivity:
         """Exact derivative of the run by a number of its scene, or by a change of its start, through every contact.
 
         Y' = A Y + Σ b_s dF_s + ∂f/∂p,   dt* = -dδ/δ̇ at entries and exits
@@ -138,6 +140,7 @@ class Run(Histories, Printed):
         parameter : a path such as "stops[valve].gap", "stops[0].law.stiffness", "base.amplitude", "base.omega",
             "damping.zeta[0]", "masses[0].mass"; those of `study.vary`. The start is held fixed in coordinates.
         start : instead, the direction (2n,) in which the start moves, as `Model.state` makes one.
+        progress : show a bar (on terminals and in notebooks only).
 
         Returns
         -------
@@ -147,7 +150,7 @@ class Run(Histories, Printed):
         Raises
         ------
         ValueError : an unknown path (with the nearest one), values near the present one that the scene refuses, a law
-            with an infinite slope at its surface, a run read from a file.
+            with an infinite slope at its surface, a run read from a file, one too long for its modes (some 10 min).
         solvers.NoDerivativeError : a contact grazes, so that there is none.
 
         Warns
@@ -166,7 +169,7 @@ class Run(Histories, Printed):
         """
         from fembeam.model.sensitivity import of_run
 
-        return of_run(self, parameter, start)
+        return of_run(self, parameter, start, progress)
 
     def reactions(self) -> Reactions:
         """Forces (N) and moments (N m) of supports, springs and dashpots on the beams, at the samples.

@@ -25,7 +25,7 @@ from fembeam.model.extremes import of_top, time_of_top
 from fembeam.response import PlacedLog, directed
 from fembeam.scene import called, changes_structure, path_of, replaced, value_of
 from fembeam.scene.signals import is_of_signal
-from fembeam.support import Part, Printed, by_rows, numbers, require
+from fembeam.support import Part, Printed, bar, by_rows, numbers, require
 from solvers.orbits import codes, counts, delayed
 from solvers.problem import counted, dataframe
 from solvers.problem.friction import told_rates
@@ -343,26 +343,29 @@ def _check_smooth(models: Nearby, path: str) -> None:
             "give elements, or other modes: two may change places here")  # fmt: skip
 
 
-def of_run(run: Run, parameter: str | None, start: ArrayLike | None) -> Sensitivity:
+def of_run(run: Run, parameter: str | None, start: ArrayLike | None, progress: bool = False) -> Sensitivity:
     """See `Run.sensitivity`."""
     require((parameter is None) != (start is None), "give a parameter or a direction of the start", (parameter, start),
             "Run.sensitivity", "e.g. 'stops[0].gap'")  # fmt: skip
     if parameter is not None:
         require(isinstance(parameter, str), "parameter must be the path of one number", parameter, "Run.sensitivity",
                 "e.g. 'stops[0].gap'")  # fmt: skip
-        return _warned(by_each(run, [parameter])[0])
+        return _warned(by_each(run, [parameter], progress)[0])
     model, known, options = _made(run)
-    return _warned(Sensitivity("start", float("nan"), run, sensitivity(
-        model.system, *known, options.pop("times"), None, _direction(model, start), **options
-    )))  # fmt: skip
+    direction = _direction(model, start)
+    with bar(known[2], progress) as report:
+        found = sensitivity(model.system, *known, options.pop("times"), None, direction, progress=report, **options)
+    return _warned(Sensitivity("start", float("nan"), run, found))
 
 
-def by_each(run: Run, parameters: Sequence[str]) -> list[Sensitivity]:
+def by_each(run: Run, parameters: Sequence[str], progress: bool = False) -> list[Sensitivity]:
     """Derivatives of a run by each of several numbers of its scene, for little more than those by one."""
     model, known, options = _made(run)
     varied = [_Varied(model, one) for one in parameters]
     x = np.concatenate(known[:2])
-    found = sensitivities(model.system, *known, [(one.systems, one.start(x)) for one in varied], **options)
+    pairs = [(one.systems, one.start(x)) for one in varied]
+    with bar(known[2], progress) as report:
+        found = sensitivities(model.system, *known, pairs, progress=report, **options)
     return [
         Sensitivity(one.called, one.value, run, its, 0.0, one.models, one.systems)
         for one, its in zip(varied, found, strict=True)

@@ -9,6 +9,7 @@ t = clock(σ) makes forces δ^p with a broken p smooth at both ends of a contact
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -33,6 +34,8 @@ def lagrange(at: Array) -> Array:
 
 
 _WITHIN = lagrange(X[:, None] * X)  # (i, q, j): ℓ_j at node q of the interval before node i
+_MANY = 12  # blocks from which on kernels are taken from series
+_SHORT, _NEGLIGIBLE = 4.0, 1e-19  # radians up to which their terms cancel little; size of the first that is left out
 _FINE, _NEWTON = lagrange(np.linspace(0.0, 1.0, 4 * S + 1)), 4  # where a maximum is looked for, and steps from there
 
 
@@ -82,6 +85,29 @@ def propagator(k: Array, c: Array, t: Array) -> tuple[Array, Array]:
     return alpha + half * beta, beta
 
 
+def _series(k: Array, c: Array, reach: float) -> tuple[Array, Array] | None:
+    """Taylor coefficients (n, terms) of α and β in t / reach, to rounding; None where they would cancel."""
+    speed = float((0.5 * (np.abs(c) + np.sqrt(c * c + 4.0 * np.abs(k)))).max()) * reach
+    if not speed < _SHORT:
+        return None
+    terms = [np.array([np.ones_like(k), 0.0 * k]), np.array([0.0 * k, np.full_like(k, reach)])]
+    size, m = 1.0, 0
+    while size > _NEGLIGIBLE:
+        terms.append(-((k * reach**2) / (m + 1) * terms[m] + c * reach * terms[m + 1]) / (m + 2))
+        m, size = m + 1, size * speed / (m + 1)
+    alpha, beta = np.stack(terms, axis=-1)
+    return alpha, beta
+
+
+def _by_series(alpha: Array, beta: Array, lag: Array, weights: Array) -> tuple[Array, Array]:
+    """Kernels (n, P, S, S) from Taylor coefficients (n, terms): integrals of powers serve all blocks."""
+    powers = weights * np.vander(lag.ravel(), alpha.shape[1], increasing=True).T.reshape(-1, *lag.shape)
+    each = np.matmul(powers.transpose(2, 0, 1, 3).reshape(S, -1, S), _WITHIN)  # (i, terms P, j)
+    moments = each.reshape(S, alpha.shape[1], -1, S).transpose(1, 2, 0, 3).reshape(alpha.shape[1], -1)
+    a, b = ((one @ moments).reshape(-1, *lag.shape) for one in (alpha, beta))
+    return a, b
+
+
 def moved(k: Array, c: Array, over: tuple[Array, Array], y: Array) -> Array:
     """E y for α, β (n, ...) of a time and y (2n, ..., m), whose middle axes are those of α or have length 1."""
     a, b = (one[..., None] for one in over)
@@ -113,9 +139,9 @@ class Panels:
     def __len__(self) -> int:
         return len(self.edges) - 1
 
-    def parts(self, most: int) -> list[Panels]:
-        """The panels in parts of at most ``most``."""
-        return [replace(self, edges=self.edges[i : i + most + 1]) for i in range(0, len(self), most)]
+    def parts(self, most: int) -> Iterator[Panels]:
+        """The panels in parts of at most ``most``, one after the other: each keeps its tables."""
+        return (replace(self, edges=self.edges[i : i + most + 1]) for i in range(0, len(self), most))
 
     @cached_property
     def widths(self) -> Array:
@@ -161,6 +187,10 @@ class Panels:
         sigma = self.edges[:-1, None, None][own] + self.widths[:, None, None][own] * (X[:, None] * X)
         lag = np.maximum(self.times[own, :, None] - self.clock.time(sigma), 0.0)
         weights = self.widths[:, None, None][own] * X[:, None] * W * self.clock.pace(sigma)
+        if not alike and len(self.k) > _MANY:
+            series = _series(self.k, self.c, float(lag.max()))
+            if series is not None:
+                return _by_series(*series, lag / lag.max(), weights)
         alpha, beta = (one * weights for one in propagator(self.k, self.c, lag))
         a, b = (np.matmul(one[..., None, :], _WITHIN)[..., 0, :] for one in (alpha, beta))
         return a, b

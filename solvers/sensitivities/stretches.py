@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, pairwise
 from typing import Any
@@ -21,7 +21,8 @@ from solvers.sensitivities.sampled import SampledLoads
 _RADIANS = 1.5  # of the fastest motion in one panel
 _FEWEST = 2  # panels between two events while elements act
 _MOST_OF_DECAY = 1000  # panels between two events for damping: where they are too few it has decayed long ago
-_MOST_NODES = 4_000_000  # panels × blocks above which a stretch is refused
+_MOST_WORK, _BESIDE = 25_000_000, 20  # panels × (blocks + these) above which a run is refused: 10 min
+_MOST_KEPT = 1 << 22  # numbers of the run's motion that are held at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +139,7 @@ class Division:
         self.fastest = max((float(one.max(initial=0.0)) for one in speeds), default=0.0)
         M = dense(system.M)
         self.mobility = [float(np.linalg.norm(x.rows @ np.linalg.solve(M, x.rows.T), 2)) for x in system.contacts]
+        self.panels = 0  # of all stretches so far, before they are refined
 
     def _speed(self, s: int, start: float, end: float, entry_rate: float) -> float:
         """Estimated frequency of an element alone on the system's mass, rad/s, with its decay as far as it lasts."""
@@ -171,10 +173,11 @@ class Division:
         bends = self.bends[(self.bends > start) & (self.bends < end)]
         marks = np.concatenate((bends, self.sampled.edges(start, end)))
         count, own = count + marks.size, count
-        if count * len(self.k) > _MOST_NODES:
+        self.panels += count // refinement
+        if self.panels * (len(self.k) + _BESIDE) > _MOST_WORK:
             raise ValueError(
-                f"a sensitivity over {end - start:g} s with motion of {speed:.3g} rad/s takes {count} panels; "
-                "keep fewer modes, or shorten the run"
+                f"a sensitivity through motion of {speed:.3g} rad/s takes {self.panels} panels up to t = {end:.6g} s, "
+                f"too many for {len(self.k)} modes; keep fewer modes, or shorten the run"
             )
         edges = np.linspace(0.0, 1.0, own + 1)
         if marks.size:
@@ -192,12 +195,29 @@ def _power(contact: Any) -> int:
     return 2 if np.all(2.0 * powers == np.round(2.0 * powers)) else 6
 
 
-class Motion:
-    """The run's own q and q̇ at given times."""
+def pieces_of(times: Array, size: int) -> list[Array]:
+    """Times in pieces at which states of ``size`` coordinates are held at once."""
+    most = max(_MOST_KEPT // (2 * size), 1)
+    return [times[i : i + most] for i in range(0, max(len(times), 1), most)]
 
-    def __init__(self, solution: Solution) -> None:
-        self.t, self.both = solution.t, np.array([solution.q.T, solution.q_dot.T])
+
+class Motion:
+    """The run's own q and q̇ at given times: it is replayed, a piece at a time, as later ones are asked for."""
+
+    def __init__(self, replay: Callable[[Array], Solution], times: Array, size: int) -> None:
+        self.replay, self.times, self.size = replay, times, size
+        self.first, self.both = 0, np.zeros((2, size, 0))  # of the piece that is held
 
     def at(self, times: Any) -> Array:
-        """(2, n) or (2, n, k) q and q̇ at times that were sampled."""
-        return self.both[..., np.minimum(np.searchsorted(self.t, times), len(self.t) - 1)]
+        """(2, n) or (2, n, k) q and q̇ at times that were given."""
+        places = np.minimum(np.searchsorted(self.times, times), len(self.times) - 1)
+        if places.size and not self.first <= places.min() <= places.max() < self.first + self.both.shape[2]:
+            self._hold(int(places.min()), int(places.max()))
+        return self.both[..., places - self.first]
+
+    def _hold(self, first: int, last: int) -> None:
+        """Replay the piece that begins at one time and holds another."""
+        most = max(len(pieces_of(self.times[first:], self.size)[0]), last + 1 - first)
+        self.first, self.both = first, np.zeros((2, self.size, 0))  # lets go of the last one
+        solution = self.replay(self.times[first : first + most])
+        self.both = np.array([solution.q.T, solution.q_dot.T])

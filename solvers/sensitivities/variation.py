@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import zip_longest
@@ -25,7 +25,16 @@ from solvers.sensitivities.flow import Flow, begun_numbers, latched_columns
 from solvers.sensitivities.nearby import Change, Nearby, unchanged
 from solvers.sensitivities.panels import Panels, S, coefficients, interpolated, largest, zeros
 from solvers.sensitivities.sampled import SampledLoads
-from solvers.sensitivities.stretches import Acting, Depths, Division, Motion, Stretch, acting_at_start, grouped
+from solvers.sensitivities.stretches import (
+    Acting,
+    Depths,
+    Division,
+    Motion,
+    Stretch,
+    acting_at_start,
+    grouped,
+    pieces_of,
+)
 
 SMOOTH = 1e-3  # relative size of the last Legendre coefficients of forces' derivatives, above which panels are halved
 _REFINEMENTS, _REPEATS = (1, 2, 4), 2  # of panels, until derivatives are smooth; passes after the first to locate kinks
@@ -78,6 +87,7 @@ def sensitivity(
     start: ArrayLike | None = None,
     method: Any = None,
     memory: Sequence[Any] | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Sensitivity:
     """Derivative of a run by a parameter, and by its start, through all its events; `sensitivities` by several.
 
@@ -91,6 +101,7 @@ def sensitivity(
     nearby : systems near the present one in the parameter; None: by the start alone.
     start : (2n,) derivative of [q0, q_dot0] by the parameter, or the direction in which the start moves; None: 0. With
         laws that latch numbers (2n + l,) does, as in `Solution.end`.
+    progress : called with the simulated time now and then; it begins anew where panels are halved.
 
     Raises
     ------
@@ -117,7 +128,7 @@ def sensitivity(
     >>> float(found.entries[0])
     0.500000
     """
-    return sensitivities(system, q0, q_dot0, duration, [(nearby, start)], times, method, memory)[0]
+    return sensitivities(system, q0, q_dot0, duration, [(nearby, start)], times, method, memory, progress)[0]
 
 
 def sensitivities(
@@ -129,6 +140,7 @@ def sensitivities(
     times: ArrayLike = (),
     method: Any = None,
     memory: Sequence[Any] | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> list[Sensitivity]:
     """Derivatives of a run by several parameters, for little more than those by one.
 
@@ -150,9 +162,9 @@ def sensitivities(
         memory,
         Change(system, [unchanged(system) if one is None else one for one, _ in parameters], duration),
         [_checked_direction(system, one) for _, one in parameters],
+        progress,
     )
-    log, rows = asked.replayed(asked.dense_times())
-    asked.measure(log, rows)
+    rows = asked.measure()
     best, bends = None, np.zeros(0)
     for refinement in _REFINEMENTS:
         walk = _Walk(asked, rows, refinement, bends)
@@ -220,6 +232,7 @@ class _Request:
     memory: Any
     by: Change
     starts: list[Array]  # of [q, q̇], or of what is latched too
+    progress: Callable[[float], None] | None = None
     span: Array = field(default_factory=lambda: np.zeros(0))  # (E,) size of each element's displacement
     depths: list[Depths] = field(default_factory=list)  # of each element
 
@@ -248,31 +261,39 @@ class _Request:
         count = 100 + int(min(_PER_PERIOD * fastest * self.duration / (2.0 * np.pi), _MOST_SAMPLES))
         return np.linspace(0.0, self.duration, count)
 
-    def measure(self, solution: Solution, rows: Array) -> None:
-        """Set the sizes of the displacements; NoDerivativeError for a stop that is touched but not entered."""
+    def seen(self, times: Array) -> tuple[_Seen, Array]:
+        """What the elements see of the run at times, and its list of events."""
+        found = []
+        for piece in pieces_of(times, self.system.size):
+            solution, rows = self.replayed(piece)
+            motion = [motion_of(contact, solution.q.T, solution.q_dot.T) for contact in self.system.contacts]
+            found.append(np.array([(one.delta, one.rate) for one in motion]).reshape(len(motion), 2, len(piece)))
+        return _Seen(times, *np.concatenate(found, axis=2).swapaxes(0, 1)), rows
+
+    def measure(self) -> Array:
+        """Set the sizes of the displacements and return the events.
+
+        NoDerivativeError for a stop that is touched but not entered.
+        """
+        seen, rows = self.seen(self.dense_times())
         self.span, self.depths = np.zeros(len(self.system.contacts)), []
         for s, contact in enumerate(self.system.contacts):
-            delta = motion_of(contact, solution.q.T, solution.q_dot.T).delta
-            mine = rows[rows[:, at.ELEMENT] == s]
+            delta, mine = seen.delta[s], rows[rows[:, at.ELEMENT] == s]
             self.span[s] = np.abs(delta + contact.gap * (-1.0 if contact.outer else 1.0)).max() + 1e-300
-            self.depths.append(Depths.of(contact, mine, solution.t, delta, 1e-9 * self.span[s]))
-        self._check_touching(solution)
+            self.depths.append(Depths.of(contact, mine, seen.t, delta, 1e-9 * self.span[s]))
+        self._check_touching(seen)
+        return rows
 
-    def _check_touching(self, solution: Solution) -> None:
+    def _check_touching(self, seen: _Seen) -> None:
         """NoDerivativeError if a stop is touched, by fine samples where it comes near."""
-        near = [
-            (s, t, h)
-            for s in self._stops()
-            for t, h, top in self._maxima(solution, s)
-            if abs(top) < _NEAR * self.span[s]
-        ]
+        near = [(s, t, h) for s in self._stops() for t, h, top in seen.maxima(s) if abs(top) < _NEAR * self.span[s]]
         if not near:
             return
         times = np.unique(np.concatenate([t + h * _FINE_OFFSETS for _, t, h in near]))
         times = times[(times >= 0.0) & (times <= self.duration)]
-        closer, _ = self.replayed(times)
+        closer, _ = self.seen(times)
         for s in {s for s, _, _ in near}:
-            for t, _, top in self._maxima(closer, s):
+            for t, _, top in closer.maxima(s):
                 if abs(top) <= GRAZING * self.span[s]:
                     raise NoDerivativeError(
                         f"no derivative: {called(self.system, s)} is touched but not entered at t = {t:.6g} s, "
@@ -283,11 +304,18 @@ class _Request:
         """Elements whose contacts begin and end."""
         return [s for s, contact in enumerate(self.system.contacts) if not contact.always]
 
-    def _maxima(self, solution: Solution, s: int) -> list[tuple[float, float, float]]:
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """δ and δ̇ (E, k) of all elements at times t (k,)."""
+
+    t: Array
+    delta: Array
+    rate: Array
+
+    def maxima(self, s: int) -> list[tuple[float, float, float]]:
         """(time, distance of samples, δ) of the maxima of δ below zero between samples, from cubics."""
-        contact, t = self.system.contacts[s], solution.t
-        motion, found = motion_of(contact, solution.q.T, solution.q_dot.T), []
-        delta, rate = motion.delta, motion.rate
+        t, delta, rate, found = self.t, self.delta[s], self.rate[s], []
         for i in np.flatnonzero((rate[:-1] > 0.0) & (rate[1:] <= 0.0) & (delta[:-1] < 0.0) & (delta[1:] < 0.0)):
             h, x = t[i + 1] - t[i], rate[i] / (rate[i] - rate[i + 1])
             rest = 1.0 - x
@@ -345,9 +373,8 @@ class _Walk:
         self.stretches = list(division.stretches(self.acting, rows, asked.duration, refinement))
         wanted = [np.array([0.0, asked.duration]), asked.times, *(t for one in self.stretches for t in one.times)]
         times = np.unique(np.clip(np.concatenate(wanted), 0.0, asked.duration))
-        self.solution, again = asked.replayed(times)
-        _check_same(rows, again, asked.duration)
-        self.motion = Motion(self.solution)
+        self.solution = self._replayed(np.union1d(wanted[0], asked.times))  # that is kept
+        self.motion = Motion(self._replayed, times, system.size)
         n2, own = 2 * system.size, sum(len(getattr(one.law, "memory", ())) for one in system.contacts)
         columns = n2 + own + len(by)
         start = np.zeros((n2, columns))
@@ -363,6 +390,12 @@ class _Walk:
         self.bends: list[float] = []  # times at which laws have kinks that are no knots
         self.open: dict[int, _Contact] = {}
         self._pass_all()
+
+    def _replayed(self, times: Array) -> Solution:
+        """The run at times; NoDerivativeError if it has other events."""
+        solution, again = self.asked.replayed(times)
+        _check_same(self.rows, again, self.asked.duration)
+        return solution
 
     def _pass_all(self) -> None:
         """Follow the run and collect the derivatives."""
@@ -461,7 +494,14 @@ class _Walk:
                 found = flow.pass_flight(panels, stretch.acting, times[low:middle])
             self._sampled(low, found)
             low = middle
+            self._tell(float(panels.ends[-1]))
         self._store_at(stretch.end)
+        self._tell(stretch.end)
+
+    def _tell(self, t: float) -> None:
+        """Tell that a time has been reached."""
+        if self.asked.progress:
+            self.asked.progress(t)
 
     def _sampled(self, first: int, found: Array) -> None:
         """Store derivatives (q, 2n, d) of the blocks at samples."""
