@@ -39,8 +39,16 @@ def test_orbit_is_what_a_long_run_settles_to(model):
     assert orbit.contacts.peak_indentation.max() == pytest.approx(-orbit.extremes(TIP)[0], rel=1e-4)
 
 
-def test_subharmonics_from_nothing_and_their_names(model):
-    found = model.attractors(430.0, starts=3)
+def test_subharmonics_from_nothing_and_their_names(model, monkeypatch):
+    bars = []
+
+    def counting(wanted, *items, **options):
+        bars.append((wanted, *map(len, items)))
+        return tqdm(*items, disable=True, **options)
+
+    monkeypatch.setattr("fembeam.model.orbit.counting", counting)
+    found = model.attractors(430.0, starts=3, progress=True)
+    assert bars == [(True, 3)]
     assert [a.name for a in found] == ["period 2 with 1 impact"]
     driven = paper_scene(fb.Harmonic(1e-3, 430.0)).reduce(1)
     half = driven.orbit(period=2)
@@ -59,9 +67,10 @@ def test_a_search_from_nothing_tells_how_far_it_is(monkeypatch):
     """A run from rest and 12 other starts."""
     bars = []
 
-    def counting(wanted, **options):
-        bars.append(tqdm(disable=not wanted, file=io.StringIO(), **options))
-        return bars[-1]
+    def counting(wanted, *items, **options):
+        bar = tqdm(*items, disable=not wanted, file=io.StringIO(), **options)
+        bars.extend([bar] if wanted else [])
+        return bar
 
     monkeypatch.setattr("fembeam.model.orbit.counting", counting)
     with pytest.raises(solvers.OrbitError, match="none to period 3"):

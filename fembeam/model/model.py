@@ -364,7 +364,12 @@ class Model(Printed, ModalEquations):
         return rub(self, spin, near, entry_rate)
 
     def attractors(
-        self, omega: float | None = None, starts: int | Sequence[ArrayLike] = 12, longest: int = 8, seed: int = 0
+        self,
+        omega: float | None = None,
+        starts: int | Sequence[ArrayLike] = 12,
+        longest: int = 8,
+        seed: int = 0,
+        progress: bool = False,
     ) -> list[Attractor]:
         """Settle many starts and name what they come to, the most frequent first.
 
@@ -374,6 +379,7 @@ class Model(Printed, ModalEquations):
         starts : how many (rest and random states of the size of the motion from rest), or a list of states (2n,).
         longest : periods above this many of the load's count as "not periodic".
         seed : of the random states.
+        progress : show a bar of the starts tried (on terminals and in notebooks only).
 
         Returns
         -------
@@ -382,7 +388,7 @@ class Model(Printed, ModalEquations):
         from fembeam.model.orbit import attractors
 
         model = self if omega is None else self.under(with_value(self.scene, "omega", omega))
-        return attractors(model, starts, longest, seed)
+        return attractors(model, starts, longest, seed, progress=progress)
 
     def branch(
         self,

@@ -281,12 +281,13 @@ def attractors(
     longest: int = 8,
     seed: int = 0,
     tried: Callable[[], Any] = lambda: None,
+    progress: bool = False,
 ) -> list[Attractor]:
     """See `Model.attractors`; ``tried`` is called after each start."""
     T = load_period(model.scene)
     method = solvers.Exponential(1e-8, ledger=False)
     found: list[Attractor] = []
-    for start in _starts(model, T, starts, seed):
+    for start in counting(progress, _starts(model, T, starts, seed), unit=" starts"):
         state, orbit = _settle(model, T, start, longest, method)
         for i, known in enumerate(found):
             if _same(known.orbit, orbit, T):
