@@ -231,3 +231,14 @@ def test_what_is_not_round_is_refused():
             model.rub(spin)
     with pytest.raises(ValueError, match="spin must be given for a body that has none"):
         as_scene(180.0).reduce(modes=2).rub()
+
+
+def test_derivatives_of_a_rub_by_the_spin():
+    """The period follows the spin, as unbalances do: it was held, and the derivative off by 2.6 times its size."""
+    spin, h = 200.0, 0.02
+    model = overhung(mu=0.1).reduce(modes=4)
+    found = model.orbit(start=model.rub().state).sensitivity("beam.spin")
+    assert found.period == pytest.approx(-2.0 * np.pi / spin**2, rel=1e-9)
+    before, after = (model.rub(spin + d).state for d in (-h, h))
+    expected = (after - before) / (2.0 * h)
+    np.testing.assert_allclose(found.state, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())

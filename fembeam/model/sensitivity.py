@@ -255,8 +255,8 @@ class _Varied:
 
     @cached_property
     def lengthening(self) -> float:
-        """Change of the loads' period, s per unit."""
-        if not is_of_signal(self.path):
+        """Change of the loads' period, s per unit: by signals, and by a spin, which unbalances follow."""
+        if not (is_of_signal(self.path) or self.path.endswith(".spin")):
             return 0.0
         step = SIGNAL * (abs(self.value) or UNIT)
         return float(self._near(lambda value: load_period(self._scene(value)), step).derivative(lambda one: one))
