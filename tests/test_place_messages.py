@@ -134,3 +134,13 @@ def test_numbers_of_numpy_are_places_of_frames(kind):
     run = scene.reduce(modes=2).simulate(0.01, 1e-3)
     for z in (0.25, 0.375):
         np.testing.assert_array_equal(run.displacement(kind(z), "x"), run.displacement(z, "x"))
+
+
+def test_a_number_of_a_body_within_a_place():
+    """`1 is the nearest there is, got (1, 'b')` was said of a node named 1."""
+    other = fb.Structure(1e4 * np.eye(2), np.eye(2), labels=[(1, "x"), (2, "x")])
+    run = fb.Scene(other, bodies=[fb.Scene(BODY)]).reduce(2).simulate(0.01, 1e-3)
+    said = "a place must be on one body, without its number, got (1, 33) in Run; write 33, and body=1"
+    with pytest.raises(ValueError, match=re.escape(said)):
+        run.displacement((1, 33), "x")
+    assert run.displacement(33, "x", body=1).shape == (11,)

@@ -111,6 +111,9 @@ class PlacedShapes:
         place = tuple(place) if isinstance(place, list) else place.item() if isinstance(place, np.generic) else place
         if place in self.known:
             return np.asarray(self.whole[self.known.index(place)])
+        alone = not any(map(is_numbered, self.known))
+        require(not (alone and is_numbered(place)), "a place must be on one body, without its number", place, "Run",
+                f"write {place[1]!r}, and body={place[0]}" if is_numbered(place) else "")  # fmt: skip
         if self.more is not None:
             return self.more(place)
         of_others = [one for one in self.known if is_numbered(one) and one[1] == place]
