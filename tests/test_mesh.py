@@ -378,6 +378,19 @@ def test_what_is_no_line_is_counted_in_a_warning(tmp_path, suffix, more, said):
     assert warned[0].filename == __file__
 
 
+@pytest.mark.parametrize(
+    ("suffix", "said"), [("bdf", "1 CROD, 1 CTUBE in"), ("inp", "1 T3D2 in")], ids=["nastran", "abaqus"]
+)
+def test_pinned_bars_are_told_of(tmp_path, suffix, said):
+    """They became beams, rigidly joined, without a word."""
+    path, plain = tmp_path / f"bar.{suffix}", {"kind": "T3D2", "nodes": "2", "moved": "", "second": ""}
+    rods = "GRID,8,,0.,1.,1.\nCROD,5,1,7,8\nCTUBE,6,1,8,10"
+    path.write_text(BARS.format(first=rods, system="", more="") if suffix == "bdf" else PART.format(**plain))
+    with pytest.warns(UserWarning, match=said) as warned:
+        fb.Frame.from_mesh(path, THICK)
+    assert warned[0].filename == __file__
+
+
 GRIDS = """$ nothing but cards
 GRID,1 $ the clamp
 GRID*,50,,.2,0.
@@ -398,6 +411,7 @@ grid          12             1.0      0.
         "CTUBE,3,2,9,12",
     ],
 )
+@pytest.mark.filterwarnings("ignore:1 CTUBE in")
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 def test_cards_of_nastran_in_all_fields(tmp_path, bar, end):
     """A bar in large fields or small letters was passed over: the beam was 0.5 m long."""

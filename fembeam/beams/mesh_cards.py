@@ -15,6 +15,7 @@ from fembeam.support import Block, Card, abaqus_blocks, check_abaqus, nastran_ca
 Key = tuple[bool, int]  # whether of the assembly itself, and the number
 
 BARS = ("CBAR", "CBEAM", "CROD", "CTUBE")
+PINNED = ("CROD", "CTUBE", "T2D", "T3D")
 OTHERS = ("CBEND", "CBEAM3", "CONROD", "CTRI", "CTRAX", "CQUAD", "CSHEAR", "CTETRA", "CPENTA", "CHEXA", "CPYRA")
 PASSED = ("RBAR", "RBE", "RJOINT", "RROD", "RSPLINE", "RTRPLT", "MPC", "CONM", "CMASS", "CELAS", "CBUSH", "CDAMP",
           "CVISC", "CGAP", "CFAST", "CWELD", "GENEL")  # fmt: skip
@@ -35,6 +36,7 @@ def nastran_mesh(path: Path) -> Any:
             cards[-1].name if cards else "nothing", f"{path}", "export it again: it is cut")  # fmt: skip
     _check_nastran(cards, path)
     _warn_of_passed([card.name for card in cards if card.name.startswith(PASSED)], path)
+    _warn_of_pinned([card.name for card in cards], path)
     grids = [card for card in cards if card.name == "GRID"]
     number = {_whole(card.words[0], card.where): i for i, card in enumerate(grids)}
     bars = [card for card in cards if card.name in BARS]
@@ -72,6 +74,15 @@ def _warn_of_passed(names: list[str], path: Path) -> None:
                       "the scene", UserWarning, stacklevel=6)  # fmt: skip
 
 
+def _warn_of_pinned(kinds: list[str], path: Path) -> None:
+    """Warn of bars that turn freely at their ends, which a mesh joins as rigidly as beams."""
+    names = [name for name in kinds if name.startswith(PINNED)]
+    if names:
+        said = ", ".join(f"{count} {name}" for name, count in sorted(Counter(names).items()))
+        warnings.warn(f"{said} in {path}, pinned at their ends, are read as rigidly joined beams; a Member has "
+                      "release= for what an end does not carry", UserWarning, stacklevel=6)  # fmt: skip
+
+
 def abaqus_mesh(path: Path) -> Any:
     """A mesh of *NODE and *ELEMENT with their sets; nodes of the assembly have numbers of their own beside a part's."""
     import meshio
@@ -87,6 +98,8 @@ def abaqus_mesh(path: Path) -> Any:
                     "write a flat file: all nodes and elements in one")  # fmt: skip
     number = {key: i for i, key in enumerate(places)}
     cells, found, named = _elements(blocks, number)
+    kinds = [block.options["TYPE"].upper() for block, _ in blocks if block.keyword == "ELEMENT" and block.data]
+    _warn_of_pinned([kind for kind, (_, rows) in zip(kinds, cells, strict=True) for _ in rows], path)
     sets, nodes = _sets(blocks, "ELSET", found, named), _sets(blocks, "NSET", number, [])
     return meshio.Mesh(
         *(np.array(list(places.values())).reshape(-1, 3), [(kind, np.array(rows)) for kind, rows in cells]),
