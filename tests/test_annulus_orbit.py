@@ -5,6 +5,7 @@ import pytest
 from oscillators import Tone
 from scipy.optimize import brentq
 
+import fembeam as fb
 from contacts import KelvinVoigt
 from solvers import Contact, DormandPrince, System, branch, integrate, orbit
 
@@ -104,3 +105,16 @@ def test_derivatives_of_an_indentation_are_those_of_differences(outer):
         assert rate_by_q[i] == pytest.approx((ahead[1] - behind[1]) / (2.0 * step), rel=1e-7)
         faster, slower = (contact.motion(q, v + h * unit)[1] for h in (step, -step))
         assert by_q[i] == pytest.approx((faster - slower) / (2.0 * step), rel=1e-8)
+
+
+def test_random_starts_whose_runs_are_refused_are_left_out():
+    """One of them drew the spring of friction by half a turn, and the search ended, though rest settles to an orbit."""
+    matrices, labels = [one * PLANE for one in (STIFFNESS, MASS, DAMPING)], [("D", "x"), ("D", "y")]
+    body = fb.Structure(*matrices, labels=labels, nodes={"D": (0, 0, 0)})
+    hole = fb.AnnularStop("D", KelvinVoigt(3e5, 50.0), 2e-4, directions=("x", "y"), friction=fb.Friction(0.3, 3e4))
+    drive = [fb.PointForce("D", fb.Harmonic(60.0, 150.0), direction="x"),
+             fb.PointForce("D", fb.Harmonic(24.0, 150.0, 1.0), direction="y")]  # fmt: skip
+    model = fb.Scene(body, stops=[hole], forces=drive).reduce(modes=2)
+    with pytest.warns(UserWarning, match="1 of 3 starts are left out, whose runs are refused: .* half a turn"):
+        (found,) = model.attractors(starts=3)
+    assert (found.name, found.count) == ("period 1 with 2 impacts", 2)

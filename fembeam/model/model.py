@@ -384,6 +384,10 @@ class Model(Printed, ModalEquations):
         Returns
         -------
         list of Attractor : orbit (None when not periodic), period, impacts, count, state, name.
+
+        Warns
+        -----
+        UserWarning : random starts are left out, as their runs are refused.
         """
         from fembeam.model.orbit import attractors
 

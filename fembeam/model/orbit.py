@@ -7,6 +7,7 @@ k = 2 is a 1/2 subharmonic.
 from __future__ import annotations
 
 import math
+import warnings
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -287,8 +288,16 @@ def attractors(
     T = load_period(model.scene)
     method = solvers.Exponential(1e-8, ledger=False)
     found: list[Attractor] = []
-    for start in counting(progress, _starts(model, T, starts, seed), unit=" starts"):
-        state, orbit = _settle(model, T, start, longest, method)
+    refused: list[str] = []
+    for number, start in enumerate(counting(progress, _starts(model, T, starts, seed), unit=" starts")):
+        try:
+            state, orbit = _settle(model, T, start, longest, method)
+        except solvers.SolverError as error:
+            if number == 0 or not is_whole(starts):  # rest, or asked for
+                raise
+            refused.append(str(error))
+            tried()
+            continue
         for i, known in enumerate(found):
             if _same(known.orbit, orbit, T):
                 found[i] = replace(known, count=known.count + 1)
@@ -296,6 +305,9 @@ def attractors(
         else:
             found.append(Attractor(orbit, 1, state))
         tried()
+    if refused:
+        warnings.warn(f"{len(refused)} of {starts} starts are left out, whose runs are refused: {refused[0]}",
+                      UserWarning, stacklevel=3)  # fmt: skip
     return sorted(found, key=lambda a: -a.count)
 
 
