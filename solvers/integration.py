@@ -31,7 +31,7 @@ from solvers.problem import (
     product,
 )
 from solvers.problem import event_list as at
-from solvers.problem.friction import ACCOUNTS, BEGUN, CODE, STICK, tell_sliders
+from solvers.problem.friction import ACCOUNTS, BEGUN, CODE, STICK, most_friction, tell_sliders
 from solvers.problem.matrices import number
 from solvers.problem.run_arguments import (
     check_laws,
@@ -49,7 +49,6 @@ _SAMPLES = 64  # of a run that is made again for its balance
 BLOCK_STEPS = 20_000  # steps in a block: between two checks for signals and calls of `progress`
 _IDLE, _MOST_IDLE = 1e-6, 50  # of shortened steps: part of the duration a block must pass; blocks in turn that may not
 _MOST_KEPT = 1 << 22  # bytes of sampled signals that are kept for other runs: of longer ones the run takes the time
-_NEARLY_HALF_A_TURN = 0.95  # of it: to which a spring of friction may be drawn in a circle
 _NOTHING = np.empty(0)  # latched by a law without memory
 
 
@@ -441,8 +440,7 @@ def _overdrawn(record: Record) -> bool:
     for s, contact in enumerate(record.system.contacts):
         if contact.friction is not None and contact.circle:
             largest = of_friction[of_friction[:, at.ELEMENT] == s, at.LARGEST].max(initial=0.0)
-            law: Any = contact.law
-            if largest > _NEARLY_HALF_A_TURN * law.friction.stiffness * math.pi * abs(contact.circle):
+            if largest > most_friction(contact, abs(contact.circle)):
                 return True
     return False
 

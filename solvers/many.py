@@ -132,7 +132,7 @@ def integrate_many(
         of_blocks = whole_starts(engines[0], starts, _of_tones(scaled, engines[0]))
         workers = [Worker(engine, of_blocks, own_gaps, outcomes, BLOCK_STEPS) for engine in engines]
         _to_the_end(workers, len(starts), progress)
-        status = final_statuses(engines[0], outcomes)
+        status = final_statuses(engines[0], outcomes, own_gaps)
         whole = not np.any(status == Status.INTERRUPTED)
         again = bool(whole and np.any(status == Status.STEP_TOO_SMALL)) and engines[0].shorten()
         for engine in engines:

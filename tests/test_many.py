@@ -14,7 +14,7 @@ import solvers
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from fembeam import cli
 from fembeam.study.basins import _Known, _labels, _settled, axis_of, starts_of
-from solvers import Contact, Exponential, SolverError, Status, System, integrate, integrate_many
+from solvers import Contact, Exponential, Friction, SolverError, Status, System, integrate, integrate_many
 from solvers.exponential import many_starts
 from solvers.exponential.energy import check
 from solvers.many import _shared_out
@@ -438,3 +438,19 @@ def test_the_table_basins(tmp_path, capsys):
     assert {path.name for path in out.iterdir()} >= {"basins.npz", "basins.json", "basins.png", "basins.txt"}
     assert cli.main(["run", str(file), "--out", str(out), "--quiet"]) != 0  # dear results are not overwritten
     assert cli.main(["run", str(file), "--out", str(out), "--quiet", "--resume"]) == 0
+
+
+@pytest.mark.parametrize(("clearance", "refused"), [(2e-4, 2), (8e-4, 0)])
+def test_friction_beyond_half_a_turn_is_refused_as_in_a_run(clearance, refused):
+    """Starts that `integrate` refuses were given as finished; clearances of their own count too."""
+    rng, plane = np.random.default_rng(3), np.eye(2)
+
+    def system(c):
+        hole = Contact(plane, KelvinVoigt(3e5, 50.0), c, map="annulus", friction=Friction(1.0, 6e3))
+        return System(2.0 * plane, 60.0 * plane, 8e4 * plane, [hole])
+
+    q, q_dot = 1e-4 * rng.normal(size=(30, 2)), 2.0 * rng.normal(size=(30, 2))
+    found = integrate_many(system(1e-3 - clearance), q, q_dot, 0.1, gaps=np.full((30, 1), clearance), check=False)
+    alone = [integrate(system(clearance), *start, 0.1, check=False).status for start in zip(q, q_dot, strict=True)]
+    assert list(found.status) == alone
+    assert alone.count(Status.OVERDRAWN) == refused

@@ -15,7 +15,7 @@ import numpy as np
 from numba import types
 
 from solvers.compiled.fields import packed_type
-from solvers.compiled.kernels import INTEGERS, PLANAR_PROBLEM, copy, entry, inner, is_circle
+from solvers.compiled.kernels import INTEGERS, PLANAR_PROBLEM, copy, entry, inner, is_circle, rubs, slider_of
 from solvers.compiled.packed import unpacker
 from solvers.compiled.state import (
     DIVERGED,
@@ -39,6 +39,7 @@ from solvers.exponential.method import ADVANCE, Engine
 from solvers.exponential.preparation import SCRATCH
 from solvers.problem import Array, Status
 from solvers.problem import event_list as at
+from solvers.problem.friction import PEAK, most_friction
 
 NEXT, BEYOND, BEGUN = range(3)  # places in a cursor: present start, end of the group, whether the start has begun
 CODE, CONTACTS = range(2)  # columns of Outcomes.count
@@ -55,6 +56,7 @@ class Outcomes(NamedTuple):
     count: Annotated[Any, "int k, 2"]  # code of the status, number of contacts
     number: Annotated[Any, "k, 5"]  # time reached, Σ peak force × peak indentation, energies
     peak: Annotated[Any, "k, E, 2"]  # largest indentation and force
+    rubbed: Annotated[Any, "k, E"]  # largest friction
 
     @classmethod
     def of(cls, starts: int, width: int, stops: int) -> Outcomes:
@@ -62,7 +64,7 @@ class Outcomes(NamedTuple):
         count = np.zeros((starts, 2), dtype=np.int64)
         count[:, CODE] = STATUSES.index(Status.INTERRUPTED)
         x, number = np.full((starts, width), np.nan), np.zeros((starts, 5))
-        return cls(x, count, number, np.zeros((starts, stops, 2)))
+        return cls(x, count, number, np.zeros((starts, stops, 2)), np.zeros((starts, stops)))
 
 
 class Starts(NamedTuple):
@@ -108,6 +110,8 @@ def _end(problem, state, scratch, code, outcomes, i):
     for s in range(problem.law.size):
         if acting_segment(problem, state, s) > 0 and begins_and_ends(problem, s):
             _count_contact(outcomes, i, s, state.active[s, PEAK_DELTA], state.active[s, PEAK_FORCE])
+        if rubs(problem, s) and state.segment[s] > 0:
+            outcomes.rubbed[i, s] = max(outcomes.rubbed[i, s], slider_of(problem, s)[PEAK])
     outcomes.count[i, CODE] = DIVERGED if code == DONE and not finite else code
     outcomes.number[i, REACHED] = state.now[T]
     copy(scratch.energy, outcomes.number[i, ENERGY:], 3)
@@ -136,6 +140,9 @@ def advance_many(run, addresses, starts, outcomes, cursor, budget):
         for row in state.log[: state.count[LOGGED]]:
             if row[at.FROM] > 0.0 and row[at.TO] == 0.0:  # a contact ends
                 _count_contact(outcomes, i, np.int64(row[at.ELEMENT]), row[at.DEEPEST], row[at.LARGEST])
+            elif row[at.GUARD] == at.FRICTION:
+                drawn = outcomes.rubbed[i, np.int64(row[at.ELEMENT]) :]
+                drawn[0] = max(drawn[0], row[at.LARGEST])
         state.count[LOGGED] = 0
         if code != RUNNING and code != LOG_FULL:
             _end(problem, state, scratch, code, outcomes, i)
@@ -183,9 +190,17 @@ class Worker:
         return bool(self.cursor[NEXT] == self.cursor[BEYOND])
 
 
-def final_statuses(engine: Engine, outcomes: Outcomes) -> Any:
-    """(k,) `Status` of every start: that of its run, or `UNBALANCED` if it ends with more energy than it can have."""
+def final_statuses(engine: Engine, outcomes: Outcomes, gaps: Array) -> Any:
+    """(k,) `Status` of every start: that of its run, or `UNBALANCED` if it ends with more energy than it can have.
+
+    `OVERDRAWN` if friction in a circle, of ``gaps`` (k, E) where runs have their own, was drawn too far.
+    """
     status = np.array(STATUSES, dtype=object)[outcomes.count[:, CODE]]
+    for s, contact in enumerate(engine.system.contacts):
+        if contact.friction is not None and contact.circle:
+            radius = gaps[:, s] if gaps.size else abs(contact.circle)
+            drawn = outcomes.rubbed[:, s] > most_friction(contact, radius)
+            status[drawn & (outcomes.count[:, CODE] == DONE)] = Status.OVERDRAWN
     if not is_bounded(engine.system):
         return status
     energy = outcomes.number[:, ENERGY:]

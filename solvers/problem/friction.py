@@ -19,6 +19,7 @@ the law's switch that cuts N at zero, or -1; a direction in the circle and its a
 SIZE = 19  # the rest is scratch
 ACCOUNTS = 3  # numbers in the state behind the energy balance: ∫F_t ξ̇ dt, ∫F_t dt, and the way of the slider
 STICK, FREE = 0.0, 2.0  # codes; those of slip are -1 and 1, FREE is that of a contact that is open, or pulls
+NEARLY = 0.95  # of half a turn of the spring in a circle, beyond which runs are refused
 SLIDES, PRESSES = range(2)  # borders: the slider's own, and N = 0, where slip ends
 
 
@@ -126,6 +127,11 @@ class Rubbing:
     def stored(self, delta: float, parameters: Array) -> float:
         """Energy of the law alone, J; that of the slider's spring is F_t²/2k_t."""
         return float(self.law.stored(delta, np.asarray(self.law.parameters, dtype=float)))
+
+
+def most_friction(contact: Any, radius: Any) -> Any:
+    """|F_t|, N, in a circle of that radius beyond which ξ - s, known up to whole turns, may be wrong."""
+    return NEARLY * contact.law.friction.stiffness * math.pi * radius
 
 
 def may_pull(law: Any) -> bool:
