@@ -158,7 +158,7 @@ def _without_root(
     low = omega_squared <= RIGID**2 * scale
     if low.any():
         omega_squared[low] = np.sum(vectors[:, low] * (K @ vectors[:, low]), axis=0)
-    hidden = np.maximum(_hidden(K, vectors) ** 2, _of_decimals(omega_squared, scale))
+    hidden = _hidden(K, vectors, omega_squared, scale)
     if np.any(omega_squared < -hidden):
         share = float(-omega_squared.min()) / scale
         rounded = f", or K is rounded, for this is {share:.1g} of the highest: give more digits" * (share < DECIMALS)
@@ -179,10 +179,10 @@ def _of_decimals(omega_squared: Vector, scale: float) -> float:
     return SCATTER * below if told else 0.0
 
 
-def _hidden(K: sparse.csc_matrix, vectors: Vector) -> Vector:
-    """The frequency below which that of each shape is rounding of K."""
-    terms: Vector = np.sum(np.abs(vectors) * (abs(K) @ np.abs(vectors)), axis=0)
-    return RIGID * np.sqrt(terms)
+def _hidden(K: Any, vectors: Vector, omega_squared: Vector, scale: float) -> Vector:
+    """ω² below which that of each shape is rounding of K."""
+    terms = np.sum(np.abs(vectors) * (abs(K) @ np.abs(vectors)), axis=0)
+    return np.asarray(np.maximum(RIGID**2 * terms, _of_decimals(omega_squared, scale)))
 
 
 def _settled(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix | None, count: int) -> Basis:
@@ -248,13 +248,11 @@ def ritz(M: Matrix, K: Matrix, root: Matrix | None, vectors: Vector) -> tuple[Ve
     """Frequencies and mass-normalised shapes of the pencil reduced to the span of the vectors, lowest first."""
     unit = vectors / np.sqrt(np.sum(vectors * (M @ vectors), axis=0))
     if root is None:
-        values, rotation = _dense(unit.T @ (M @ unit), unit.T @ (K @ unit))
-        omega, vectors = np.sqrt(np.maximum(values, 0.0)), unit @ rotation
-        rigid: Any = _hidden(checked_matrix(K, "K", "modal_basis"), vectors)
-    else:
-        omega, vectors = _ritz(M, sparse.csr_matrix(root), unit)
-        rigid = _rigid_with_root(omega, _scale(M, K))
-    return np.where(omega <= rigid, 0.0, omega), vectors
+        squares, rotation = _dense(unit.T @ (M @ unit), unit.T @ (K @ unit))
+        vectors = unit @ rotation
+        return np.sqrt(np.where(squares > _hidden(K, vectors, squares, _scale(M, K) ** 2), squares, 0.0)), vectors
+    omega, vectors = _ritz(M, sparse.csr_matrix(root), unit)
+    return np.where(omega <= _rigid_with_root(omega, _scale(M, K)), 0.0, omega), vectors
 
 
 def _ritz(M: sparse.csc_matrix, R: sparse.csr_matrix, vectors: Vector) -> tuple[Vector, Vector]:

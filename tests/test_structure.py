@@ -67,6 +67,8 @@ def test_rigid_motions_of_stiffness_with_few_decimals():
     assert found[:6].tolist() == [0.0] * 6
     np.testing.assert_allclose(found[6:], exact[6:], rtol=1e-7)
     K, M, labels = free_body(".9e")
+    condensed = reduction.craig_bampton(M, K, np.eye(len(K))[:, :12], 2)
+    assert condensed.omega[:6].tolist() == [0.0] * 6
     assert fb.Structure(K, M, labels=labels).check()[-1].startswith("lowest frequencies without supports: 0, 0, 0,")
 
 
