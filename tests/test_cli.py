@@ -387,16 +387,16 @@ def said_on_failure(capsys, code, *arguments):
 
 
 def test_a_study_that_fails_does_not_stop_the_others(tmp_path, capsys):
-    path, out = scene(tmp_path), tmp_path / "out"
-    path.write_text(path.read_text(encoding="utf-8") + '[orbit]\n[mode_count]\ncounts = [1]\nquantity = "peak_force"\n'
-                    "duration = 0.1\nseeds = 3\n", encoding="utf-8")  # fmt: skip
+    plane = "x_span = [0.0, 1e-3]\ny_span = [0.0, 0.1]\npoints = [2, 2]\nx = 99\ny = 0\n"
+    counts = '[mode_count]\ncounts = [1]\nquantity = "peak_force"\nduration = 0.1\n'
+    path, out = shaken(tmp_path, f"[basins]\n{plane}{counts}"), tmp_path / "out"
     said = said_on_failure(capsys, 2, "run", path, "--out", out, "--quiet")
-    line = path.read_text(encoding="utf-8").splitlines().index("[orbit]") + 1
-    assert f"scene.toml:{line}: [orbit]: an orbit needs periodic loads" in said
+    line = path.read_text(encoding="utf-8").splitlines().index("[basins]") + 1
+    assert f"scene.toml:{line}: [basins]: the number of a state must lie in" in said
     text = (out / "report.html").read_text(encoding="utf-8")
     assert "Mode count" in text
     assert "Contacts" in text
-    assert "Orbit" not in text
+    assert "Basins" not in text
     recorded = json.loads((out / "studies.json").read_text())
     assert {name for name, one in recorded.items() if one["files"]} == {"simulate", "mode_count"}
 
