@@ -30,7 +30,6 @@ SHIFT = 1e-12  # of the median of K_ii/M_ii: above rounding of K, not far above 
 WIDER = (1.0, 1e3, 1e4)  # times that shift, where the modes do not settle
 RIGID = 1e-7  # of √(|φ|ᵀ|K||φ|): rounding of K, a few √eps, hides lower frequencies
 DECIMALS = 1e-9  # of max K_ii/M_ii: what numbers of few decimals, as of DMIG cards, may make of ω² = 0
-SCATTER = 100.0  # of the lowest ω² below zero: what the same decimals may make of others
 RIGID_WITH_ROOT = 1e-12  # of max √(K_ii/M_ii), when R is given: rounding stays below 4e-14 up to 2000 elements
 ROUNDED, GAP = 10.0, 1e6  # times that: rounding of superelements reaches 1.2e-12; no elastic mode within the gap behind
 GUARDS = 6  # so many more vectors than wanted are corrected: a mode next to the last one wanted settles too slowly
@@ -74,7 +73,7 @@ def modal_basis(
     Notes
     -----
     Frequencies below 1e-7 √(|φ|ᵀ|K||φ|), with `root` below 1e-12 max √(K_ii/M_ii), are rounding and are returned as
-    exactly 0.0: rigid-body modes. A soft part is so found beside any stiff one, but not behind a link 1e14 times as
+    exactly 0.0: rigid-body modes. A soft part is so found beside any stiff one, but not behind a link 1e13 times as
     stiff, which leaves K no digits for it. Several rigid-body modes are an arbitrary orthonormal set of the rigid
     motions. Above 60 dofs modes come from sparse shift-invert Lanczos, unless more than a quarter is asked for.
 
@@ -150,15 +149,13 @@ def _scale(M: sparse.csc_matrix, K: sparse.csc_matrix) -> float:
     return float(np.sqrt(np.max(np.abs(K.diagonal()) / M.diagonal())))
 
 
-def _without_root(
-    M: sparse.csc_matrix, K: sparse.csc_matrix, omega_squared: Vector, vectors: Vector, count: int
-) -> Basis:
-    """The lowest `count` frequencies from ω², rigid-body modes set to zero."""
+def _without_root(M: sparse.csc_matrix, K: sparse.csc_matrix, omega_squared: Vector, vectors: Vector) -> Basis:
+    """Frequencies from ω², rigid-body modes set to zero."""
     scale = _scale(M, K) ** 2
     low = omega_squared <= RIGID**2 * scale
     if low.any():
         omega_squared[low] = np.sum(vectors[:, low] * (K @ vectors[:, low]), axis=0)
-    hidden = _hidden(K, vectors, omega_squared, scale)
+    hidden = _hidden(K, vectors)
     if np.any(omega_squared < -hidden):
         share = float(-omega_squared.min()) / scale
         rounded = f", or K is rounded, for this is {share:.1g} of the highest: give more digits" * (share < DECIMALS)
@@ -166,23 +163,18 @@ def _without_root(
             f"K must be positive semi-definite, got omega² = {omega_squared.min():.6g} in modal_basis; "
             f"the structure is unstable{rounded}"
         )
-    omega = np.sqrt(np.where(omega_squared > hidden, omega_squared, 0.0))
-    order = np.argsort(omega, kind="stable")[:count]
-    return Basis(vectors[:, order], omega[order])
+    return _ascending(np.sqrt(np.where(omega_squared > hidden, omega_squared, 0.0)), vectors)
 
 
-def _of_decimals(omega_squared: Vector, scale: float) -> float:
-    """ω² up to which K of few decimals hides rigid-body modes, by one below zero; 0 without elastic modes far above."""
-    below = max(0.0, -float(omega_squared.min()))
-    elastic = omega_squared[omega_squared > SCATTER * below]
-    told = below <= DECIMALS * scale and elastic.size and elastic.min() > GAP * below
-    return SCATTER * below if told else 0.0
-
-
-def _hidden(K: Any, vectors: Vector, omega_squared: Vector, scale: float) -> Vector:
+def _hidden(K: Any, vectors: Vector) -> Vector:
     """ω² below which that of each shape is rounding of K."""
-    terms = np.sum(np.abs(vectors) * (abs(K) @ np.abs(vectors)), axis=0)
-    return np.asarray(np.maximum(RIGID**2 * terms, _of_decimals(omega_squared, scale)))
+    return np.asarray(RIGID**2 * np.sum(np.abs(vectors) * (abs(K) @ np.abs(vectors)), axis=0))
+
+
+def _ascending(omega: Vector, vectors: Vector) -> Basis:
+    """Modes in the order of their frequencies."""
+    order = np.argsort(omega, kind="stable")
+    return Basis(vectors[:, order], omega[order])
 
 
 def _settled(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix | None, count: int) -> Basis:
@@ -190,13 +182,10 @@ def _settled(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix | 
     failure = None
     for factor in WIDER:
         try:
-            most = _guarded(M.shape[0], count)
-            values, vectors = _solve(M, K, count if R is None else most, factor)
-            if R is None and values[-1] <= -SCATTER * values[0]:  # elastic ones tell what is rounding
-                values, vectors = _solve(M, K, most, factor)
             if R is None:
-                basis = _without_root(M, K, values, vectors, count)
+                basis = _without_root(M, K, *_solve(M, K, count, factor))
             else:
+                vectors = _solve(M, K, _guarded(M.shape[0], count), factor)[1]
                 basis = _with_root(M, K, R, vectors, factor * _shift(M, K), count)
             _verify(basis, M, K)
         except AccuracyError as error:
@@ -250,7 +239,8 @@ def ritz(M: Matrix, K: Matrix, root: Matrix | None, vectors: Vector) -> tuple[Ve
     if root is None:
         squares, rotation = _dense(unit.T @ (M @ unit), unit.T @ (K @ unit))
         vectors = unit @ rotation
-        return np.sqrt(np.where(squares > _hidden(K, vectors, squares, _scale(M, K) ** 2), squares, 0.0)), vectors
+        basis = _ascending(np.sqrt(np.where(squares > _hidden(K, vectors), squares, 0.0)), vectors)
+        return basis.omega, basis.vectors
     omega, vectors = _ritz(M, sparse.csr_matrix(root), unit)
     return np.where(omega <= _rigid_with_root(omega, _scale(M, K)), 0.0, omega), vectors
 

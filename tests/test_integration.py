@@ -418,6 +418,14 @@ def test_plain_callable_of_time_against_its_closed_answer():
     np.testing.assert_allclose(run.q[:, 0], run.t**3 / 2, atol=1e-12)
 
 
+def test_plain_loads_that_the_first_nodes_miss_are_no_jumps():
+    """At these the sine is zero but for rounding, which was taken for a jump."""
+    omega = 2.0 * np.pi * 64.0
+    loads = lambda t: np.sin(omega * np.asarray(t)), Tone(-1j, omega)
+    ends = [integrate(System([[1.0]], [[0.1]], [[100.0]], loads=[([1.0], load)]), [0.0], [0.0], 32.0) for load in loads]
+    np.testing.assert_allclose(ends[0].q, ends[1].q, atol=1e-9)
+
+
 test_signals_that_are_no_signals_are_refused = refused_by(
     lambda signal: hit_by(signal),
     (Nodes(length=0.2), r"the signal of load 0 ends at 0.2 s, the run at 0.5 s"),

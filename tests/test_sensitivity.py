@@ -240,13 +240,13 @@ def test_a_run_held_in_pieces_and_its_progress(monkeypatch):
 
 
 def test_panels_beyond_count_are_refused_before_they_are_passed():
-    """Two million of one mode; those of each stretch were counted alone."""
+    """Five million of one mode; those of each stretch were counted alone."""
 
     def driven(push):
         return System.modal([1e6], [0.02], loads=[([1.0], Tone(push, 3.0))])
 
-    with pytest.raises(ValueError, match="too many for 1 modes; keep fewer modes, or shorten the run"):
-        sensitivity(driven(1.0), [0.0], [0.0], 3.0, nearby=Nearby.of(driven, 1.0, 1e-3))
+    with pytest.raises(ValueError, match="too many for 1 mode; keep fewer modes, or shorten the run"):
+        sensitivity(driven(1.0), [0.0], [0.0], 7.5, nearby=Nearby.of(driven, 1.0, 1e-3))
 
 
 # --- sampled loads ----------------------------------------------------------------------------------------------------

@@ -41,7 +41,11 @@ TURNED = {
     "N s/m^p": "N m s/rad^p",
     "N/m": "N m/rad",
     "m/s": "rad/s",
+    "N s/m": "N m s/rad",
+    "N s/m^((p+1)/2)": "N m s/rad^((p+1)/2)",
+    "1/m^n": "1/rad^n",
 }  # of rotation
+ACTING = "stops", "elements", "springs", "dashpots"
 OWNERS = {"supports": "support", "masses": "mass", "springs": "spring", "dashpots": "dashpot", "stops": "stop",
           "elements": "element", "forces": "force", "bodies": "beam"}  # fmt: skip
 
@@ -87,7 +91,7 @@ def _named(path: str, scene: Scene) -> tuple[str, str]:
         name, unit = f"{'xyz'[int(component)]} of node {last}", "m"
     else:
         name, unit = _of_part(scene, beam, kind, int(number or 0), last, ".law." in path)
-        if last == "coefficients":  # N/m^j of the j-th
+        if last == "coefficients" and path.endswith("]"):  # N/m^j of the j-th
             j = int(path.removesuffix("]").rpartition("[")[2]) + 1
             name, unit = name.replace("coefficient", f"coefficient {j}"), unit if j == 1 else f"{unit}^{j}"
     return name + (f" of beam {int(beam) + 1}" if name and beam else ""), unit
@@ -98,10 +102,18 @@ def _of_part(scene: Scene, beam: str | None, kind: str, number: int, last: str, 
     if kind == "dashpots" and last == "rotational":
         return f"rotational damping of {_owner(scene, beam, kind, number)}", "N m s/rad"
     name, unit = (LAWS if of_law else PARTS).get(last, ("", ""))
-    acts = kind in ("stops", "elements") and last not in ("z", "on", "to")
-    if acts and (part := _part(scene, beam, kind, number)) and part.coordinate.rotation:
+    part = _part(scene, beam, kind, number) if kind in ACTING and last not in ("z", "on", "to") else None
+    if of_law and part is not None and last != "coefficients":
+        unit = part.law.units.get(last, unit)
+    if part is not None and _turns(part):
         unit = TURNED.get(unit, unit)
     return name + (f" of {_owner(scene, beam, kind, number)}" if name and kind in OWNERS else ""), unit
+
+
+def _turns(part: Any) -> bool:
+    """Whether a part acts on a rotation."""
+    coordinate, direction = getattr(part, "coordinate", None), getattr(part, "direction", None)
+    return bool(coordinate.rotation) if coordinate is not None else isinstance(direction, str) and "r" in direction
 
 
 def coordinate_name(name: str) -> str:

@@ -24,7 +24,7 @@ from fembeam.plot.style import (
     verbatim,
 )
 from fembeam.plot.units import length_for, unit_for
-from fembeam.scene import signals_of
+from fembeam.scene import signals_of, turns_at
 from fembeam.scene.parameters import scalars
 from fembeam.support import require
 from solvers.problem import counted
@@ -102,7 +102,8 @@ def branch(
 def bifurcation(found: Bifurcation, axes: Axes | None = None) -> Figure:
     """Largest |u| of every settled period against the parameter; `axes` to draw into, None makes a figure."""
     figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
-    scale, unit = length_for(found.cloud()[1])
+    peaks = found.cloud()[1]
+    scale, unit = unit_for(peaks, "rad") if turns_at(found.z) else length_for(peaks)
     _draw_cloud(axis, found.cloud(), scale)
     axis.set(xlabel=verbatim(found.title), ylabel=f"max |{displacement_name(found.z)}| / {unit}")
     return figure

@@ -143,9 +143,10 @@ class Scene:
         if not callable(getattr(self.damping, "modal_coefficients", None)):
             raise TypeError(f"damping must be ModalDamping or Rayleigh, got {self.damping!r} in Scene; "
                             "write ModalDamping(0.01)")  # fmt: skip
-        if self.named and not self._ways_to_fall:
-            still = not any(self.gravity) if isinstance(self.gravity, (list, tuple)) else self.gravity == 0.0
-            require(still, "gravity needs a body that moves along x, y or z, joined ones all along the same",
+        if self.named and not self._ways_to_fall and all(part.named for part in self.bodies):
+            given = self.gravity
+            pulls = any(given) if isinstance(given, (list, tuple)) else is_finite(given) and given != 0.0
+            require(not pulls, "gravity needs a body that moves along x, y or z, joined ones all along the same",
                     self.gravity, "Scene", "give the structure more dofs, or leave it out")  # fmt: skip
         object.__setattr__(self, "gravity", _fall(self.gravity, self._ways_to_fall))
         self._check_base()

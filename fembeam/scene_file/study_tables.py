@@ -28,7 +28,7 @@ from fembeam.beams import on_beam
 from fembeam.model import Branch, Orbit, check_mode_count, load_period
 from fembeam.model.run_csv import SECTIONS, Output
 from fembeam.response import checked_damping, checked_oscillators
-from fembeam.scene import Place, is_directed, path_of, quoted, value_of
+from fembeam.scene import Place, is_directed, path_of, quoted, value_of, with_value
 from fembeam.scene_file.keys import Constructors, parameters
 from fembeam.structures import direction_of, require_components
 from fembeam.study import (
@@ -442,8 +442,7 @@ class BranchTable:
 
     def check(self, scene: Scene) -> None:
         """Raise ValueError for a parameter that the scene does not have, or loads without a period."""
-        path_of(scene, self.parameter)
-        load_period(scene)
+        load_period(with_value(scene, path_of(scene, self.parameter), self.span[1]))
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> FoundBranch:
         """The branch, saved as ``branch.npz`` in the folder; continues where an interrupted one left that.

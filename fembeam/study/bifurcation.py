@@ -44,7 +44,7 @@ class Bifurcation(Result):
     parameter: Vector
     strobes: Vector
     peaks: Vector
-    title: str
+    title: str = ""
 
     def __repr__(self) -> str:
         at, each = counted(len(self.parameter), "value"), counted(self.peaks.shape[1], "period")

@@ -95,7 +95,7 @@ class Peak(Result):
 
     def _units(self) -> dict[str, str]:
         length, (unit, of_place) = "rad" if turns_at(self.z) else "m", self.units
-        slope = f"{length}/{unit if unit.isalpha() else f'({unit})'}" if unit else length
+        slope = f"{length}/{unit if unit.isalpha() else f'({unit})'}" if unit else ""
         return {"value": unit, "at": of_place, "amplitude": length, "slope": slope}
 
     def _parts(self) -> list[Part]:
@@ -184,7 +184,7 @@ def check_peak(
     require(paths[0] != paths[1], "over must be another number than the parameter", over, where, "name both")
     pair = np.shape(span) == (2,) and all(map(is_finite, span)) and span[0] < span[1]
     require(bool(pair), "span must be two values, ascending", span, where, "give (lowest, highest)")
-    load_period(scene)
+    load_period(with_value(scene, paths[0], float(span[1])))
     for value in p:
         with_value(scene, over, float(value))  # what the part refuses, it refuses here
     return p

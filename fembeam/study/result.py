@@ -43,7 +43,7 @@ class Result(Printed, ABC):
         return frame.set_index(self.INDEX) if self.INDEX else frame
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the table as CSV with units, whole or not at all."""
+        """Write the table as CSV, with units where they are known, whole or not at all."""
         write_rows(Path(path), self.table(), self._units())
 
     def plain(self) -> dict[str, Any]:

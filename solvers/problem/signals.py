@@ -205,17 +205,17 @@ def _values(signal: Signal, t: Any, load: int) -> Array:
     return values
 
 
-def _refuse_jumps(signal: Signal, t: Array, values: Array, load: int) -> None:
-    """ValueError where a signal changes within 1e-9 of its steepest cell nearly as much as in all of it."""
-    first = steepest = int(np.argmax(np.abs(np.diff(values))))
-    for _ in range(_JUMP_ROUNDS):
+def _refuse_jumps(signal: Signal, t: Array, values: Array, rtol: float, load: int) -> None:
+    """ValueError where a signal changes within 1e-9 of its steepest cell by half as much as in all of it, or more."""
+    found, changes = values, []
+    for _ in range(1 + _JUMP_ROUNDS):
+        steepest = int(np.argmax(np.abs(np.diff(found))))
         t = np.linspace(t[steepest], t[steepest + 1], 65)
         found = _values(signal, t, load)
-        steepest = int(np.argmax(np.abs(np.diff(found))))
-    left = abs(found[steepest + 1] - found[steepest])
-    if left > 0.5 * abs(values[first + 1] - values[first]) > 0.0:
+        changes.append(np.ptp(found))
+    if changes[-1] > max(0.5 * changes[0], rtol * np.abs(values).max()):
         raise ValueError(
-            f"the signal of load {load} jumps at t = {t[steepest]:g} s; only slope and curvature may, at nodes(): "
+            f"the signal of load {load} jumps at t = {t[0]:g} s; only slope and curvature may, at nodes(): "
             "let it rise within a short time"
         )
 
@@ -236,7 +236,7 @@ def _sample(signal: Signal, duration: float, rtol: float, load: int) -> tuple[fl
         if error <= rtol * np.abs(values).max():
             return duration / cells, np.stack([values, spline(t, 1), spline(t, 2)], axis=1)
         if cells >= _FEWEST_PLACES:
-            _refuse_jumps(signal, t, values, load)
+            _refuse_jumps(signal, t, values, rtol, load)
         cells *= 2
     raise ValueError(
         f"the signal of load {load} is too rough to sample to {rtol:g}; give it tones() or nodes(), or loosen rtol"

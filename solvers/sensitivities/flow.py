@@ -93,6 +93,8 @@ class Flow:
         alike = (law.knots for law in more if len(law.knots) == len(own))  # those of a sum may fall together
         knots = np.array([(lowest, *one, np.inf) for one in (own, *alike)])
         low, high = knots[:, acting.segment[s] - 1].max(), knots[:, acting.segment[s]].min()
+        if not low < high:  # a knot moves by more than its segment
+            low, high = knots[0, acting.segment[s] - 1], knots[0, acting.segment[s]]
         low = low + _INSIDE * abs(low) + 1e-300 if np.isfinite(low) else low  # above zero, where a force may jump
         high = high * (1.0 - _INSIDE)
         return np.clip(motion.delta, low, high), motion.rate

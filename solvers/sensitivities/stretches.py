@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from solvers.compiled.state import law_parameters
-from solvers.problem import Array, Solution, System, dense
+from solvers.problem import Array, Solution, System, counted, dense
 from solvers.problem import event_list as at
 from solvers.sensitivities import laws
 from solvers.sensitivities.elements import Slider, motion_of
@@ -21,7 +21,7 @@ from solvers.sensitivities.sampled import SampledLoads
 _RADIANS = 1.5  # of the fastest motion in one panel
 _FEWEST = 2  # panels between two events while elements act
 _MOST_OF_DECAY = 1000  # panels between two events for damping: where they are too few it has decayed long ago
-_MOST_WORK, _BESIDE = 25_000_000, 20  # panels × (blocks + these) above which a run is refused: 10 min
+_MOST_WORK, _BESIDE = 25_000_000, 5  # panels × (blocks + these) above which a run is refused: minutes
 _MOST_KEPT = 1 << 22  # numbers of the run's motion that are held at once
 
 
@@ -177,7 +177,7 @@ class Division:
         if self.panels * (len(self.k) + _BESIDE) > _MOST_WORK:
             raise ValueError(
                 f"a sensitivity through motion of {speed:.3g} rad/s takes {self.panels} panels up to t = {end:.6g} s, "
-                f"too many for {len(self.k)} modes; keep fewer modes, or shorten the run"
+                f"too many for {counted(len(self.k), 'mode')}; keep fewer modes, or shorten the run"
             )
         edges = np.linspace(0.0, 1.0, own + 1)
         if marks.size:

@@ -148,9 +148,9 @@ def unbalanced(record: Record, rtol: float) -> bool:
     if residual <= allowed:
         return False
     allowed = tolerated_energy(handled + float(np.abs(record.exchanged()).sum()), rtol)
-    if residual > allowed:
-        cancels = np.finfo(float).eps * _told(system, motion) / max(stored.max(), begun)
-        allowed += handled * min(float(cancels), CANCELLED)
+    size = max(float(stored.max()), begun)
+    if residual > allowed and size > 0.0:
+        allowed += handled * min(np.finfo(float).eps * _told(system, motion) / size, CANCELLED)
     if residual > allowed:
         told = _energy_of_loads(system, record.t[rows]) + _energy_over_distances(record, motion)
         allowed += ROUNDINGS * np.finfo(float).eps * told
