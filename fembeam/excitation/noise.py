@@ -22,7 +22,7 @@ from fembeam.support import is_finite, is_whole, number
 
 AUTOMATIC_LINES = 4096  # kurtosis 3 - 1.5/4096: Gaussian to far below any sampling error
 FEWEST_LINES = 8  # below this a sum of cosines is visibly not Gaussian (kurtosis under 2.8)
-MOST_LINES = 10**8  # numbers of 1.6 GB
+MOST_LINES = 10**8  # whose amplitudes and phases take 1.6 GB
 
 
 @dataclass(frozen=True, repr=False)
