@@ -2,10 +2,10 @@
 
 The energy handled is the initial energy, the input, the energy dissipated and stored, and for every contact the peak
 force times the peak indentation. A run with an energy balance is refused if the residual exceeds (`MULTIPLE` rtol +
-`ROUNDING`) times the energy handled. A rounding of the terms that cancel in the energy, of coordinates that stretch
-stiff parts and of coupled blocks, is tolerated too, up to `CANCELLED` of that; and `ROUNDINGS` roundings of the energy
-that each load would give alone, as loads may cancel, and of that of each contact's peak force over the distances whose
-difference δ is: at rest nothing else is handled.
+`ROUNDING`) times the energy handled. `ROUNDED` roundings of the terms that cancel in the energy, of coordinates that
+stretch stiff parts and of coupled blocks, are tolerated too, up to `CANCELLED` of that; and `ROUNDINGS` roundings of
+the energy that each load would give alone, as loads may cancel, and of that of each contact's peak force over the
+distances whose difference δ is: at rest nothing else is handled.
 
 Without a balance, let E be the energy of the motion minus the steady response to tones. At the end it is at most that
 at the start plus the work of the contacts,
@@ -35,6 +35,7 @@ from solvers.problem.friction import ARM, MU, SPIN, may_pull
 
 MULTIPLE, ROUNDING = 20.0, 1e-9  # see the module; relative to the energy handled
 CANCELLED = 1e-6  # the most tolerated of what cancels in the energy, relative to the energy handled
+ROUNDED = 3.0  # roundings tolerated of what cancels: 0.7 was met in 108 runs on three processors
 ROUNDINGS = 100.0  # tolerated of the energy of loads that cancel, and of distances that make δ
 FACTOR = 4.0  # margin of the check without a balance
 _SAMPLES = 64  # samples whose balance is checked, the last one among them
@@ -150,7 +151,7 @@ def unbalanced(record: Record, rtol: float) -> bool:
     allowed = tolerated_energy(handled + float(np.abs(record.exchanged()).sum()), rtol)
     size = max(float(stored.max()), begun)
     if residual > allowed and size > 0.0:
-        allowed += handled * min(np.finfo(float).eps * _told(system, motion) / size, CANCELLED)
+        allowed += handled * min(ROUNDED * np.finfo(float).eps * _told(system, motion) / size, CANCELLED)
     if residual > allowed:
         told = _energy_of_loads(system, record.t[rows]) + _energy_over_distances(record, motion)
         allowed += ROUNDINGS * np.finfo(float).eps * told
