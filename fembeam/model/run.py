@@ -150,7 +150,7 @@ class Run(Histories, Printed):
         Raises
         ------
         ValueError : an unknown path (with the nearest one), values near the present one that the scene refuses, a law
-            with an infinite slope at its surface, a run read from a file, one too long for its modes (some 10 min).
+            with an infinite slope at its surface, a run read from a file, one that would take many minutes.
         solvers.NoDerivativeError : a contact grazes, so that there is none.
 
         Warns
