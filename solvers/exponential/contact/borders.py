@@ -406,14 +406,14 @@ def _may_be_expected(problem, scratch, s, j):
 
 @inner
 def border_ahead(problem, tables, state, scratch, node_set, level):
-    """(time after the start of the step, element, border) of the first border that the step just tried crosses.
+    """(time after the start, element, border, slope) of the first border that the step just tried crosses.
 
-    (inf, -1, -1) if there is none, (inf, `UNRESOLVED`, -1) if the step is too long to tell. Of one that is crossed
-    ``scratch.ahead`` gets the slope of its margin there, or 0. ``scratch.expected`` gets the one that the step after
-    this one may cross.
+    (inf, -1, -1, 0) if there is none, (inf, `UNRESOLVED`, -1, 0) if the step is too long to tell. The slope is that of
+    the margin by time, 0 if it is not known. ``scratch.expected`` gets the border that the step after this one may
+    cross.
     """
     scratch.expected[WHEN] = np.inf
-    first, element, border, h = np.inf, -1, -1, tables.contact_step[level]
+    first, element, border, fall, h = np.inf, -1, -1, 0.0, tables.contact_step[level]
     for s in range(problem.law.size):
         count = problem.border_count[s]
         if _has_no_borders(problem, state, s):
@@ -426,12 +426,12 @@ def border_ahead(problem, tables, state, scratch, node_set, level):
             if time == np.inf:
                 time = _crossing_between_nodes(problem, tables, state, scratch, s, j, node_set, h)
             if time == np.inf and _may_be_hidden(scratch, s, j):
-                return np.inf, UNRESOLVED, -1
+                return np.inf, UNRESOLVED, -1, 0.0
             if time < first:
-                first, element, border, scratch.ahead[SLOPE] = time, s, j, slope
+                first, element, border, fall = time, s, j, slope
             elif time == np.inf and _may_be_expected(problem, scratch, s, j):
                 _expect(tables, scratch, s, j, node_set, h)
-    return first, element, border
+    return first, element, border, fall
 
 
 @merged

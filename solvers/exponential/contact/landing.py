@@ -68,18 +68,15 @@ from solvers.compiled.state import (
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import land_on_circle
 from solvers.exponential.contact.borders import margins_later, margins_of, passed
-from solvers.exponential.contact.crossings import CLEAR, ROUNDING, TOO_LONG, before_landing, force_turns, side_at
+from solvers.exponential.contact.crossings import CLEAR, ROUNDING, before_landing, force_turns, side_at
 from solvers.exponential.contact.first_step import BALANCED, NEW, NODE_SET
 from solvers.exponential.contact.landing_step import INDENTATION, ROOT, SINCE, TIME, landing_step, start_landing
 from solvers.exponential.contact.node_response import (
     BATCH,
-    BORDER,
     DIFFERENCE,
-    ELEMENT,
     LANDED,
     REACH,
     RTOL,
-    SLOPE,
     START,
     STRAIGHT,
     WITHIN,
@@ -90,8 +87,6 @@ from solvers.exponential.contact.peaks import state_peaks
 from solvers.exponential.contact.slider_margins import margin_rounding
 from solvers.problem.friction import CODE, FREE, MU, PEAK, SLIDES, STICK, STIFFNESS
 
-OPENED = 2  # place in `Scratch.landed`: 1 + stop whose opening the step in ``scratch.stages`` ends at, or 0
-LAST_RESORT = 3  # the same: 1 where no step could end before the border, nor the landing last longer than one
 _MOST_TRIALS = 8  # iterations for the step that ends at an output time
 _MIDPOINT_UP_TO = 1e-4  # change of a landing's length, relative, that the midpoint rule makes: its error is the cube
 _CLASSICAL_UP_TO = 4e-3  # the same by the classical rule, of order 4
@@ -118,17 +113,35 @@ _LAST_STEP = 0.09  # indentation, in units of the deepest, below which a landing
 _LAST_STEP_ROOT, _MOST_ROOT = 0.2, 0.25  # the same with u = δ^{1/2}, over reach², and at most: errors grow like u⁹
 
 
+class Landing(NamedTuple):
+    """What came of trying to land."""
+
+    stop: int  # landed on; another one if that leaves its segment before; -1 if no landing was done
+    element: int  # whose border is crossed before; -1 if none is, `UNRESOLVED` if a shorter step must tell
+    border: int  # its number
+    opened: bool  # whether it is the stop's own, before an opening at which the step in ``scratch.stages`` ends
+
+
 class Search(NamedTuple):
-    """How a landing on a bend or border is looked for."""
+    """How a landing on a bend or border is looked for; lengths are those of the step in its variable."""
 
     variable: int  # of the step, see the module
     forward: float  # 1, or -1 where the variable falls
     first: float  # length of the first trial
-    longest: float  # length up to which a zero is looked for
+    longest: float  # length up to which a zero is looked for; 0 if a landing is not worth a trial
     largest: float  # scale of the event function
     tolerance: float  # value of the event function that is zero
     sign: float  # of the slip that begins, see `_event_function`; 0 if none does
-    slope: float  # of the event function at the first trial; 0 if it is not known
+    slope: float  # of the event function by length at the first trial; 0 if it is not known
+
+
+class Zero(NamedTuple):
+    """Zero of an event function at the end of a step."""
+
+    length: float  # of the step
+    value: float  # left of the event function; NaN if no zero is found
+    rounding: float  # of the value
+    slope: float  # of the event function by length; 0 if it is not known
 
 
 def landing_reach(rtol: float) -> float:
@@ -418,7 +431,7 @@ def may_land(problem, tables, state, scratch, stop, direction, time_to_knot):
         problem, stop, state.x
     ):
         return False
-    if scratch.landed[LAST_RESORT] > 0:
+    if scratch.last_resort[0] > 0:
         return True
     if direction < 0 and state.segment[stop] == 1:
         limit = _LAST_STEP
@@ -461,7 +474,7 @@ def _is_resolved(problem, tables, state, scratch, variable, stop):
     return (
         _time_increases(scratch, state.x.size)
         and before * after >= least * before * before
-        and _rate_error(problem, scratch, share) <= (_ANY_ERROR if scratch.landed[LAST_RESORT] > 0 else 1.0)
+        and _rate_error(problem, scratch, share) <= (_ANY_ERROR if scratch.last_resort[0] > 0 else 1.0)
     )
 
 
@@ -482,15 +495,10 @@ def _falls_on_surface(problem, state, scratch, stop, border):
 
 @merged
 def land(problem, tables, state, scratch, stop, direction, time_to_knot):
-    """Try to land on the knot of ``stop`` in a direction, 1 up or -1 down, about ``time_to_knot`` s ahead.
-
-    Returns ``stop`` after a landing, another stop if that crosses a border before, else -1. If -1 is due to a border of
-    a law with memory that is crossed before, ``scratch.landed`` holds its element and number.
-    """
+    """Try to land on the knot of ``stop`` in a direction, 1 up or -1 down, about ``time_to_knot`` s ahead."""
     size, t, rate = state.x.size, state.now[T], scratch.start_motion[stop, 1]
-    scratch.landed[ELEMENT], scratch.landed[OPENED] = -1, 0
     if not may_land(problem, tables, state, scratch, stop, direction, time_to_knot):
-        return -1
+        return Landing(-1, -1, -1, False)
     longest, kappa = longest_time(problem, tables, state, scratch), tables.time_exponent[1 + stop]
     leaving = direction < 0 and state.segment[stop] == 1
     start_landing(problem, tables, state, scratch, stop, np.int64(ROOT))
@@ -500,24 +508,20 @@ def land(problem, tables, state, scratch, stop, direction, time_to_knot):
     take_step(problem, tables, state, scratch, variable, stop, span)
     landed = x[size]
     time_rounding = surface_tolerance(problem, stop, state.x) / abs(rate)  # the distance may be rounding
-    if not t <= landed <= t + min(4.0 * time_to_knot, longest) + time_rounding:
-        return -1
-    if not _is_resolved(problem, tables, state, scratch, variable, stop):
-        return -1
+    in_time = t <= landed <= t + min(4.0 * time_to_knot, longest) + time_rounding
+    if not (in_time and _is_resolved(problem, tables, state, scratch, variable, stop)):
+        return Landing(-1, -1, -1, False)
     other = before_landing(problem, tables, state, scratch, stop, np.bool_(0), w, x)
-    if other == CLEAR and problem.parts[PASSED]:
-        scratch.landed[ELEMENT], scratch.landed[BORDER] = passed(problem, state, scratch, -1, -1, w, x)
-        own = scratch.landed[ELEMENT] == stop and variable == ROOT
-        if own and _falls_on_surface(problem, state, scratch, stop, scratch.landed[BORDER]):
-            scratch.landed[ELEMENT] = -1
-        if scratch.landed[ELEMENT] != -1:
-            other = TOO_LONG
-            scratch.landed[OPENED] = stop + 1 if own else 0
     if other != CLEAR:
-        return max(other, -1)
+        return Landing(max(other, -1), -1, -1, False)
+    if problem.parts[PASSED]:
+        element, border = passed(problem, state, scratch, -1, -1, w, x)
+        opened = element == stop and variable == ROOT
+        if element != -1 and not (opened and _falls_on_surface(problem, state, scratch, stop, border)):
+            return Landing(-1, element, border, opened)
     level = _knot(problem, state, stop, direction)
     accepted = accept_landing(problem, tables, state, scratch, variable, stop, level, span)
-    return stop if accepted else -1
+    return Landing(stop if accepted else -1, -1, -1, False)
 
 
 @inlined
@@ -678,68 +682,75 @@ def _rounded(problem, tables, scratch, stop, size):
 
 
 @inlined
-def _try_length(problem, tables, state, scratch, search, stop, span, before):
-    """Take the step of length ``span``; if the last trial, of length ``before``, is near, by a short step from there.
+def _try_length(problem, tables, state, scratch, search, stop, length, before):
+    """Take the step of some ``length``; if the last trial, of length ``before``, is near, by a short step from there.
 
     Returns whether it was near.
     """
-    change, variable = span - before, search.variable
-    if abs(change) > _CLASSICAL_UP_TO * span:
-        take_step(problem, tables, state, scratch, variable, stop, search.forward * span)
+    change, variable = length - before, search.variable
+    if abs(change) > _CLASSICAL_UP_TO * length:
+        take_step(problem, tables, state, scratch, variable, stop, search.forward * length)
         return False
-    count = 2 if abs(change) <= _MIDPOINT_UP_TO * span else 4
+    count = 2 if abs(change) <= _MIDPOINT_UP_TO * length else 4
     _short_step(problem, tables, state, scratch, variable, stop, search.forward * change, count)
     return True
 
 
+@inlined
+def _rounding_there(problem, tables, state, scratch, search, stop, slope):
+    """Rounding of an event function where a step has ended, with its slope by the length of the step."""
+    rounding = _STAGNATION * search.largest
+    if rubs(problem, stop) and search.variable != TIME:
+        of_delta = slope * _rounded(problem, tables, scratch, stop, state.x.size)
+        rounding = max(rounding, 10.0 * search.tolerance, min(abs(of_delta), _MOST_ROUNDING * search.largest))
+    return rounding
+
+
 @merged
 def _locate(problem, tables, state, scratch, stop, border, search):
-    """Locate a zero of the event function by the secant rule, safeguarded by a bracket.
+    """Locate a zero of the event function by the secant rule, safeguarded by a bracket; returns a `Zero`.
 
-    Returns (length, remaining value, its rounding, by that of δ too, slope there or 0 if it is not known). The value is
-    NaN if there is no zero up to ``longest``. Trials that differ little are short steps from the last one.
+    Trials that differ little are short steps from the last one.
     """
-    variable, forward, span, longest, largest, tolerance, sign, slope = search
-    x, span_before = scratch.stages[LANDED], 0.0
-    w, begin, end = scratch.stages[START], scratch.margin_begin[stop], scratch.margin_end[stop]
-    value_before, begins_on_border = np.inf, False
+    largest, slope, sign, length = search.largest, search.slope, search.sign, search.first
+    x, begin, end = scratch.stages[LANDED], scratch.margin_begin[stop], scratch.margin_end[stop]
+    last_length, last_value, begins_on_border = 0.0, np.inf, False
     # With a known slope and no other margin of friction to compare, the value at the start is not needed.
-    if slope == 0.0 or forward < 0.0 or problem.border_count[stop] > 1 or not rubs(problem, stop):
-        value_before, sign = _event_function(problem, tables, state, scratch, stop, border, w, sign, begin)
-        begins_on_border = (value_before if border >= 0 else abs(value_before)) <= _BEGINS_ON_BORDER * largest
-    shortest = 0.0 if border >= 0 and not begins_on_border else 0.1 * span
+    if slope == 0.0 or search.forward < 0.0 or problem.border_count[stop] > 1 or not rubs(problem, stop):
+        w = scratch.stages[START]
+        last_value, sign = _event_function(problem, tables, state, scratch, stop, border, w, sign, begin)
+        begins_on_border = (last_value if border >= 0 else abs(last_value)) <= _BEGINS_ON_BORDER * largest
+    shortest = 0.0 if border >= 0 and not begins_on_border else 0.1 * length
     if begins_on_border and slope == 0.0:  # the secant needs another point
-        span_before = 0.9 * span
-        take_step(problem, tables, state, scratch, variable, stop, forward * span_before)
-        value_before, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
-    low, high, rounding, near = span_before if value_before > 0.0 else 0.0, longest, 0.0, slope
+        last_length = 0.9 * length
+        take_step(problem, tables, state, scratch, search.variable, stop, search.forward * last_length)
+        last_value, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
+    low, high = last_length if last_value > 0.0 else 0.0, search.longest
+    promised, known, rounding = slope != 0.0, slope, 0.0
     for _ in range(_MOST_BORDER_TRIALS):
-        is_near = _try_length(problem, tables, state, scratch, search, stop, span, span_before)
+        is_near = _try_length(problem, tables, state, scratch, search, stop, length, last_length)
         value, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
-        if slope != 0.0 and forward > 0.0 and abs(value) > _PROMISED * largest:
+        if promised and search.forward > 0.0 and abs(value) > _PROMISED * largest:
             if rubs(problem, stop):
-                return span, np.nan, rounding, 0.0  # what the polynomial of a step promised is not there
-            slope = 0.0  # the step was too long for its polynomial
-        if slope == 0.0:
-            slope = (value - value_before) / (span - span_before)
-            near = slope if is_near else 0.0
-        rounding = _STAGNATION * largest
-        if rubs(problem, stop) and variable != TIME:
-            of_delta = slope * _rounded(problem, tables, scratch, stop, state.x.size)
-            rounding = max(rounding, 10.0 * tolerance, min(abs(of_delta), _MOST_ROUNDING * largest))
-        next_span, slope = span - value / slope, 0.0
-        stagnates = abs(next_span - span) <= 1e-15 * span and border >= 0
-        if stagnates or abs(value) <= tolerance or 0.5 * abs(value_before) <= abs(value) <= rounding:
-            break
-        low, high = (span, high) if value > 0.0 else (low, span)
-        if (high < longest or forward < 0.0) and not low < next_span < high:
-            next_span = _bisect(low, high)
+                break  # what the polynomial of a step promised is not there
+            promised = False  # the step was too long for its polynomial
+        if not promised:
+            slope = (value - last_value) / (length - last_length)
+            known = slope if is_near else 0.0
+        promised, rounding = False, _rounding_there(problem, tables, state, scratch, search, stop, slope)
+        following = length - value / slope
+        stagnates = abs(following - length) <= 1e-15 * length and border >= 0
+        if stagnates or abs(value) <= search.tolerance or 0.5 * abs(last_value) <= abs(value) <= rounding:
+            return Zero(length, value, rounding, known)
+        low, high = (length, high) if value > 0.0 else (low, length)
+        if (high < search.longest or search.forward < 0.0) and not low < following < high:
+            following = _bisect(low, high)
             if rubs(problem, stop):  # the landing may begin on the same border
-                next_span = max(next_span, 2.0 * shortest)
-        if not shortest < next_span <= longest or next_span == span:
-            return span, np.nan, rounding, 0.0
-        span_before, value_before, span = span, value, next_span
-    return span, value, rounding, near
+                following = max(following, 2.0 * shortest)
+        if not shortest < following <= search.longest or following == length:
+            break
+        last_length, last_value, length = length, value, following
+    return Zero(length, np.nan, rounding, 0.0)
 
 
 @merged
@@ -752,46 +763,64 @@ def _is_within_segment(problem, state, stop, x):
 
 
 @merged
-def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess):
-    """Try to land on border ``border`` of ``stop``, on its bend if that is -1, about ``guess`` s ahead; whether it did.
+def _search_for(problem, tables, state, scratch, stop, border, guess, slope, opened):
+    """How to look for border ``border`` of ``stop``, -1 for its bend, about ``guess`` s ahead; the `Search` begins.
 
-    If another border is crossed before, ``scratch.landed`` holds its element and number; its first entry is -1 if there
-    is none, `UNRESOLVED` if a shorter step must tell.
+    ``slope`` is that of its margin by time, or 0; for ``opened`` see `Landing`.
     """
     limit, largest = longest_time(problem, tables, state, scratch), scratch.bend_values[scratch.bend_values.size - 1]
-    tolerance, sign = 1e-10 * largest, 0.0
-    opened, slope_in_time = scratch.landed[OPENED] == stop + 1, scratch.ahead[SLOPE] if border >= 0 else 0.0
+    tolerance, variable, exponent = 1e-10 * largest, np.int64(TIME), 1.0  # a literal would be compiled for itself
     if border >= 0:  # if it were missed by more, the next step might cross it in the wrong direction
         largest, tolerance = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
-    scratch.landed[ELEMENT], scratch.landed[OPENED] = -1, 0
-    variable, exponent, forward = np.int64(TIME), 1.0, 1.0  # a literal would be compiled for itself
-    if border >= 0 and scratch.control[NEW] and scratch.control[NODE_SET] == stop + 1:
-        variable, exponent = np.int64(SINCE), 1.0 / tables.time_exponent[stop + 1]
+        if scratch.control[NEW] and scratch.control[NODE_SET] == stop + 1:
+            variable, exponent = np.int64(SINCE), 1.0 / tables.time_exponent[stop + 1]
     promising = promising_time(scratch, variable, stop) if rubs(problem, stop) else np.inf
     if not 0.0 < guess <= min(limit, promising):
-        return False
+        return Search(variable, 1.0, 0.0, 0.0, largest, tolerance, 0.0, 0.0)
     start_landing(problem, tables, state, scratch, stop, variable)
-    w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
-    limit, span = limit**exponent, guess**exponent
-    slope = slope_in_time * guess / (exponent * span)
     if border >= 0 and variable == TIME and _may_end_at_opening(problem, tables, state, scratch, stop):
-        variable, forward, limit = np.int64(ROOT), -1.0, w[size + 1]
-        span, sign, slope = _guess_before_opening(problem, tables, state, scratch, stop, border, guess, opened)
+        u = scratch.stages[START, state.x.size + 1]
+        first, sign, slope = _guess_before_opening(problem, tables, state, scratch, stop, border, guess, opened)
         largest, tolerance = scratch.largest[stop, border], 0.1 * scratch.noise[stop, border]
-    search = Search(variable, forward, span, limit, largest, tolerance, sign, slope)
-    span, value, rounding, slope = _locate(problem, tables, state, scratch, stop, border, search)
-    time = span if variable == TIME else x[size] - w[size]
-    found = abs(value) <= max(_FOUND * largest, rounding)
+        return Search(np.int64(ROOT), -1.0, first, u, largest, tolerance, sign, slope)
+    first = guess**exponent
+    slope = slope * guess / (exponent * first) if border >= 0 else 0.0
+    return Search(variable, 1.0, first, limit**exponent, largest, tolerance, 0.0, slope)
+
+
+@inlined
+def _has_risen(problem, state, scratch, stop, border, zero, time):
+    """Whether a margin has risen to its zero in a landing of length ``time`` s: then it was below zero before."""
+    if zero.slope == 0.0 or _others_near_zero(problem, scratch, stop, border):
+        return border >= 0 and _was_below(problem, state, scratch, stop, border, zero.value, 1e-3 * time)
+    return zero.slope > 0.0
+
+
+@merged
+def land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess, slope, opened):
+    """Try to land on border ``border`` of ``stop``, on its bend if that is -1, about ``guess`` s ahead.
+
+    ``slope`` is that of its margin there by time, 0 if it is not known; for ``opened`` see `Landing`.
+    """
+    none = Landing(-1, -1, -1, False)
+    search = _search_for(problem, tables, state, scratch, stop, border, guess, slope, opened)
+    if search.longest == 0.0:
+        return none
+    zero, variable = _locate(problem, tables, state, scratch, stop, border, search), search.variable
+    w, x, size = scratch.stages[START], scratch.stages[LANDED], state.x.size
+    time = zero.length if variable == TIME else x[size] - w[size]
+    found = abs(zero.value) <= max(_FOUND * search.largest, zero.rounding)
     if not (found and _within_tolerance(problem, tables, state, scratch, variable, stop, time)):
-        return False
-    crossed_upward = slope > 0.0
-    if slope == 0.0 or _others_near_zero(problem, scratch, stop, border):
-        crossed_upward = border >= 0 and _was_below(problem, state, scratch, stop, border, value, 1e-3 * time)
-    if crossed_upward or before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
-        return False  # the margin was below zero before, or another surface or bend is crossed first
-    scratch.landed[ELEMENT], scratch.landed[BORDER] = passed(problem, state, scratch, stop, border, w, x)
-    if scratch.landed[ELEMENT] != -1:
-        return False
+        return none
+    if _has_risen(problem, state, scratch, stop, border, zero, time):
+        return none
+    if before_landing(problem, tables, state, scratch, stop, np.bool_(1), w, x) != CLEAR:
+        return none
+    element, other = passed(problem, state, scratch, stop, border, w, x)
+    if element != -1:
+        return Landing(-1, element, other, False)
     if not _is_within_segment(problem, state, stop, x):
-        return False
-    return accept_landing(problem, tables, state, scratch, variable, stop, np.inf, forward * span)
+        return none
+    forward = search.forward * zero.length
+    accepted = accept_landing(problem, tables, state, scratch, variable, stop, np.inf, forward)
+    return Landing(stop if accepted else -1, -1, -1, False)

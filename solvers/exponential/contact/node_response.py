@@ -55,7 +55,7 @@ DELTAS, RATES, FORCES, KNOWN = range(4)
 """Rows of `Scratch.local_motion`: m, m/s, N at points around a node, and the values they are interpolated from."""
 RTOL, REACH = range(2)  # places in Scratch.accuracy
 WHEN, SLOPE = range(2)  # places in Scratch.ahead and expected: s; slope by time of the margin at its zero, 0 if unknown
-ELEMENT, BORDER, ONLY_EXPECTED = range(3)  # places in Scratch.ahead_of; the first two also in expected_of and landed
+ELEMENT, BORDER, ONLY_EXPECTED = range(3)  # places in Scratch.ahead_of; the first two also in expected_of
 _KINK_JUMP = 1e-2  # jump of a third derivative, over signal/dt³, that is a kink; smooth signals have a tenth
 STRAIGHT = 1e-9  # change of a law's slope on a step, in units of the slope, that is rounding
 _WORK_TOLERANCE = 10.0  # part of a force, in units of rtol × the largest force, that a step may leave out for its work
@@ -132,8 +132,7 @@ class Scratch(NamedTuple):
     margin_before: Annotated[Any, "B"]  # of the element whose border is landed on
     largest: Annotated[Any, "E, B"]  # largest margins on the step tried last
     noise: Annotated[Any, "E, B"]  # their rounding
-    border: Annotated[Any, "int 1"]  # border that the step tried last crosses first, -1 if it is a bend
-    landed: Annotated[Any, "int 4"]  # element and border that a landing would cross first, else -1; see `landing`
+    last_resort: Annotated[Any, "int 1"]  # 1 where no step could end before a border, nor the landing last longer
     block_motion: Annotated[Any, "2*M, S"]  # p and v at the nodes; as the next two see `many_stops`
     block_force: Annotated[Any, "2*M, S"]  # state rates of the blocks by the forces at the nodes
     pair_weights: Annotated[Any, "M8"]  # products of a read row with the push of another row

@@ -14,62 +14,66 @@ from solvers.compiled.parts import FIRST_END, GO_BEYOND, LAND, LAND_IN_TIME, par
 from solvers.exponential.contact.borders import UNRESOLVED, border_ahead, renew_all, renew_border
 from solvers.exponential.contact.crossings import first_bend
 from solvers.exponential.contact.landing import land, land_on_bend_or_border
-from solvers.exponential.contact.node_response import BORDER, ELEMENT, LANDED, SLOPE
+from solvers.exponential.contact.node_response import LANDED
 
 
-@part(LAND, types.UniTuple(types.int64, 2), types.int64, types.int64, REAL)
+@part(LAND, types.Tuple((*[types.int64] * 4, types.boolean)), types.int64, types.int64, REAL)
 def land_first(problem, tables, state, scratch, stop, direction, time_to_knot):
-    """Land on the knot reached first, be it that of another stop; (stop, direction), or (-1, 0) on failure."""
+    """Land on the knot reached first, be it that of another stop: (stop, direction, and the last three of `Landing`).
+
+    The stop is -1 on failure.
+    """
     for _ in range(problem.law.size + 1):
         landed = land(problem, tables, state, scratch, stop, direction, time_to_knot)
-        if landed == stop or landed < 0:
-            return landed, direction
-        above = indentation(problem, landed, scratch.stages[LANDED]) > problem.knots[landed, state.segment[landed]]
-        stop, direction = landed, 1 if above else -1
-    return -1, 0
+        if landed.stop == stop or landed.stop < 0:
+            return landed.stop, direction, landed.element, landed.border, landed.opened
+        stop = landed.stop
+        above = indentation(problem, stop, scratch.stages[LANDED]) > problem.knots[stop, state.segment[stop]]
+        direction = 1 if above else -1
+    return -1, 0, -1, -1, False
 
 
-@part(FIRST_END, types.Tuple((REAL, types.int64)), types.int64, types.int64, types.boolean)
+@part(FIRST_END, types.Tuple((REAL, types.int64, types.int64, REAL)), types.int64, types.int64, types.boolean)
 def first_end(problem, tables, state, scratch, node_set, level, is_new):
-    """(time after the start of the step just tried, stop) of the first bend or border that it crosses, or (inf, -1).
+    """(time after the start, element, border, slope) of the first bend or border that the step just tried crosses.
 
-    ``scratch.border`` gets the number of the border, -1 of a bend. The stop is `UNRESOLVED` if the step is too long to
-    decide.
+    The border is -1 of a bend; the slope is that of its margin by time, 0 if it is not known. The element is -1 if
+    there is none, `UNRESOLVED` if the step is too long to decide.
     """
     first, stop = first_bend(problem, tables, state, scratch, node_set, level, is_new)
-    time, element, border = border_ahead(problem, tables, state, scratch, node_set, level)
-    scratch.border[0] = border if time < first else -1
+    time, element, border, slope = border_ahead(problem, tables, state, scratch, node_set, level)
     if element == UNRESOLVED and level < tables.contact_step.size - 1:
-        return np.inf, UNRESOLVED
-    return (time, element) if time < first else (first, stop)
+        return np.inf, UNRESOLVED, -1, 0.0
+    return (time, element, border, slope) if time < first else (first, stop, -1, 0.0)
 
 
-@part(LAND_IN_TIME, types.Tuple((types.int64, types.boolean)), types.int64, REAL)
-def land_in_time(problem, tables, state, scratch, stop, first):
-    """Land on the bend or border of ``stop``, ``first`` s ahead, or on a border reached before; (stop, success).
+_ON = types.Tuple((types.int64, types.int64, types.boolean))
 
-    ``scratch.border`` holds the number of the border, -1 of a bend, before and after, ``scratch.ahead`` the slope of
-    its margin. "In time": unlike that of a landing on a knot, the length of the step has to be found.
+
+@part(LAND_IN_TIME, _ON, types.int64, types.int64, REAL, REAL, types.boolean)
+def land_in_time(problem, tables, state, scratch, element, border, time, slope, opened):
+    """Land on a bend or border, ``time`` s ahead, or on a border reached before; (element, border, success).
+
+    ``border`` is -1 of a bend; ``slope`` is that of its margin there, 0 if it is not known; ``opened`` is that of
+    `Landing`. "In time": unlike that of a landing on a knot, the length of the step has to be found.
     """
-    border, guess = scratch.border[0], first
+    is_bend = border < 0
     for _ in range(problem.law.size + 1):
-        if land_on_bend_or_border(problem, tables, state, scratch, stop, border, guess):
-            scratch.border[0] = border
-            return stop, True
-        if scratch.border[0] < 0 or scratch.landed[ELEMENT] < 0:
+        landed = land_on_bend_or_border(problem, tables, state, scratch, element, border, time, slope, opened)
+        if landed.stop >= 0:
+            return element, border, True
+        if is_bend or landed.element < 0:
             break
-        stop, border = scratch.landed[ELEMENT], scratch.landed[BORDER]
-        scratch.ahead[SLOPE] = 0.0
-    return stop, False
+        element, border, slope, opened = landed.element, landed.border, 0.0, False
+    return element, border, False
 
 
-@part(GO_BEYOND, types.void, types.int64, types.boolean)
-def go_beyond(problem, state, scratch, stop, alone):
-    """Begin what follows a bend, or a border and, unless ``alone``, others reached with it."""
-    border = scratch.border[0]
+@part(GO_BEYOND, types.void, types.int64, types.int64, types.boolean)
+def go_beyond(problem, state, scratch, element, border, alone):
+    """Begin what follows a bend, -1, or a border and, unless ``alone``, others reached with it."""
     if border < 0:
-        scratch.side[stop] = -scratch.side[stop]
+        scratch.side[element] = -scratch.side[element]
     elif alone:
-        renew_border(problem, state, scratch, stop, border)
+        renew_border(problem, state, scratch, element, border)
     else:
-        renew_all(problem, state, scratch, stop, border)
+        renew_all(problem, state, scratch, element, border)

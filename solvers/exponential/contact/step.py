@@ -10,6 +10,7 @@ memory or of friction, see `borders`.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import types
@@ -71,7 +72,7 @@ from solvers.exponential.contact.first_step import (
     level_of,
 )
 from solvers.exponential.contact.kinks import land_on_kink_or_limit
-from solvers.exponential.contact.landing import LAST_RESORT, may_land
+from solvers.exponential.contact.landing import may_land
 from solvers.exponential.contact.node_response import (
     BORDER,
     ELEMENT,
@@ -156,7 +157,7 @@ def _leave_or_rest(problem, tables, state, scratch, stop, time_to_knot):
     rate, rounding = abs(scratch.start_motion[stop, 1]), surface_tolerance(problem, stop, state.x)
     if abs(time_to_knot) * rate <= OUTSIDE * rounding and rate <= rate_tolerance(problem, stop, state.x):
         return RESTS
-    scratch.landed[LAST_RESORT] = rounding <= shortest_step(tables) * rate
+    scratch.last_resort[0] = rounding <= shortest_step(tables) * rate
     return NEITHER
 
 
@@ -192,49 +193,49 @@ def _predict(problem, tables, state, scratch, level):
             state.count[CALLS] += S
 
 
+class Attempt(NamedTuple):
+    """What one contact step tried has shown."""
+
+    error: float  # in units of the tolerance; inf if the forces are not found, or the step crosses a bend or border
+    time: float  # s, after the start of the step, of the first bend or border crossed; inf if there is none
+    element: int  # whose bend or border it is; -1 if there is none
+    border: int  # its number; -1 of a bend
+    slope: float  # of its margin by time; 0 if it is not known
+
+
 @merged
 def _attempt(problem, tables, state, scratch, node_set, level):
-    """Attempt one contact step; (error in units of the tolerance, time, stop).
+    """Attempt one contact step.
 
-    If the step crosses a bend or border, these are the time of this after the start and its stop, ``scratch.border``
-    holds the number of the border, -1 of a bend, and the error is inf. Otherwise they are (inf, -1). A step on the
-    shortest level counts as within the tolerance if its forces are found: what is at rest has none.
+    One on the shortest level counts as within the tolerance if its forces are found: what is at rest has none.
     """
-    shortest, first, crossing = level == tables.contact_step.size - 1, np.inf, -1
-    scratch.border[0] = -1
+    shortest = level == tables.contact_step.size - 1
+    time, element, border, slope = np.inf, -1, -1, 0.0
     free_response(problem, tables, state, scratch, node_set, level)
     _predict(problem, tables, state, scratch, level)
     if not solve_forces(problem, tables, state, scratch, node_set, level):
-        return np.inf, first, crossing
+        return Attempt(np.inf, time, element, border, slope)
     end_state(problem, tables, state, scratch, node_set, level)
     if leaves_segment(problem, tables, state, scratch, node_set, level):
         if shortest and state.now[T] == 0.0 and problem.parts[BEHIND]:
-            crossing, scratch.border[0] = border_behind(problem, state, scratch)
-        return (np.inf, 0.0, crossing) if crossing >= 0 else (1.0 if shortest else np.inf, first, crossing)
+            element, border = border_behind(problem, state, scratch)
+        if element >= 0:
+            return Attempt(np.inf, 0.0, element, border, slope)
+        return Attempt(1.0 if shortest else np.inf, time, element, border, slope)
     if problem.parts[FIRST_END]:
-        first, crossing = first_end(problem, tables, state, scratch, node_set, level, scratch.control[NEW] > 0)
-    if crossing == UNRESOLVED:
-        return np.inf, np.inf, -1
-    at_once = first == 0.0 and scratch.border[0] >= 0 and (problem.table_dt.size > 0 or rubs(problem, crossing))
-    if crossing >= 0 and (shortest or not at_once):
-        return 1.0 if shortest else np.inf, first, crossing
+        is_new = scratch.control[NEW] > 0
+        time, element, border, slope = first_end(problem, tables, state, scratch, node_set, level, is_new)
+    if element == UNRESOLVED:
+        return Attempt(np.inf, np.inf, -1, -1, 0.0)
+    at_once = time == 0.0 and border >= 0 and (problem.table_dt.size > 0 or rubs(problem, element))
+    if element >= 0 and (shortest or not at_once):
+        return Attempt(1.0 if shortest else np.inf, time, element, border, slope)
     error = step_error(problem, tables, state, scratch, node_set, level)
-    if crossing >= 0:  # a step that does not resolve the motion cannot tell what happens at its start
-        return (np.inf, first, crossing) if error <= 1.0 else (error, np.inf, -1)
-    return min(error, 1.0) if shortest else error, first, crossing
-
-
-@merged
-def _try_friction_border(problem, tables, state, scratch, time_to_knot):
-    """Land on a border of friction that a landing on a knot would have crossed; returns whether it was done."""
-    stop, level = scratch.landed[ELEMENT], scratch.control[NEXT_LEVEL]
-    if stop < 0 or not rubs(problem, stop):
-        return False
-    scratch.border[0], scratch.ahead[SLOPE] = scratch.landed[BORDER], 0.0
-    stop, landed = land_in_time(problem, tables, state, scratch, stop, time_to_knot)
-    if landed:
-        _continue_after(problem, tables, state, scratch, stop, level, False)
-    return landed
+    if element < 0:
+        return Attempt(min(error, 1.0) if shortest else error, time, element, border, slope)
+    if error <= 1.0:
+        return Attempt(np.inf, time, element, border, slope)
+    return Attempt(error, np.inf, -1, -1, 0.0)  # what does not resolve the motion cannot tell what happens at its start
 
 
 @merged
@@ -243,17 +244,19 @@ def _try_border_ahead(problem, tables, state, scratch, time_to_knot):
 
     Returns whether it was done, and the longest step, s, that ends well before a border that is only expected.
     """
-    at, level, expected = scratch.ahead[WHEN], scratch.control[NEXT_LEVEL], scratch.ahead_of[ONLY_EXPECTED] > 0
+    ahead, level = scratch.ahead_of, scratch.control[NEXT_LEVEL]
+    at, slope, expected = scratch.ahead[WHEN], scratch.ahead[SLOPE], ahead[ONLY_EXPECTED] > 0
     time = at - state.now[T]
     scratch.ahead[WHEN] = 0.0
     if not 0.0 < time < time_to_knot or scratch.control[NEW]:
         return False, np.inf
-    scratch.border[0] = scratch.ahead_of[BORDER]
-    stop, landed = land_in_time(problem, tables, state, scratch, scratch.ahead_of[ELEMENT], time)
+    element, border, landed = land_in_time(
+        *(problem, tables, state, scratch, ahead[ELEMENT], ahead[BORDER], time, slope, np.bool_(0))
+    )
     if landed:
-        _continue_after(problem, tables, state, scratch, stop, level, False)
+        _continue_after(problem, tables, state, scratch, element, border, level, False)
     elif expected:
-        scratch.ahead[WHEN], scratch.ahead_of[ONLY_EXPECTED] = at, 0
+        scratch.ahead[WHEN], ahead[ONLY_EXPECTED] = at, 0
         return False, _SHORTLY_BEFORE * time
     return landed, np.inf
 
@@ -270,24 +273,32 @@ def _expect_border(state, scratch):
 
 
 @merged
-def _continue_after(problem, tables, state, scratch, stop, level, alone):
+def _continue_after(problem, tables, state, scratch, element, border, level, alone):
     """Go on after a landing on a bend or border: what it ends is renewed, the next step is the first of a segment."""
     control = scratch.control
     state.count[STEPS] += 1
     if state.now[T] < state.now[T_END]:
-        go_beyond(problem, state, scratch, stop, alone)
+        go_beyond(problem, state, scratch, element, border, alone)
     control[NEW], control[NODE_SET], control[NEXT_LEVEL] = SEGMENT, 0, level
-    if rubs(problem, stop):  # the contact may have just begun, its force still singular
-        control[NODE_SET] = entry_nodes(problem, tables, state, stop, control[NEXT_LEVEL])
+    if rubs(problem, element):  # the contact may have just begun, its force still singular
+        control[NODE_SET] = entry_nodes(problem, tables, state, element, control[NEXT_LEVEL])
 
 
 @merged
 def _try_landing(problem, tables, state, scratch, stop, direction, time_to_knot):
-    """Land on the knot reached first, and switch its stop; returns whether it was done."""
-    stop, direction = land_first(problem, tables, state, scratch, stop, direction, time_to_knot)
+    """Land on the knot reached first, and switch its stop, or on a border of friction before it; returns success."""
+    level = scratch.control[NEXT_LEVEL]
+    stop, direction, element, border, opened = land_first(
+        problem, tables, state, scratch, stop, direction, time_to_knot
+    )
+    if stop < 0 and is_planar(problem) and element >= 0 and rubs(problem, element):
+        element, border, landed = land_in_time(
+            *(problem, tables, state, scratch, element, border, time_to_knot, 0.0, opened)
+        )
+        if landed:
+            _continue_after(problem, tables, state, scratch, element, border, level, False)
+        return landed
     if stop < 0:
-        if is_planar(problem):
-            return _try_friction_border(problem, tables, state, scratch, time_to_knot)
         return False
     state.count[STEPS] += 1
     if state.now[T] < state.now[T_END]:
@@ -314,9 +325,12 @@ def _try_landing_now(problem, tables, state, scratch, stop, direction, time_to_k
     return landed, longest
 
 
-@part(ACCEPT, types.void, *[types.int64] * 3, REAL, types.int64)
-def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, crossing):
-    """Complete the accepted step: samples, energy, event record, next level; or the end of the run inside it."""
+@part(ACCEPT, types.void, *[types.int64] * 3, REAL, *[types.int64] * 2)
+def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, element, border):
+    """Complete the accepted step: samples, energy, event record, next level; or the end of the run inside it.
+
+    ``element`` and ``border`` are those of `Attempt`.
+    """
     h = tables.contact_step[level]
     end = state.now[T] + h
     run_ends = end >= state.now[T_END]
@@ -332,23 +346,23 @@ def _accept(problem, tables, energy_tables, state, scratch, node_set, level, wan
         account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h)
     if state.event_record.shape[0]:
         record_forces(problem, state, scratch, STEP, end, node_set, level)
-    if problem.parts[FIRST_END] and crossing < 0:
+    if problem.parts[FIRST_END] and element < 0:
         _expect_border(state, scratch)
     finish_step(problem, tables, state, scratch, node_set, level)
     _adapt(tables, scratch, level, node_set, wanted, error)
-    if crossing >= 0:  # crossed within the shortest step
-        go_beyond(problem, state, scratch, crossing, True)
-        scratch.control[NEW] = SEGMENT if scratch.border[0] >= 0 else 0
+    if element >= 0:  # crossed within the shortest step
+        go_beyond(problem, state, scratch, element, border, True)
+        scratch.control[NEW] = SEGMENT if border >= 0 else 0
     state.count[STEPS] += 1
 
 
 @inlined
-def _end_before(tables, state, scratch, level, stop, first):
+def _end_before(tables, state, scratch, level, tried):
     """Level of a step that ends shortly before what the step tried crosses, so that the next one can land there."""
-    scratch.ahead[WHEN] = state.now[T] + first if scratch.border[0] >= 0 else 0.0
-    ahead = scratch.ahead_of
-    ahead[ELEMENT], ahead[BORDER], ahead[ONLY_EXPECTED] = stop, scratch.border[0], 0
-    return min(max(level + 1, level_of(tables, _SHORTLY_BEFORE * first)), level + _CROSSING_KNOWN)
+    scratch.ahead[WHEN] = state.now[T] + tried.time if tried.border >= 0 else 0.0
+    scratch.ahead[SLOPE], ahead = tried.slope, scratch.ahead_of
+    ahead[ELEMENT], ahead[BORDER], ahead[ONLY_EXPECTED] = tried.element, tried.border, 0
+    return min(max(level + 1, level_of(tables, _SHORTLY_BEFORE * tried.time)), level + _CROSSING_KNOWN)
 
 
 @part(CONTACT, types.int64)
@@ -356,7 +370,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
     """One accepted step in contact, a landing on what is near, else by collocation; returns a status code."""
     control, shortest = scratch.control, tables.contact_step.size - 1
     time_to_knot, stop, direction = _nearest_knot(problem, state, scratch)
-    scratch.landed[LAST_RESORT] = 0
+    scratch.last_resort[0] = 0
     if time_to_knot < shortest_step(tables) or control[NEXT_LEVEL] == shortest:
         found = _leave_or_rest(problem, tables, state, scratch, stop, time_to_knot)
         if found == MOVES_OUT:
@@ -381,28 +395,34 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
     level = level_of(tables, longest) if longest < tables.contact_step[wanted] else wanted
     copy(scratch.side, scratch.side_at_begin, scratch.side.size)
     while True:
-        error, first, crossing = _attempt(problem, tables, state, scratch, node_set, level)
-        if error <= 1.0 and (crossing < 0 or not rubs(problem, crossing)):
+        tried = _attempt(problem, tables, state, scratch, node_set, level)
+        element, border = tried.element, tried.border
+        if tried.error <= 1.0 and (element < 0 or not rubs(problem, element)):
             break
-        ended, on_it = crossing, first == 0.0 and scratch.border[0] >= 0  # the step begins on the border
-        if crossing >= 0 and not on_it:
-            ended, on_it = land_in_time(problem, tables, state, scratch, crossing, first)
+        on_it = tried.time == 0.0 and border >= 0  # the step begins on the border
+        if element >= 0 and not on_it:
+            element, border, on_it = land_in_time(
+                *(problem, tables, state, scratch, element, border, tried.time, tried.slope, np.bool_(0))
+            )
         if on_it:
-            _continue_after(problem, tables, state, scratch, ended, max(level, wanted), first == 0.0)
+            _continue_after(problem, tables, state, scratch, element, border, max(level, wanted), tried.time == 0.0)
             return RUNNING
-        if error <= 1.0:  # the step is the shortest, and no landing is possible within it
+        if tried.error <= 1.0:  # the step is the shortest, and no landing is possible within it
             break
         if level == shortest:
             return LAW_NOT_FINITE if _force_not_finite(problem, state, scratch) else STEP_TOO_SMALL
         copy(scratch.side_at_begin, scratch.side, scratch.side.size)
         state.count[REJECTED] += 1
-        if crossing >= 0:
-            level = _end_before(tables, state, scratch, level, crossing, first)
+        if tried.element >= 0:
+            level = _end_before(tables, state, scratch, level, tried)
         else:
-            level = wanted = min(shortest, level + _levels_shorter(error))
+            level = wanted = min(shortest, level + _levels_shorter(tried.error))
     if level == shortest and _relaxes_within(problem, tables, state, scratch):
         return STEP_TOO_SMALL
-    _accept(problem, tables, energy_tables, state, scratch, node_set, level, wanted, error, crossing)
+    _accept(
+        *(problem, tables, energy_tables, state, scratch, node_set, level, wanted),
+        *(tried.error, tried.element, tried.border),
+    )
     return RUNNING
 
 
