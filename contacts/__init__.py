@@ -12,14 +12,7 @@ measurements. Imports: numpy, scipy, numba. Begin with `law`, then `power_laws`.
 
 from contacts.curves import PiecewiseLinear, Tabulated
 from contacts.custom import CustomLaw, law
-from contacts.identification import (
-    Estimate,
-    Identified,
-    IdentifiedLoop,
-    identify,
-    identify_loop,
-    read_collisions,
-)
+from contacts.identification import Estimate, Identified, IdentifiedLoop, identify, identify_loop, read_collisions
 from contacts.law import Law
 from contacts.memory import (
     Border,
@@ -40,38 +33,9 @@ from contacts.sums import Sum, parallel
 from contacts.viscous import KelvinVoigt, Viscoelastic
 
 __all__ = [
-    "PUBLISHED",
-    "Border",
-    "BoucWen",
-    "Bounce",
-    "Coulomb",
-    "CustomLaw",
-    "CustomMemoryLaw",
-    "ElastoPlastic",
-    "Estimate",
-    "Hertz",
-    "Hysteretic",
-    "Identified",
-    "IdentifiedLoop",
-    "Iwan",
-    "Jenkins",
-    "KelvinVoigt",
-    "Law",
-    "PiecewiseLinear",
-    "Polynomial",
-    "Segment",
-    "Sum",
-    "Tabulated",
-    "Viscoelastic",
-    "WaltonBraun",
-    "achieved_restitution",
-    "bounce",
-    "damping_factor_for",
-    "identify",
-    "identify_loop",
-    "law",
-    "memory_law",
-    "parallel",
-    "read_collisions",
+    "PUBLISHED", "Border", "BoucWen", "Bounce", "Coulomb", "CustomLaw", "CustomMemoryLaw", "ElastoPlastic", "Estimate",
+    "Hertz", "Hysteretic", "Identified", "IdentifiedLoop", "Iwan", "Jenkins", "KelvinVoigt", "Law", "PiecewiseLinear",
+    "Polynomial", "Segment", "Sum", "Tabulated", "Viscoelastic", "WaltonBraun", "achieved_restitution", "bounce",
+    "damping_factor_for", "identify", "identify_loop", "law", "memory_law", "parallel", "read_collisions",
     "restitution",
-]
+]  # fmt: skip

@@ -13,21 +13,7 @@ from reduction.truncation import below, carrying, fewest_modes, moved_mass
 from reduction.whirl import Whirl, critical_speeds, whirl
 
 __all__ = [
-    "AccuracyError",
-    "Basis",
-    "Whirl",
-    "below",
-    "carrying",
-    "craig_bampton",
-    "critical_speeds",
-    "dofs_inside",
-    "fewest_modes",
-    "guyan",
-    "modal_basis",
-    "moved_mass",
-    "oriented",
-    "static_shapes",
-    "static_share",
-    "whirl",
+    "AccuracyError", "Basis", "Whirl", "below", "carrying", "craig_bampton", "critical_speeds", "dofs_inside",
+    "fewest_modes", "guyan", "modal_basis", "moved_mass", "oriented", "static_shapes", "static_share", "whirl",
     "with_residual",
-]
+]  # fmt: skip

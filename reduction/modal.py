@@ -40,11 +40,7 @@ MOST_CORRECTIONS = 10
 
 
 def modal_basis(
-    M: Matrix,
-    K: Matrix,
-    count: int | None = None,
-    indices: Sequence[int] | None = None,
-    root: Matrix | None = None,
+    M: Matrix, K: Matrix, count: int | None = None, indices: Sequence[int] | None = None, root: Matrix | None = None
 ) -> Basis:
     """Mass-normalised modes, lowest first: K φ = ω² M φ, φᵀMφ = 1.
 

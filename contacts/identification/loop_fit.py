@@ -163,17 +163,11 @@ class Fit:
         remarks = remarks_on(m.loops, estimates, correlations, correlation, noise)
         for remark in remarks:
             warnings.warn(remark, stacklevel=3)
-        fitted = np.split(
-            m.strength * (self.residual(self.theta) + m.target), np.cumsum([d.size for d in m.delta])[:-1]
-        )
+        borders = np.cumsum([d.size for d in m.delta])[:-1]
+        fitted = np.split(m.strength * (self.residual(self.theta) + m.target), borders)
+        law = model.law({name: float(x) for name, x in named.items()})
         return IdentifiedLoop(
-            *(
-                model.law({name: float(x) for name, x in named.items()}),
-                estimates,
-                found[-1],
-                noise * m.strength,
-                correlations,
-            ),
+            *(law, estimates, found[-1], noise * m.strength, correlations),
             tuple(MeasuredLoop(*rows) for rows in zip(m.delta, m.force, fitted, strict=True)),
             *(remarks, confidence),
         )

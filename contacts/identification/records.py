@@ -131,11 +131,8 @@ def _split(record: dict[str, Vector], index: int) -> list[Samples]:
         before = (last[i - 1] + a) // 2 if i else 0
         after = (b + first[i + 1]) // 2 if i + 1 < len(first) else len(delta)
         reach = max(2, (b - a) // 4)
-        out.append(
-            whole.part(
-                _extent(delta, a, max(before, a - reach), -1), _extent(delta, b - 1, min(after, b + reach) - 1, 1) + 1
-            )
-        )
+        start = _extent(delta, a, max(before, a - reach), -1)
+        out.append(whole.part(start, _extent(delta, b - 1, min(after, b + reach) - 1, 1) + 1))
     return out
 
 

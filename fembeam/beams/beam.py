@@ -231,11 +231,7 @@ def element_matrices(beam: Beam, nodes: Vector) -> tuple[sparse.csr_matrix, spar
     basis = Basis(MeshLine(np.tile([0.0, 1.0], count)[None], ends), ElementLineHermite(), intorder=exact)
     h = np.diff(nodes)
     z = nodes[:-1, None] + h[:, None] * basis.quadrature[0][0]
-    w = {
-        "h": np.broadcast_to(h[:, None], z.shape),
-        "EI": beam.bending_stiffness(z),
-        "rho_A": beam.line_mass(z),
-    }
+    w = {"h": np.broadcast_to(h[:, None], z.shape), "EI": beam.bending_stiffness(z), "rho_A": beam.line_mass(z)}
     more = beam.axial_force != 0 or beam.foundation != 0
     K, M = ((stiffness if more else bending).assemble(basis, **w), inertia.assemble(basis, **w))
     return K, M, basis.nodal_dofs

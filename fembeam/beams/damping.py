@@ -66,13 +66,9 @@ class ModalDamping:
         size = M.shape[0]
         if not any(self.zeta):
             return sparse.csr_matrix((size, size))
-        require(
-            size <= FULL_MATRIX_LIMIT,
-            f"the full damping matrix of ModalDamping needs at most {FULL_MATRIX_LIMIT} free dofs",
-            size,
-            "ModalDamping.matrix",
-            "reduce the model, use fewer elements, or use Rayleigh",
-        )
+        require(size <= FULL_MATRIX_LIMIT,
+                f"the full damping matrix of ModalDamping needs at most {FULL_MATRIX_LIMIT} free dofs", size,
+                "ModalDamping.matrix", "reduce the model, use fewer elements, or use Rayleigh")  # fmt: skip
         basis = reduction.modal_basis(M, K, root=root)
         momentum = M @ basis.vectors
         return sparse.csr_matrix(momentum * self.modal_coefficients(basis.omega) @ momentum.T)

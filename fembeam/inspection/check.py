@@ -121,11 +121,7 @@ class Check(Printed):
 
 
 def check(
-    model: Model,
-    duration: float | None = None,
-    dt: float | None = None,
-    discard: float = 0.0,
-    said: Sequence[str] = (),
+    model: Model, duration: float | None = None, dt: float | None = None, discard: float = 0.0, said: Sequence[str] = ()
 ) -> Check:
     """Look at a scene and its model; `Scene.check` explains it. `said`: what was warned of when the model was made."""
     touched, failed = expected(model)

@@ -254,13 +254,8 @@ def _record_of(path: str | Path) -> dict[str, Any]:
             require("branch" in file, f"{path} holds no branch", sorted(file), "Model.resume", advice)
             record = json.loads(str(file["branch"]))
         missing = sorted(RECORDED - set(record))
-        require(
-            not missing,
-            f"{path} must hold all of a branch, {missing} are missing",
-            sorted(record),
-            "Model.resume",
-            advice,
-        )
+        require(not missing, f"{path} must hold all of a branch, {missing} are missing", sorted(record),
+                "Model.resume", advice)  # fmt: skip
     except (ValueError, TypeError, EOFError, AttributeError, BadZipFile, zlib.error) as error:
         said = str(error)
         if said.startswith(str(path)):

@@ -285,11 +285,7 @@ class Model(Printed, ModalEquations):
         return frequency_response(self, omega, input, places, absolute, body, slipping)
 
     def orbit(
-        self,
-        period: int = 1,
-        start: ArrayLike | Orbit | None = None,
-        shots: int | None = None,
-        progress: bool = False,
+        self, period: int = 1, start: ArrayLike | Orbit | None = None, shots: int | None = None, progress: bool = False
     ) -> Orbit:
         """Find a periodic motion by shooting.
 

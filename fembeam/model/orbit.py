@@ -217,9 +217,7 @@ def _periods_to_repeat(orbit: Orbit, T: float) -> int:
             continue
         later = delayed(orbit.model.system, orbit.found.phase)
         end = state_after(later, orbit.found.whole, shorter * T, orbit.found.method)[: 2 * n]
-        scale = np.concatenate(
-            (np.repeat(np.abs(orbit.state[:n]).max(), n), np.repeat(np.abs(orbit.state[n:]).max(), n))
-        )
+        scale = np.repeat([np.abs(orbit.state[:n]).max(), np.abs(orbit.state[n:]).max()], n)
         if np.all(np.abs(end - orbit.state) <= SAME * scale + 1e-300):
             return shorter
     return orbit.period

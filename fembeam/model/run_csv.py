@@ -28,24 +28,10 @@ FRICTION_UNITS = {"t_in": "s", "t_out": "s", "angle_in": "rad", "angle_out": "ra
                   "energy_loss": "J"}  # fmt: skip
 DIGITS = "%.12g"
 Output = Literal[
-    "displacement",
-    "velocity",
-    "acceleration",
-    "absolute displacement",
-    "absolute velocity",
-    "absolute acceleration",
-    "slope",
-    "moment",
-    "shear",
-    "stress",
-    "section forces",
-    "indentation",
-    "force",
-    "friction",
-    "work",
-    "friction loss",
+    "displacement", "velocity", "acceleration", "absolute displacement", "absolute velocity", "absolute acceleration",
+    "slope", "moment", "shear", "stress", "section forces", "indentation", "force", "friction", "work", "friction loss",
     "reactions",
-]
+]  # fmt: skip
 UNITS = {  # of what `histories` can be asked for
     **dict.fromkeys(get_args(Output), "m"),
     **{"velocity": "m/s", "absolute velocity": "m/s", "acceleration": "m/s²", "absolute acceleration": "m/s²"},

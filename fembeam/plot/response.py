@@ -66,10 +66,7 @@ LEGEND_COLUMNS, LEGEND_ROW = 2, 0.2  # of mode shapes; a row's height in units o
 
 @styled
 def time_history(
-    run: Run,
-    window: tuple[float, float] | None = None,
-    z: Any = None,
-    axes: Axes | Sequence[Axes] | None = None,
+    run: Run, window: tuple[float, float] | None = None, z: Any = None, axes: Axes | Sequence[Axes] | None = None
 ) -> Figure:
     """Displacement and contact force over a readable window, contacts shaded.
 

@@ -149,11 +149,7 @@ def _motion_at(body: BodyMatrices, vectors: Vector, place: Any) -> Vector:
 
 
 def placed_shapes(
-    body: BodyMatrices,
-    vectors: Vector,
-    loaded: Sequence[LocalCoordinate],
-    carried: Vector,
-    parts: Mapping[str, Any],
+    body: BodyMatrices, vectors: Vector, loaded: Sequence[LocalCoordinate], carried: Vector, parts: Mapping[str, Any]
 ) -> PlacedShapes:
     """The shapes of a body from its part of the basis, (N, n), and what supports that move carry, (N_all, k).
 

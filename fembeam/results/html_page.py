@@ -55,10 +55,7 @@ ORDER = ("rig", "time_history", "psd", "densities", "response_spectrum", "contac
 
 
 def write_page(
-    folder: str | Path,
-    source: Source | None = None,
-    warnings: Sequence[str] = (),
-    files: Sequence[Path] | None = None,
+    folder: str | Path, source: Source | None = None, warnings: Sequence[str] = (), files: Sequence[Path] | None = None
 ) -> Path:
     """Write `report.html` from the tables and figures in a result folder.
 

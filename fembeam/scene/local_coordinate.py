@@ -22,12 +22,7 @@ if TYPE_CHECKING:
 
 Of = Literal["displacement", "rotation"]
 KINDS = ("displacement", "rotation")  # the place in it is the derivative of u
-UNITS = {
-    "indentation": ("m", "rad"),
-    "speed": ("m/s", "rad/s"),
-    "force": ("N", "N m"),
-    "impulse": ("N s", "N m s"),
-}
+UNITS = {"indentation": ("m", "rad"), "speed": ("m/s", "rad/s"), "force": ("N", "N m"), "impulse": ("N s", "N m s")}
 
 
 def unit_of(quantity: str, rotations: Iterable[Any]) -> str:

@@ -21,15 +21,7 @@ from fembeam.scene.impactor import Impactor
 from fembeam.scene.joined_scene import merged
 from fembeam.scene.local_coordinate import LocalCoordinate
 from fembeam.scene.part_places import at_parts, names_of, part_places, placed_parts, require_number
-from fembeam.scene.parts import (
-    Dashpot,
-    LumpedMass,
-    PointForce,
-    PointMoment,
-    Spring,
-    Stop,
-    Support,
-)
+from fembeam.scene.parts import Dashpot, LumpedMass, PointForce, PointMoment, Spring, Stop, Support
 from fembeam.scene.rigid_motions import drifting, rigid_body_modes
 from fembeam.scene.rotors import Disk, Unbalance, driven
 from fembeam.scene.signal_checks import require_motion

@@ -53,11 +53,7 @@ def record(
 
 
 def sine_sweep(
-    amplitude: float,
-    omega0: float,
-    omega1: float,
-    duration: float,
-    rate: Literal["linear", "logarithmic"] = "linear",
+    amplitude: float, omega0: float, omega1: float, duration: float, rate: Literal["linear", "logarithmic"] = "linear"
 ) -> SineSweep:
     """`SineSweep` for a scene file, where `kind` is the kind of signal."""
     return SineSweep(amplitude, omega0, omega1, duration, rate)

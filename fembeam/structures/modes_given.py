@@ -69,15 +69,8 @@ class GivenModes(NamedBody):
                     "give Γ of every mode in √kg")  # fmt: skip
             gamma[str(direction)] = value
         at, named = placed(nodes, points, names, WHERE)
-        values: dict[str, Any] = {
-            "omega": w,
-            "shapes": phi,
-            "labels": names,
-            "participation": gamma,
-            "nodes": at,
-            "points": named,
-        }
-        for name, value in {**values, "edges": checked_edges(lines, at, WHERE)}.items():
+        values: dict[str, Any] = {"omega": w, "shapes": phi, "labels": names, "participation": gamma, "nodes": at}
+        for name, value in {**values, "points": named, "edges": checked_edges(lines, at, WHERE)}.items():
             object.__setattr__(self, name, value)
 
     @property
@@ -114,14 +107,11 @@ class GivenModes(NamedBody):
         """M = 1, K = diag(ω²); a base motion along x loads with -Γ_x ẍ."""
         require(elements is None, "elements must be left out: a structure has the modes it was given", elements,
                 "Scene.matrices", "ask for modes, or modes='all'")  # fmt: skip
-        n = len(self.omega)
-        along = [c for c in COMPONENTS[:3] if c in self.participation]
-        moved = np.array([self.participation[c] for c in along]).reshape(len(along), n).T
+        n, along = len(self.omega), self.base_directions
         return NamedMatrices(
             *(sparse.eye(n, format="csr"), sparse.diags(self.omega**2).tocsr()),
-            tuple((i, "mode") for i in range(n)),
-            self.rows,
-            moved,
+            *(tuple((i, "mode") for i in range(n)), self.rows),
+            np.array([self.participation[c] for c in along]).reshape(len(along), n).T,
             root=sparse.diags(self.omega).tocsr(),
             accuracy=f"{n} modes as they were given",
             body=self,

@@ -61,19 +61,10 @@ def read_dmig(path: Path) -> Given:
         if not card.rows:
             raise wrong(path, "as a whole", f"columns of {name} after its head", "none; is the file truncated?")
     order = numbered({label for card in square.values() for label in (*card.rows, *card.columns)})
-    found = [
-        (
-            name,
-            assembled(
-                [order[label] for label in card.rows],
-                [order[label] for label in card.columns],
-                card.values,
-                len(order),
-                card.form == SYMMETRIC,
-            ),
-        )
-        for name, card in square.items()
-    ]
+    found = []
+    for name, card in square.items():
+        rows, columns = ([order[label] for label in labels] for labels in (card.rows, card.columns))
+        found.append((name, assembled(rows, columns, card.values, len(order), card.form == SYMMETRIC)))
     return Given(path, tuple(found), tuple(order))
 
 
