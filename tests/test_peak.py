@@ -50,6 +50,7 @@ def test_a_linear_oscillator_over_its_damping():
     np.testing.assert_allclose(found.slope, -height / zeta * (1.0 - 2.0 * zeta**2) / (1.0 - zeta**2), rtol=1e-5)
     assert found.least is None
     assert found.stable.all()
+    assert "slope" in str(found)  # which has no unit here, as ζ has none
 
 
 def test_a_shaken_frame_has_its_peak_above():

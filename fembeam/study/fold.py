@@ -19,7 +19,7 @@ from fembeam.model import Branch, Orbit, observed
 from fembeam.model.branch import Family
 from fembeam.plot.axis_names import axis_name, parameter_unit
 from fembeam.scene import called, path_of, turns_at, value_of
-from fembeam.study.result import Result
+from fembeam.study.result import Result, with_units
 from fembeam.support import Part, by_rows, is_finite, is_whole, require
 from solvers.branches import fold_curve
 from solvers.problem import counted
@@ -78,9 +78,8 @@ class Fold(Result):
         return {"value": self.units[0], "at": self.units[1], "amplitude": "rad" if turns_at(self.z) else "m"}
 
     def _parts(self) -> list[Part]:
-        names = {"value": self.over, "at": f"fold at {self.parameter}"}
-        head = [f"{names.get(name, name)} / {unit}" if unit else names[name] for name, unit in self._units().items()]
-        head.append("")
+        names = self.over, f"fold at {self.parameter}", "amplitude"
+        head = *with_units(names, list(self._units().values())), ""
         rows = [(*list(row.values())[:-1], row["mark"] if row["mark"] == "cusp" else "") for row in self.table()]
         return [repr(self), (head, rows), "; ".join(dict.fromkeys(self.endings))]
 

@@ -26,7 +26,7 @@ from fembeam.model.sensitivity import of_amplitude
 from fembeam.plot.axis_names import axis_name, parameter_unit
 from fembeam.scene import Scene, called, path_of, turns_at, with_value
 from fembeam.study.response_curve import ResponseCurve, Seen
-from fembeam.study.result import Result, column
+from fembeam.study.result import Result, column, with_units
 from fembeam.support import Part, counting, is_finite, numbers, require
 
 Vector = NDArray[np.float64]
@@ -99,9 +99,8 @@ class Peak(Result):
         return {"value": unit, "at": of_place, "amplitude": length, "slope": slope}
 
     def _parts(self) -> list[Part]:
-        names = {"value": self.over, "at": f"peak at {self.parameter}"}
-        head = [f"{names.get(name, name)} / {unit}" if unit else names[name] for name, unit in self._units().items()]
-        head.append("stable")
+        names = self.over, f"peak at {self.parameter}", "amplitude", "slope"
+        head = *with_units(names, list(self._units().values())), "stable"
         rows = [(*list(row.values())[:-1], "yes" if row["stable"] else "no") for row in self.table()]
         one, least = self.least, "least at the end of the values: widen them"
         if one is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -50,6 +51,11 @@ class Result(Printed, ABC):
         """What was found as JSON has it, without models, runs and functions."""
         found: dict[str, Any] = plain(self)
         return found
+
+
+def with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
+    """Names with units where there are any, as heads of tables."""
+    return [f"{name} / {unit}" if unit else name for name, unit in zip(names, units or [""] * len(names), strict=True)]
 
 
 def column(rows: str, name: str, doc: str) -> Any:

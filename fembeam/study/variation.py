@@ -19,7 +19,7 @@ from fembeam.statistics import Estimate
 from fembeam.study.execution.checkpoint import Checkpoint, digested, scene_identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import Plan, Start
-from fembeam.study.result import Result
+from fembeam.study.result import Result, with_units
 from fembeam.study.trial import Asked, Maker, Refused, Trial
 from fembeam.support import Part, is_whole, require
 from solvers.problem import counted
@@ -88,12 +88,12 @@ class Variation(Result):
     @property
     def heads(self) -> list[str]:
         """Paths of the parameters with their units, as tables have them."""
-        return _with_units(self.names, self.units)
+        return with_units(self.names, self.units)
 
     @property
     def value_heads(self) -> list[str]:
         """Names of the quantities with their units, as tables and figures have them."""
-        return _with_units(self.quantities, self.value_units)
+        return with_units(self.quantities, self.value_units)
 
     def _cells(self) -> list[list[Any]]:
         """Values with their standard errors, as printed."""
@@ -135,11 +135,6 @@ class Variation(Result):
         return units | {f"standard error of {name}": units.get(name, "") for name in self.quantities}
 
     figure = plot.variation
-
-
-def _with_units(names: Sequence[str], units: Sequence[str]) -> list[str]:
-    """Names with units where there are any, as heads of tables."""
-    return [f"{name} / {unit}" if unit else name for name, unit in zip(names, units or [""] * len(names), strict=True)]
 
 
 def vary(
