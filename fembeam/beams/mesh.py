@@ -6,16 +6,11 @@ EI κ⁴ - |N| κ² = max(ρA ω², k), which also covers the boundary layers of
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.beams.beam import Beam
 from fembeam.support import require
-
-if TYPE_CHECKING:
-    pass
 
 Vector = NDArray[np.float64]
 

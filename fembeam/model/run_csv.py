@@ -117,14 +117,9 @@ def _sections_at(run: Run, sections: Sequence[str], place: Any) -> dict[str, Vec
     found: dict[str, Vector] = {}
     for what in sections:
         forces = run.section_forces(place) if what == "section forces" else {what: _at(run, what, place)}
-        units = {what: UNITS[what]} if what in forces else {name: _unit_of_force(name) for name in forces}
+        units = {name: UNITS.get(name, "N" if name[0] in "NQ" else "N m") for name in forces}  # N, Q, M, Q2, M2, T
         found |= {f"{name} at {place_words(place)} [{units[name]}]": x for name, x in forces.items()}
     return found
-
-
-def _unit_of_force(name: str) -> str:
-    """Unit of N, Q, M, Q2, M2, T."""
-    return "N" if name[0] in "NQ" else "N m"
 
 
 def _of_stop(run: Run, stop: int, asked: Sequence[str]) -> dict[str, Vector]:
@@ -149,7 +144,8 @@ def _by_components(run: Run, what: str, stop: int, key: str) -> dict[str, Vector
     if values.ndim == 1:
         return {f"{what} {key} [{unit}]": values}
     given = run.places[stop][1] if run.circles[stop, 0] else ("", "along")  # N, and the force along the tangent
-    ways = [direction if isinstance(direction, str) else _vector(direction) for direction in given]
+    # a vector without commas, for the file
+    ways = [one if isinstance(one, str) else f"({' '.join(f'{number:.4g}' for number in one)})" for one in given]
     return {f"{what} {key} {way}".rstrip() + f" [{unit}]": values[:, i] for i, way in enumerate(ways)}
 
 
@@ -164,11 +160,6 @@ def _of_reactions(run: Run) -> dict[str, Vector]:
         else:
             found |= {f"reaction force {about} [N]": one.force, f"reaction moment {about} [N m]": one.moment}
     return found
-
-
-def _vector(direction: Any) -> str:
-    """A direction as the file writes it, without commas."""
-    return f"({' '.join(f'{number:.4g}' for number in direction)})"
 
 
 def _unit(quantity: str, at: Any) -> str:

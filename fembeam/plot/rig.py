@@ -149,16 +149,12 @@ def _inches(axis: Axes) -> float:
 
 def _stacked(scene: Scene, lanes: list[Lane], head: bool) -> float:
     """Put the lanes over each other, bodies on the side of the stop they carry; returns the upper end."""
-    over: list[Lane] = []
-    under: list[Lane] = []
-    for body in range(1, len(lanes)):
-        (over if _over(scene, body) else under).append(lanes[body])
-    lanes[0].middle = 0.0
-    for chain, side in ((over, 1), (under, -1)):
+    for side in (1, -1):
         last = lanes[0]
-        for lane in chain:
-            lane.middle = last.end(side) + side * (LANE + abs(lane.end(-side) - lane.middle))
-            last = lane
+        for lane in lanes[1:]:
+            if _over(scene, lane.body) == (side > 0):
+                lane.middle = last.end(side) + side * (LANE + abs(lane.end(-side) - lane.middle))
+                last = lane
     return max(lane.end(1) for lane in lanes) + 0.1 + HEAD * head
 
 

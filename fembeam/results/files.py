@@ -288,9 +288,7 @@ def print_json(content: Any) -> None:
 
 def write_json(target: Path, content: dict[str, Any]) -> Path:
     """Write JSON."""
-    with written_whole(target) as file:
-        file.write((json_text(content) + "\n").encode())
-    return target
+    return write_text(target, json_text(content))
 
 
 def _finite(value: Any) -> Any:

@@ -148,7 +148,7 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
         stops = [row["name"] for row in found["contacts"]]
         yield f"<h2>Contacts{part}</h2>" + html_table(["", *stops], rows)
     if found.get("outputs"):
-        rows = [[name, *map(_number, row.values())] for name, row in found["outputs"].items()]
+        rows = [[name, *(_scaled(x, 1.0, "") for x in row.values())] for name, row in found["outputs"].items()]
         yield f"<h2>Outputs{part}</h2>" + html_table(["", *OUTPUT_COLUMNS], rows)
     if found["energy"]:
         ledger = found["energy"]
@@ -156,11 +156,6 @@ def _simulation(found: dict[str, Any]) -> Iterator[str]:
         residual = ledger["residual_over_input"]
         yield f"<h2>Energy{' of the whole run' if part else ''}</h2>" + html_table(["", ""], rows)
         yield f'<p class="note">Missing in this balance, an estimate of the error: {residual:.1e} of the input.</p>'
-
-
-def _number(value: float | None) -> str | None:
-    """A number of a table."""
-    return None if value is None else _rounded(value)
 
 
 def _of_stop(row: dict[str, Any], key: str, part: str = "") -> Any:

@@ -428,10 +428,9 @@ class Scene:
 
     def _check_places_of_acting(self) -> None:
         """Raise ValueError unless stops and elements of a beam act on what exists and can move."""
-        for index, stop in enumerate(self.stops):
-            self._check_second(stop.coordinate, "on", f"stops[{index}]{stop.quoted} of Scene")
-        for index, element in enumerate(self.elements):
-            self._check_second(element.coordinate, "to", f"elements[{index}]{element.quoted} of Scene")
+        for name, key in (("stops", "on"), ("elements", "to")):
+            for index, one in enumerate(getattr(self, name)):
+                self._check_second(one.coordinate, key, f"{name}[{index}]{one.quoted} of Scene")
 
     def _check_names(self) -> None:
         """Raise ValueError if two parts have one name, those of bodies included."""

@@ -114,12 +114,12 @@ def _in_space(frame: Frame) -> None:
         require(not missing, f"the section of member {one.name!r} must know {' and '.join(missing)} in space",
                 one.section, "Frame", f"give Section(..., {', '.join(f'{name}=' for name in missing)}), or use "
                 "Section.rectangle, circle or tube")  # fmt: skip
-        foreign = [text for _, text, motion in release_axes(one, np.eye(3)) if not _moves(frame, text, motion)]
+        foreign = [text for _, text, _ in release_axes(one, np.eye(3)) if not _moves(frame, text)]
         require(not foreign, f"releases of member {one.name!r} must be among {', '.join(frame.components)}", foreign,
                 "Frame", "release what the frame carries")  # fmt: skip
 
 
-def _moves(frame: Frame, text: str, motion: Vector) -> bool:
+def _moves(frame: Frame, text: str) -> bool:
     """Whether a release is of a motion that the frame has: in the plane none about axes of the member."""
     if text.split()[1] in COMPONENTS:
         return text.split()[1] in frame.components
