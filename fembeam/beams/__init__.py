@@ -17,7 +17,6 @@ from fembeam.beams.beam import (
 )
 from fembeam.beams.damping import ModalDamping, Rayleigh
 from fembeam.beams.mesh import (
-    ERROR_CONSTANT,
     FREQUENCY_TOLERANCE,
     MESHED_MODES,
     MOST_ELEMENTS,
@@ -28,8 +27,6 @@ from fembeam.beams.mesh import (
     divided,
     on_beam,
     shares,
-    slowness,
-    spread,
     wavenumber,
 )
 from fembeam.beams.mesh_files import chosen_names, lines_of, named_nodes, read_mesh, shown

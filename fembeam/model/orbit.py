@@ -24,17 +24,7 @@ from fembeam.model.extremes import extremes_of
 from fembeam.response import PlacedLog
 from fembeam.scene import signals_of, with_signals
 from fembeam.support import Part, Printed, counting, is_whole, require
-from solvers.orbits import (
-    MORE_DAMPING,
-    at_zero,
-    delayed,
-    orbit_by_damping,
-    periods_of_decay,
-    settled,
-    state_after,
-    with_initial_memory,
-)
-from solvers.orbits import run as run_from
+from solvers import orbits
 from solvers.problem import counted
 from solvers.problem.whole_runs import whole_runs
 
@@ -182,11 +172,11 @@ def orbit(
     """See `Model.orbit`."""
     count, T = checked_period(period), load_period(model.scene)
     if start is None:
-        most = 1 + STARTS + (len(MORE_DAMPING) if count == 1 else 0)
+        most = 1 + STARTS + (len(orbits.MORE_DAMPING) if count == 1 else 0)
         with counting(progress, total=most, unit=" starts", delay=1.0, leave=False) as bar:
             return _from_rest(model, count, T, shots, bar.update)
     if isinstance(start, Orbit):
-        start = at_zero(start.found)
+        start = orbits.at_zero(start.found)
     found = Orbit(model, solvers.orbit(model.system, count * T, start, shots=shots), count)
     _check_not_shorter(found, T)
     return found
@@ -215,8 +205,8 @@ def _periods_to_repeat(orbit: Orbit, T: float) -> int:
     for shorter in range(1, orbit.period):
         if orbit.period % shorter:
             continue
-        later = delayed(orbit.model.system, orbit.found.phase)
-        end = state_after(later, orbit.found.whole, shorter * T, orbit.found.method)[: 2 * n]
+        later = orbits.delayed(orbit.model.system, orbit.found.phase)
+        end = orbits.state_after(later, orbit.found.whole, shorter * T, orbit.found.method)[: 2 * n]
         scale = np.repeat([np.abs(orbit.state[:n]).max(), np.abs(orbit.state[n:]).max()], n)
         if np.all(np.abs(end - orbit.state) <= SAME * scale + 1e-300):
             return shorter
@@ -229,7 +219,7 @@ def _from_rest(model: Model, count: int, T: float, shots: int | None, tried: Cal
     ``tried`` is called after each start.
     """
     try:
-        start = settled(model.system, count * T, solvers.Exponential(1e-8))
+        start = orbits.settled(model.system, count * T, solvers.Exponential(1e-8))
         return orbit(model, count, start, shots)
     except solvers.OrbitError as error:
         refused = error
@@ -240,7 +230,9 @@ def _from_rest(model: Model, count: int, T: float, shots: int | None, tried: Cal
             return attractor.orbit
     if count == 1:
         with suppress(solvers.OrbitError):
-            return Orbit(model, orbit_by_damping(model.system, T, solvers.Exponential(1e-11), shots, tried), count)
+            return Orbit(
+                model, orbits.orbit_by_damping(model.system, T, solvers.Exponential(1e-11), shots, tried), count
+            )
     names = ", ".join(sorted({a.name for a in found}))
     raise solvers.OrbitError(
         f"{STARTS} starts settled to {names}, none to period {count}; shooting after a run from rest: "
@@ -330,10 +322,10 @@ def _starts(model: Model, T: float, starts: int | Sequence[ArrayLike], seed: int
 def _settle(model: Model, T: float, start: Vector, longest: int, method: Any) -> tuple[Vector, Orbit | None]:
     """Last state of a long run (at a multiple of the load's period), and the orbit it has come to."""
     n = len(model.omega)
-    x = with_initial_memory(model.system, start)
+    x = orbits.with_initial_memory(model.system, start)
     for _ in range(3):
-        count = min(max(periods_of_decay(model.system, T), 40), 400) + 4 * longest
-        run = run_from(model.system, x, count * T, T, method)
+        count = min(max(orbits.periods_of_decay(model.system, T), 40), 400) + 4 * longest
+        run = orbits.run(model.system, x, count * T, T, method)
         strobes = np.concatenate((run.q, run.q_dot), axis=1)[-3 * longest :]
         x = np.concatenate((strobes[-1], *run.memory))
         size = np.abs(strobes).max(axis=0)
@@ -354,7 +346,7 @@ def _shortest_orbit(model: Model, x: Vector, k: int, T: float) -> Orbit:
     shorter = _periods_to_repeat(found, T)
     if shorter == k:
         return found
-    return Orbit(model, solvers.orbit(model.system, shorter * T, at_zero(found.found)), shorter)
+    return Orbit(model, solvers.orbit(model.system, shorter * T, orbits.at_zero(found.found)), shorter)
 
 
 def _same(a: Orbit | None, b: Orbit | None, T: float) -> bool:
@@ -363,10 +355,10 @@ def _same(a: Orbit | None, b: Orbit | None, T: float) -> bool:
         return a is b
     if a.period != b.period or len(a.contacts) != len(b.contacts):
         return False
-    x, y = at_zero(a.found), at_zero(b.found)
+    x, y = orbits.at_zero(a.found), orbits.at_zero(b.found)
     n2 = len(a.state)
     for _ in range(a.period):
         if np.linalg.norm(x[:n2] - y[:n2]) <= 1e-5 * np.linalg.norm(x[:n2]):
             return True
-        y = state_after(b.model.system, y, T, b.found.method)
+        y = orbits.state_after(b.model.system, y, T, b.found.method)
     return False

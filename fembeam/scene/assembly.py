@@ -20,25 +20,7 @@ from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
 import reduction
-from fembeam.beams import (
-    ERROR_CONSTANT,
-    FREQUENCY_TOLERANCE,
-    MESHED_MODES,
-    MOST_ELEMENTS,
-    SAME_PLACE,
-    SHORTEST,
-    SHORTEST_PRESSED,
-    WAVE_STEP,
-    Beam,
-    bare_beam,
-    divided,
-    geometric_stiffness,
-    hermite_rows,
-    on_beam,
-    slowness,
-    spread,
-    wavenumber,
-)
+from fembeam.beams import Beam, bare_beam, geometric_stiffness, hermite_rows, mesh
 from fembeam.scene.moving_loads import PER_DOF, loads_of_order
 from fembeam.scene.places import body_words, place_words, quoted
 from fembeam.scene.signals import support_motion
@@ -173,7 +155,7 @@ class Matrices:
         not on the beam.
         """
         own = self.beams[body]
-        places = on_beam(np.atleast_1d(np.asarray(z, dtype=float)), own.beam, "interpolation")
+        places = mesh.on_beam(np.atleast_1d(np.asarray(z, dtype=float)), own.beam, "interpolation")
         return self.among_all(hermite_rows(own.nodes, places, derivative) @ own.spread, body)
 
     def row(self, place: Any, along: Six, body: int = 0) -> sparse.csr_matrix:
@@ -213,8 +195,8 @@ class Matrices:
 
     def frequency_error(self, omega: ArrayLike) -> Vector:
         """Relative error to expect in frequencies omega: max over elements of (β h)⁴/1440, β⁴ = ρA ω²/EI."""
-        steps = np.diff(self.nodes) * slowness(self.beam, self.nodes)
-        return ERROR_CONSTANT * steps.max() ** 4 * np.asarray(omega, dtype=float) ** 2
+        steps = np.diff(self.nodes) * mesh.slowness(self.beam, self.nodes)
+        return mesh.ERROR_CONSTANT * steps.max() ** 4 * np.asarray(omega, dtype=float) ** 2
 
     @property
     def rounding(self) -> float:
@@ -227,7 +209,7 @@ class Matrices:
         size = f"{self.elements} elements, {self.M.shape[0]} free dofs"
         if self.modes is None:
             return f"{size}: elements as asked, frequency_error(omega) estimates the error"
-        return f"{size}: the lowest {self.modes} frequencies are right to {FREQUENCY_TOLERANCE:g} relative"
+        return f"{size}: the lowest {self.modes} frequencies are right to {mesh.FREQUENCY_TOLERANCE:g} relative"
 
     def __repr__(self) -> str:
         return f"<matrices of {self.accuracy}>"
@@ -264,11 +246,11 @@ def _one_beam(scene: Scene, elements: int | None, modes: int | None, probes: Seq
     _check_buckling(scene)
     borders = borders_of(scene, probes)
     if elements is None:
-        modes = MESHED_MODES if modes is None else int(modes)
+        modes = mesh.MESHED_MODES if modes is None else int(modes)
         require(modes <= MOST_MODES, f"modes must be at most {MOST_MODES}", modes, "Scene.matrices",
                 "keep the modes up to a few times the highest frequency of interest")  # fmt: skip
         return _on_nodes(scene, _resolving(scene, borders, modes), modes)
-    return _on_nodes(scene, spread(scene.beam, borders, elements), None)
+    return _on_nodes(scene, mesh.spread(scene.beam, borders, elements), None)
 
 
 def _check_sizes(elements: int | None, modes: int | None, beams: tuple[Matrices, ...]) -> None:
@@ -346,26 +328,26 @@ def check_counts(elements: int | None, modes: int | None) -> None:
         whole = is_whole(number)
         require(number is None or (whole and number > 0), f"{name} must be a whole number above 0", number,
                 "Scene.matrices", "give a count, or None")  # fmt: skip
-    few = elements is None or elements <= MOST_ELEMENTS
-    require(few, f"elements must be at most {MOST_ELEMENTS}, where rounding takes over", elements, "Scene.matrices",
-            "leave them out: as few as the modes need are made")  # fmt: skip
+    few = elements is None or elements <= mesh.MOST_ELEMENTS
+    require(few, f"elements must be at most {mesh.MOST_ELEMENTS}, where rounding takes over", elements,
+            "Scene.matrices", "leave them out: as few as the modes need are made")  # fmt: skip
 
 
 def _resolving(scene: Scene, borders: Vector, modes: int) -> Vector:
     """Nodes with as few elements as keep κ h below WAVE_STEP; omega is estimated on a coarse mesh."""
-    coarse = _on_nodes(scene, spread(scene.beam, borders, 2 * modes + 4), None)
+    coarse = _on_nodes(scene, mesh.spread(scene.beam, borders, 2 * modes + 4), None)
     omega = reduction.modal_basis(coarse.M, coarse.K, modes, root=coarse.root).omega[-1]
-    waves = np.diff(borders) * wavenumber(scene.beam, borders, float(omega))
-    counts = np.maximum(1, np.ceil(waves / WAVE_STEP))
-    require(counts.sum() <= MOST_ELEMENTS, f"{modes} modes must need at most {MOST_ELEMENTS} elements", counts.sum(),
-            "Scene.matrices", "is a length in mm, or a place next to another one?")  # fmt: skip
-    return divided(borders, counts.astype(int))
+    waves = np.diff(borders) * mesh.wavenumber(scene.beam, borders, float(omega))
+    counts = np.maximum(1, np.ceil(waves / mesh.WAVE_STEP))
+    require(counts.sum() <= mesh.MOST_ELEMENTS, f"{modes} modes must need at most {mesh.MOST_ELEMENTS} elements",
+            counts.sum(), "Scene.matrices", "is a length in mm, or a place next to another one?")  # fmt: skip
+    return mesh.divided(borders, counts.astype(int))
 
 
 def _check_buckling(scene: Scene) -> None:
     """Raise ValueError when the beam has buckled under its axial force."""
     if scene.beam.axial_force < 0:
-        spare = buckling_load(scene, 2 * MESHED_MODES)
+        spare = buckling_load(scene, 2 * mesh.MESHED_MODES)
         most = f"{spare - scene.beam.axial_force:.6g}"
         require(spare > 0, f"axial_force must stay above -{most} N, where the beam buckles", scene.beam.axial_force,
                 "Beam", "press less, or support it more")  # fmt: skip
@@ -488,12 +470,12 @@ def borders_of(scene: Scene, probes: Sequence[float]) -> Vector:
     """Coordinates that must be nodes, ascending, without repeats."""
     for index, z in enumerate(probes):
         require_finite(f"probes[{index}]", z, "Scene.matrices", "give coordinates in m")
-    asked = on_beam(np.asarray(list(probes), dtype=float), scene.beam, "probes of Scene.matrices")
+    asked = mesh.on_beam(np.asarray(list(probes), dtype=float), scene.beam, "probes of Scene.matrices")
     pressed = scene.beam.axial_force < 0
-    shortest = (SHORTEST_PRESSED if pressed else SHORTEST) * scene.beam.length
+    shortest = (mesh.SHORTEST_PRESSED if pressed else mesh.SHORTEST) * scene.beam.length
     least = shortest / 4 if pressed else shortest  # a few such elements leave frequencies right to 1e-6
     needed = np.sort(np.array([*scene.beam.borders, *(support.z for support in scene.supports)], dtype=float))
-    nodes = needed[np.diff(needed, prepend=-np.inf) > SAME_PLACE * scene.beam.length]
+    nodes = needed[np.diff(needed, prepend=-np.inf) > mesh.SAME_PLACE * scene.beam.length]
     gaps = np.diff(nodes)
     rule = f"supports and span ends must be {least:.3g} m apart or at one place"
     require(bool(np.all(gaps >= least)), rule, float(gaps.min()), "Scene", "move or merge them")

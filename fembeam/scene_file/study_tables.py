@@ -24,6 +24,7 @@ import numpy as np
 
 import solvers
 from fembeam import plot
+from fembeam import study as studies
 from fembeam.beams import on_beam
 from fembeam.model import Branch, Orbit, check_mode_count, load_period
 from fembeam.model.run_csv import SECTIONS, Output
@@ -31,29 +32,6 @@ from fembeam.response import checked_damping, checked_oscillators
 from fembeam.scene import Place, is_directed, path_of, quoted, value_of, with_value
 from fembeam.scene_file.keys import Constructors, parameters
 from fembeam.structures import direction_of, require_components
-from fembeam.study import (
-    Backbone,
-    Basins,
-    Campbell,
-    Ensemble,
-    FloorSpectra,
-    Fold,
-    Minimum,
-    Peak,
-    SpeedAccuracy,
-    Variation,
-    backbone,
-    basins,
-    campbell,
-    characteristics,
-    ensemble,
-    floor_spectra,
-    fold,
-    minimise,
-    peak,
-    speed_accuracy,
-    vary,
-)
 from fembeam.study.backbone import check_backbone
 from fembeam.study.basins import checked_points
 from fembeam.study.campbell import check_modes, check_shaft
@@ -183,12 +161,14 @@ class SpeedAccuracyTable:
         if self.duration is not None:
             require_positive("duration", self.duration, where, "give s")
 
-    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> SpeedAccuracy:
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.SpeedAccuracy:
         """The study."""
         methods: list[Any] = [solvers.Exponential(rtol) for rtol in self.rtols]
         methods += [solvers.DormandPrince(rtol) for rtol in self.rtols] + [solvers.RK4(step) for step in self.steps]
         models = [file.scene.reduce(modes=n, **_mesh_of(file)) for n in sorted(set(self.modes))]
-        return speed_accuracy(models, methods, self.starts, self.duration, rounds=self.rounds, progress=progress)
+        return studies.speed_accuracy(
+            models, methods, self.starts, self.duration, rounds=self.rounds, progress=progress
+        )
 
 
 @dataclass(frozen=True)
@@ -237,14 +217,16 @@ class EnsembleTable:
         """Raise ValueError where every realisation would be refused."""
         check_length(model, self.duration, self.dt, self.discard)
 
-    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Ensemble:
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.Ensemble:
         """The ensemble, with its checkpoint ``ensemble.npz`` in the folder."""
         options = {"discard": self.discard, "segment": self.segment, "solver": self.solver}
-        quantity = partial(characteristics, duration=self.duration, dt=self.dt, **options)
+        quantity = partial(studies.characteristics, duration=self.duration, dt=self.dt, **options)
         model, path = file.model(), folder / "ensemble.npz"
         self.check_run(file, model)
         with _pool(self.workers) as pool:
-            found = ensemble(model, self.realisations, quantity, pool, path, until=self.until, progress=progress)
+            found = studies.ensemble(
+                model, self.realisations, quantity, pool, path, until=self.until, progress=progress
+            )
         return replace(found, title=f"{len(found)} realisations of {self.duration:g} s")
 
 
@@ -541,9 +523,9 @@ class BasinsTable:
         load_period(scene)
         _check_place(scene, self.z)
 
-    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Basins:
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.Basins:
         """The basins, with their checkpoint ``basins.npz`` in the folder."""
-        return basins(file.model(), **vars(self), checkpoint=folder / "basins.npz", progress=progress)
+        return studies.basins(file.model(), **vars(self), checkpoint=folder / "basins.npz", progress=progress)
 
 
 @dataclass(frozen=True)
@@ -569,9 +551,9 @@ class CampbellTable:
         """Raise ValueError for a scene that is no shaft."""
         check_shaft(scene)
 
-    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Campbell:
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.Campbell:
         """The diagram."""
-        return campbell(file.scene, np.linspace(*self.spins, self.points), self.modes, **_mesh_of(file))
+        return studies.campbell(file.scene, np.linspace(*self.spins, self.points), self.modes, **_mesh_of(file))
 
 
 @dataclass(frozen=True)
@@ -614,11 +596,11 @@ class FloorSpectraTable:
         """Raise ValueError for places and directions that the scene does not have."""
         _check_places(scene, list(self.places), "places")
 
-    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> FloorSpectra:
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.FloorSpectra:
         """The spectra."""
         run = file.model().simulate(self.duration, self.dt, solver=self.solver, progress=progress)
         oscillators = {"omega": self._spread(self.omega), "periods": self._spread(self.periods)}
-        return floor_spectra(run, self.places, zeta=self.zeta, **oscillators)
+        return studies.floor_spectra(run, self.places, zeta=self.zeta, **oscillators)
 
     def _spread(self, given: Sequence[float] | None) -> Any:
         """The oscillators, those between the two given ones too."""
@@ -647,9 +629,9 @@ class PeakTable:
         check_peak(scene, self.parameter, self.over, self.values, self.span)
         _check_place(scene, self.z)
 
-    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Peak:
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.Peak:
         """The study."""
-        return peak(file.model(), **vars(self), progress=progress)
+        return studies.peak(file.model(), **vars(self), progress=progress)
 
 
 @dataclass(frozen=True)
@@ -683,10 +665,10 @@ class FoldTable:
                 self.values, "[fold]", "give [lowest, highest]")  # fmt: skip
         _check_place(scene, self.z)
 
-    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Fold:
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.Fold:
         """The study."""
         branch = file.model().branch(self.parameter, self.span, self.period).run(progress)
-        return fold(branch, self.over, self.values, self.number, self.z)
+        return studies.fold(branch, self.over, self.values, self.number, self.z)
 
 
 @dataclass(frozen=True)
@@ -711,9 +693,9 @@ class BackboneTable:
         check_backbone(scene, self.levels, self.span, self.level, self.parameter)
         _check_place(scene, self.z)
 
-    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Backbone:
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.Backbone:
         """The study."""
-        return backbone(file.model(), **vars(self), progress=progress)
+        return studies.backbone(file.model(), **vars(self), progress=progress)
 
 
 Draw = Mapping[str, str | float]  # a distribution of `scipy.stats` by its kind, with its numbers
@@ -750,11 +732,13 @@ class VaryTable:
         names, points, _ = points_of(self.points, self.samples, self.seed)
         _check_trials(self, scene, names, self.quantity, points)
 
-    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Variation:
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.Variation:
         """The study, with its checkpoint ``vary.npz`` in the folder."""
         keys = _plan_of(self) | {"samples": self.samples, "seed": self.seed, "checkpoint": folder / "vary.npz"}
         with _pool(self.workers) as pool:
-            return vary(file.scene, self.points, self.quantity, **keys, **file.reduce, executor=pool, progress=progress)
+            return studies.vary(
+                file.scene, self.points, self.quantity, **keys, **file.reduce, executor=pool, progress=progress
+            )
 
 
 @dataclass(frozen=True)
@@ -787,14 +771,14 @@ class MinimiseTable:
         limits_of(self.constraints or {})
         _check_trials(self, scene, list(self.parameters), [self.quantity, *(self.constraints or {})], ends)
 
-    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> Minimum:
+    def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.Minimum:
         """The search, with its checkpoint ``minimise.npz`` in the folder."""
         keys = _plan_of(self) | {
             name: getattr(self, name) for name in ("constraints", "tolerance", "most", "gradients")
         }
         keys |= {"checkpoint": folder / "minimise.npz", "progress": progress, **file.reduce}
         with _pool(self.workers) as pool:
-            return minimise(file.scene, self.parameters, self.quantity, executor=pool, **keys)
+            return studies.minimise(file.scene, self.parameters, self.quantity, executor=pool, **keys)
 
 
 def _drawn(path: str, table: Mapping[str, Any]) -> Any:
