@@ -51,6 +51,8 @@ def test_refused(tmp_path):
         fb.Frame.from_mesh(written(tmp_path / "l.msh"), {"run": FLAT})
     with pytest.raises(FileNotFoundError):
         fb.Frame.from_mesh(tmp_path / "none.msh", FLAT)
+    with pytest.raises(TypeError, match="section must be a Section, got Taper"):
+        fb.Frame.from_mesh(tmp_path / "l.msh", fb.Taper(FLAT, FLAT))
 
 
 @pytest.mark.parametrize("more", [[1, 2], [2, 1], [0, 2]])

@@ -29,5 +29,5 @@ from fembeam.beams.mesh import (
     shares,
     wavenumber,
 )
-from fembeam.beams.mesh_files import chosen_names, lines_of, named_nodes, read_mesh, shown
+from fembeam.beams.mesh_files import by_group, chosen_names, lines_of, named_nodes, read_mesh, shown
 from fembeam.beams.section import Section, Taper

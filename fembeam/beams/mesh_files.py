@@ -56,7 +56,7 @@ def beam_of(
     chosen = chosen_names(sections, [names[i] for i in order], [f"z = {z:.6g} m" for z in chain], where)
     _warn_of_size(chain, where)
     spans, index = [], 0
-    table = {"": sections} if isinstance(sections, (Section, Taper)) else {str(k): s for k, s in sections.items()}
+    table = by_group(sections)
     for name, group in groupby(chosen):
         after = index + len(list(group))
         spans.append((float(chain[after] - chain[index]), table[name]))
@@ -228,6 +228,11 @@ def _chained(z: Vector, lines: NDArray[np.int64], points: Vector, where: str) ->
 def shown(points: Any) -> tuple[float, ...] | None:
     """One point for a message."""
     return tuple(float(f"{x:.6g}") for x in points[0]) if len(points) else None
+
+
+def by_group(sections: Any) -> dict[str, Any]:
+    """Sections by the names of their groups; one for all elements has the name ""."""
+    return {"": sections} if isinstance(sections, (Section, Taper)) else {str(k): s for k, s in sections.items()}
 
 
 def chosen_names(sections: Any, names: Names, places: Sequence[str], where: str) -> list[str]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.beams import Section, chosen_names, lines_of, named_nodes, read_mesh, shown
+from fembeam.beams import Section, by_group, chosen_names, lines_of, named_nodes, read_mesh, shown
 from fembeam.structures.frame import Frame
 from fembeam.structures.members import Member
 from fembeam.support import require
@@ -41,10 +41,10 @@ def frame_of(
     points[:, : np.shape(mesh.points)[1]] = mesh.points
     middles = [f"{shown(points[line].mean(axis=0, keepdims=True))} m" for line in lines]
     chosen = chosen_names(sections, groups, middles, where)
-    table = {"": sections} if isinstance(sections, Section) else {str(key): one for key, one in sections.items()}
+    table = by_group(sections)
     named = _names(mesh)
     chains = list(_chains(points, lines, chosen, set(named), where))
-    skew = {group for group, one in table.items() if one.I12}
+    skew = {group for group, one in table.items() if isinstance(one, Section) and one.I12}
     _require_one_way(points, lines, chosen, chains, skew, where)
     chains, ends = _in_order(points, lines, chains, skew)
     names = {node: named.get(node, f"n{node}") for node in ends}
