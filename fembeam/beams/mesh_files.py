@@ -31,12 +31,8 @@ Names = list[set[str]]
 
 LINES = ("line", "line3", "line4")  # of higher ones the ends are used
 READERS = {".inp": abaqus_mesh, ".bdf": nastran_mesh, ".nas": nastran_mesh, ".fem": nastran_mesh}  # of ours
-WRITERS: dict[str, dict[str, Any]] = {  # suffixes, and what meshio needs to know
-    ".msh": {"file_format": "gmsh22", "binary": False},
-    ".inp": {},
-    ".vtu": {},
-    ".vtk": {},
-}
+# suffixes, and what meshio needs to know
+WRITERS: dict[str, Any] = {".msh": {"file_format": "gmsh22", "binary": False}, ".inp": {}, ".vtu": {}, ".vtk": {}}
 STRAIGHT = 1e-6  # of the length: farther from the axis is a bend
 
 

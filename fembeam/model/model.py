@@ -37,17 +37,9 @@ if TYPE_CHECKING:
 
 Field = Callable[[Vector], Any] | None  # of displacement in m or velocity in m/s, over z (k,)
 _MOVES = 0.1  # of the mode that moves a stop most: one that moves it so far does
-UNDRIVEN = (
-    "zeta",
-    "participation",
-    "moving_mass",
-    "section_forces",
-    "contact_rows",
-    "sites",
-    "directions",
-    "rows_of",
-    "turning",
-)  # of what is computed once of a model: what no signal changes, and but for the rows of contacts no gap or law
+# of what is computed once of a model: what no signal changes, and but for the rows of contacts no gap or law
+UNDRIVEN = ("zeta", "participation", "moving_mass", "section_forces", "contact_rows", "sites", "directions", "rows_of",
+            "turning")  # fmt: skip
 
 
 def _with_laws(scene: Scene) -> list[Any]:

@@ -33,18 +33,10 @@ PARTS = {
     "on": ("second place", "m"), "to": ("second place", "m"), "fibre": ("distance of the outer fibre", "m"),
     "spin": ("spin", "rad/s"), "mu": ("coefficient of friction", ""),
 }  # fmt: skip
-TURNED = {
-    "m": "rad",
-    "N": "N m",
-    "N/m^p": "N m/rad^p",
-    "s/m": "s/rad",
-    "N s/m^p": "N m s/rad^p",
-    "N/m": "N m/rad",
-    "m/s": "rad/s",
-    "N s/m": "N m s/rad",
-    "N s/m^((p+1)/2)": "N m s/rad^((p+1)/2)",
-    "1/m^n": "1/rad^n",
-}  # of rotation
+TURNED = {  # of rotation
+    "m": "rad", "N": "N m", "N/m^p": "N m/rad^p", "s/m": "s/rad", "N s/m^p": "N m s/rad^p", "N/m": "N m/rad",
+    "m/s": "rad/s", "N s/m": "N m s/rad", "N s/m^((p+1)/2)": "N m s/rad^((p+1)/2)", "1/m^n": "1/rad^n",
+}  # fmt: skip
 ACTING = "stops", "elements", "springs", "dashpots"
 OWNERS = {"supports": "support", "masses": "mass", "springs": "spring", "dashpots": "dashpot", "stops": "stop",
           "elements": "element", "forces": "force", "bodies": "beam"}  # fmt: skip

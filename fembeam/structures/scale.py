@@ -7,15 +7,8 @@ from dataclasses import dataclass
 from fembeam.support import is_finite, require
 
 LENGTHS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
-MASSES = {
-    "kg": 1.0,
-    "t": 1e3,
-    "g": 1e-3,
-    "mg": 1e-6,
-    "lb": 0.45359237,
-    "slug": 14.593902937206,
-    "slinch": 175.126835246,
-}
+MASSES = {"kg": 1.0, "t": 1e3, "g": 1e-3, "mg": 1e-6, "lb": 0.45359237, "slug": 14.593902937206,
+          "slinch": 175.126835246}  # fmt: skip
 TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 
 

@@ -17,19 +17,9 @@ from scipy import sparse
 from fembeam.structures.readers.given import COMPONENT, SCALAR, Given, Label, wrong
 
 PARTS = ("data", "row", "col")
-BROKEN = (
-    ValueError,
-    TypeError,
-    KeyError,
-    IndexError,
-    OSError,
-    EOFError,
-    NotImplementedError,
-    SyntaxError,
-    MemoryError,
-    zipfile.BadZipFile,
-    zlib.error,
-)  # what NumPy and zipfile say of damaged files
+# what NumPy and zipfile say of damaged files
+BROKEN = (ValueError, TypeError, KeyError, IndexError, OSError, EOFError, NotImplementedError, SyntaxError, MemoryError,
+          zipfile.BadZipFile, zlib.error)  # fmt: skip
 
 
 def read_npz(path: Path) -> Given:
