@@ -18,12 +18,6 @@ from fembeam.response.placed_shapes import PlacedShapes, placed_shapes
 from fembeam.response.readout import READOUT_FINITE, READOUT_UNITS, Readout, expected_readout, packed, unpacked
 from fembeam.response.section_forces import Extremes, SectionForces, extremes, frame_forces_of, rows_of, section_forces
 from fembeam.response.shapes import Shapes
-from fembeam.response.spectra import (
-    ResponseSpectrum,
-    checked_damping,
-    checked_oscillators,
-    floor_spectrum,
-    response_spectrum,
-)
+from fembeam.response.spectra import ResponseSpectrum, floor_spectrum, response_spectrum
 from fembeam.response.support_reactions import BodyReaction, Reaction, Reactions, reactions
 from fembeam.response.transfer import FrequencyResponse, frequency_response

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fembeam.scene import At, BodyMatrices, LocalCoordinate, at_parts, directed_words, quoted, split
+from fembeam.scene import BodyMatrices, LocalCoordinate, at_parts, directed_words, quoted, split
+from fembeam.scene.places import At
 from fembeam.structures import COMPONENTS, FrameMatrices, direction_of, named, nearest, require_components, turns
 from fembeam.support import is_numbered, is_pair, require, tuples
 

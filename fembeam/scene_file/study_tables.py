@@ -28,7 +28,7 @@ from fembeam import study as studies
 from fembeam.beams import on_beam
 from fembeam.model import Branch, Orbit, check_mode_count, load_period
 from fembeam.model.run_csv import SECTIONS, Output
-from fembeam.response import checked_damping, checked_oscillators
+from fembeam.response.spectra import checked_damping, checked_oscillators
 from fembeam.scene import Place, is_directed, path_of, quoted, value_of, with_value
 from fembeam.scene_file.keys import Constructors, parameters
 from fembeam.structures import direction_of, require_components
