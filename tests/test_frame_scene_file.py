@@ -120,6 +120,12 @@ OUTPUTS = """
 [reduce]
 modes = 3
 [simulate]
+def test_the_offset_of_a_mass_in_the_plane_has_two_numbers(file_of):
+    """A file had to add the third, a scene in Python had not."""
+    mass = '[[masses]]\nat = "C"\nmass = 5.0\noffset = [0.1, 0.2]\n'
+    assert file_of(PORTAL + mass).scene.masses == (fb.LumpedMass("C", 5.0, offset=(0.1, 0.2)),)
+
+
 duration = 0.2
 dt = 1e-3
 places = [["B-C", 1.5], ["C", "x"]]

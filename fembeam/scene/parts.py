@@ -152,8 +152,8 @@ class LumpedMass(ScenePart):
     `mass` m in kg, `inertia` J about its own centre in kg m², both ≥ 0; `offset` e in m: the centre sits
     ahead of z by e on a rigid arm, which may reach beyond the beam's end. On other bodies than a `Beam` the inertia is
     that about every axis, three numbers, about x, y and z, or the rows of the tensor along these axes,
-    [[Jxx, Jxy, Jxz], …] with Jxy = -∫ x y dm; the offset is a vector (one number is its z). ValueError for a negative
-    mass or inertia, a tensor that is not symmetric, or negative about some axis.
+    [[Jxx, Jxy, Jxz], …] with Jxy = -∫ x y dm; the offset is a vector (one number is its z, two are x and y).
+    ValueError for a negative mass or inertia, a tensor that is not symmetric, or negative about some axis.
 
     Examples
     --------
@@ -164,7 +164,7 @@ class LumpedMass(ScenePart):
 
     mass: float
     inertia: float | tuple[float, float, float] | tuple[tuple[float, ...], ...] = 0.0
-    offset: float | tuple[float, float, float] = 0.0
+    offset: float | tuple[float, ...] = 0.0
     word = "mass"
 
     def __post_init__(self) -> None:
