@@ -351,14 +351,17 @@ def _numbers(modes: Any, interface: bool) -> tuple[int, ...]:
 
 def _check_static(scene: Scene, residual: bool, interface: bool) -> None:
     """Raise ValueError when static shapes are asked for twice, or have no place to be loaded at."""
+    for name, choice in (("residual", residual), ("interface", interface)):
+        known = isinstance(choice, (bool, np.bool_))
+        require(known, f"{name} must be True or False", choice, "Scene.reduce", "without quotes")
     require(not (residual and interface), "residual and interface exclude each other", True, "Scene.reduce",
             "keep one: either makes the model exact for slow loads at its places")  # fmt: skip
-    known = [bool(loaded(scene, body)) for body in range(1 + len(scene.bodies))]
-    met = all(known) if interface else any(known) or not residual
+    places = [bool(loaded(scene, body)) for body in range(1 + len(scene.bodies))]
+    met = all(places) if interface else any(places) or not residual
     asked = "interface=True" if interface else "residual=True"
-    without = [f"bodies[{number - 1}]" for number, has in enumerate(known) if number and not has]
+    without = [f"bodies[{number - 1}]" for number, has in enumerate(places) if number and not has]
     rule = "static shapes need a stop, a force or a dashpot, or an element" + ", on every body" * bool(without)
-    got = f"none on {', '.join(without)}" if without and known[0] else "none"
+    got = f"none on {', '.join(without)}" if without and places[0] else "none"
     if not met:
         raise ValueError(f"{rule}, got {got} in Scene.reduce; leave out {asked}, or add one")
 
