@@ -134,6 +134,10 @@ test_refused = refused(
     (lambda: fb.Frame(SPACE_L, members(offset=((0.5, 0, 0), (0, 0, 0)))), "'A-B' must have a length"),
     (lambda: fb.Member("A", "A", STEEL), "two nodes"),
     (lambda: fb.Member("A", "B", STEEL, offset=(0, 0, 0)), "offset must be two vectors"),
+    (lambda: fb.Member("A", "B", STEEL, offset=((0, 0), 0)), "offset must be two vectors"),
+    (lambda: fb.Frame.polyline(None, STEEL), "nodes must be two or more by name, got None"),
+    *((lambda bad=bad: portal().reduced(bad, 1), "nodes must name the places .* in Frame.reduced; write .'A', 'B'.")
+      for bad in ("AD", None, 5, [])),
     (lambda: fb.Frame(PORTAL, []), "members must not be empty"),
     (lambda: portal().check_place("E", "Stop"), "must be a node of the frame; 'D' is the nearest"),
     (lambda: portal().check_place("B-C", "Stop"), "write .'B-C', s. for a place s along"),

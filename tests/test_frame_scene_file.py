@@ -111,21 +111,25 @@ test_refused = refused_files(
     ('nodes = ["D", "C"]', 'nodes = ["D"]', r"\[\[frame.members\]\] number 2.*a chain of more"),
     ('release = "end rz"', 'release = "rz"', r"\[\[frame.members\]\] number 2.*release must be"),
     ('release = "end rz"', 'relase = "end rz"', r"number 2.*relase"),
+    ('release = "end rz"', "offset = [[0, 0.1], [0]]", r"number 2: offset must be two vectors of finite numbers"),
     ('at = "A"', 'at = "F"', "must be a node of the frame"),
+    ("[base.x]", "[base]\ny = 1e-3\n[base.x]", r"\[base.y\]: must be a table \{ kind = .* got 0.001"),
+    ('at = "A"', "at = \"A\"\nmotion = { x = { kind = \"harmonic\", amplitude = 1, omega = 1e300 } }",
+     "numbers too large or too small to compute with; give SI units"),
     ("[frame]", "[beam]\nlength = 1.0\n[frame]", r"one of the tables \[beam\] and \[frame\]"),
 )  # fmt: skip
 
 
-OUTPUTS = """
-[reduce]
-modes = 3
-[simulate]
 def test_the_offset_of_a_mass_in_the_plane_has_two_numbers(file_of):
     """A file had to add the third, a scene in Python had not."""
     mass = '[[masses]]\nat = "C"\nmass = 5.0\noffset = [0.1, 0.2]\n'
     assert file_of(PORTAL + mass).scene.masses == (fb.LumpedMass("C", 5.0, offset=(0.1, 0.2)),)
 
 
+OUTPUTS = """
+[reduce]
+modes = 3
+[simulate]
 duration = 0.2
 dt = 1e-3
 places = [["B-C", 1.5], ["C", "x"]]

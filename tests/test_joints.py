@@ -74,8 +74,9 @@ def test_refused_alone():
     """What no joint can be."""
     with pytest.raises(ValueError, match="two bodies"):
         Joint("A", to=(0, "B"))
-    with pytest.raises(ValueError, match="each once"):
-        Joint("A", to=(1, "B"), dofs="xx")
+    for bad in ("xx", 0, [["x"]]):
+        with pytest.raises(ValueError, match="dofs must be some of x, y, z, rx, ry, rz, each once"):
+            Joint("A", to=(1, "B"), dofs=bad)
     bodies = [legs()[0], fb.Frame({"A": (0, 0), "B": (1.0, 0)}, [fb.Member("A", "B", FLAT)])]
     with pytest.raises(ValueError, match=r"they share x, y, rz, got .'z'. in joints.0."):
         JoinedBodies(bodies, [Joint("B", to=(1, "A"), dofs="xyz")])

@@ -259,6 +259,8 @@ PARTS_REFUSED = [
     (lambda: Stop(0.5, 3.0), "law must offer force"),
     (lambda: Stop(0.5, Linear), "law must offer force"),
     (lambda: PointForce(0.5, None), "signal must be a function of t, got None"),
+    (lambda: PointForce(0.5, Harmonic), "signal must be a signal made with its values, got <class"),
+    (lambda: Spring(0.5, 1e3, foot=Harmonic), "foot must be a signal made with its values, got <class"),
     (lambda: PointForce(0.5, 3.0), "signal must be a function of t, got 3.0 .* a constant"),
     (lambda: PointForce(0.5, math.sin), r"must take an array of times, got TypeError .* in PointForce at z = 0.5"),
     (lambda: PointForce(0.5, lambda t: 0.0 if t > 1.0 else 9.0), "must take an array of times, .* np.where for if"),
@@ -296,6 +298,9 @@ SCENES_REFUSED = [
     (lambda: paper().reduce(modes=[0, 5000]), "modes must be at most 300, got 5001 "),
     (lambda: paper().matrices(elements=10**9), "elements must be at most 10000, .* got 1000000000 "),
     (lambda: paper().matrices(probes=[0.1, 0.3]), r"z must lie on the beam, .* got \[0.3\] in probes"),
+    (lambda: paper().matrices(probes=0.1), "probes must be a list, got 0.1 in Scene.matrices; put it in brackets"),
+    (lambda: paper().reduce(residual="false"), "residual must be True or False, got 'false' in Scene.reduce"),
+    (lambda: paper().reduce(interface=1), "interface must be True or False, got 1 in Scene.reduce"),
     (lambda: paper().matrices(probes=[math.nan]), r"probes\[0\] must be finite"),
 ]  # fmt: skip
 

@@ -154,6 +154,8 @@ def test_equilibrium_and_states_are_those_of_the_beam():
     beam, body = beam_scene().reduce(modes="all", elements=ELEMENTS), same_scene().reduce(modes="all")
     q = [model.equilibrium({at: 25.0})[: len(model.omega)] for model, at in ((beam, LENGTH), (body, ("tip", "y")))]
     close(beam.phi(LENGTH) @ q[0], body.phi(("tip", "y")) @ q[1])
+    with pytest.raises(ValueError, match=r"direction must be one of x, .* got 'w' in the place 'tip'"):
+        body.equilibrium({("tip", "w"): 25.0})
     field = {label: 1e-3 * number for number, label in enumerate(body.scene.beam.labels) if number > 1}
     start = body.state(field)
     for node, c in (("tip", "y"), (3, "rx")):

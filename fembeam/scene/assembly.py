@@ -8,7 +8,7 @@ of the scene, its `bodies`, then one dof for every impactor.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -224,6 +224,8 @@ def assemble(scene: Scene, elements: int | None, modes: int | None, probes: Sequ
     meshed = any(part.beam.meshed for part in (scene, *scene.bodies))
     require(elements is None or meshed, "elements must be left out: a structure has its own matrices", elements,
             "Scene.matrices", "ask for modes, or modes='all'")  # fmt: skip
+    listed = isinstance(probes, Iterable) and not isinstance(probes, (str, Mapping))
+    require(listed, "probes must be a list", probes, "Scene.matrices", "put it in brackets")
     own = _one_beam(scene, elements, modes, scene.at(list(probes), "probes of Scene.matrices"))
     if not scene.bodies and not scene.impactors:
         _check_sizes(elements, modes, (own,))

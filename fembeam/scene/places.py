@@ -100,7 +100,7 @@ def place_words(place: Any) -> str:
     if is_numbered(place):
         inner = place[1]
         return f"{inner if is_whole(inner) else place_words(inner)} of body {place[0]}"
-    if is_pair(place):
+    if is_pair(place) and is_finite(place[1]):
         return f"{place[0]} + {place[1]:g} m"
     return f"{place:.6g} m" if is_finite(place) else str(place)
 

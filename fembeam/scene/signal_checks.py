@@ -27,6 +27,8 @@ def require_motion(signal: Any, name: str, where: str) -> None:
 
 def require_array_function(function: Any, name: str, where: str, argument: str = "times") -> None:
     """Raise ValueError for a function that takes one number but no array, such as one that calls `math.sin`."""
+    require(not isinstance(function, type), f"{name} must be a signal made with its values", function, where,
+            "write Harmonic(amplitude, omega) or so")  # fmt: skip
     if hasattr(function, "tones") or hasattr(function, "nodes"):
         return
     try:

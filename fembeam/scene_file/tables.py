@@ -29,6 +29,7 @@ from fembeam.scene_file.keys import (
 )
 from fembeam.scene_file.kinds import MAKERS, SECTION, SIGNAL, Nested, nested
 from fembeam.scene_file.structures import PLACES, is_place
+from fembeam.structures import COMPONENTS
 from fembeam.support import is_whole, read_with, tuples
 
 Table = Mapping[str, Any]
@@ -134,11 +135,11 @@ class TableReader:
         if name == "base":
             if self.named and not value:
                 self.fail("[base]", "must have a table for each direction, such as [base.y]")
-            ways = [key for key, one in value.items() if isinstance(one, dict)]
+            ways = [key for key, one in value.items() if isinstance(one, dict) or key in COMPONENTS]
             if not self.named and "kind" not in value and ways:
                 self.fail(f"[base.{ways[0]}]", "the base of a beam moves along y alone: write [base] with kind = … and "
                           "the keys of that signal; tables for each direction are for frames")  # fmt: skip
-            if self.named and all(isinstance(one, dict) for one in value.values()):
+            if self.named and len(ways) == len(value):
                 return {direction: self.chosen(SIGNAL, one, f"[base.{direction}]") for direction, one in value.items()}
             return self.chosen(SIGNAL, value, "[base]")
         kinds: Constructors = {kind_name(kind.__name__): MAKERS.get(kind, kind) for kind in FEATURES[name]}
@@ -205,6 +206,8 @@ class TableReader:
             raise
         except OSError as error:
             self.fail(where, f"{error.filename}: {error.strerror}", error)
+        except OverflowError as error:
+            self.fail(where, "holds numbers too large or too small to compute with; give SI units", error)
         except (ValueError, TypeError, ArithmeticError, MemoryError, RuntimeError) as error:  # the last of modes
             self.fail(where, str(error) or type(error).__name__, error)
 

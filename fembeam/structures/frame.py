@@ -91,7 +91,9 @@ class Frame:
         >>> Frame.polyline({"A": (0, 0), "B": (1, 0), "C": (1, 2)}, Section.circle(2e11, 7800.0, 0.02)).members[1].name
         'B-C'
         """
-        return cls(nodes, [Member(a, b, section, **options) for a, b in pairwise(nodes)])
+        from fembeam.structures.frame_checks import checked_nodes
+
+        return cls(nodes, [Member(a, b, section, **options) for a, b in pairwise(checked_nodes(nodes))])
 
     @classmethod
     def straight(cls, length: float, section: Section, spin: float = 0.0, bending_only: bool = False) -> Frame:
@@ -315,8 +317,9 @@ class Frame:
         >>> [node for node, component in beam.reduced(["A", "B"], modes=2).labels if component in ("x", "mode")]
         ['A', 'B', 'mode 1', 'mode 2']
         """
-        from fembeam.structures.superelement import reduced
+        from fembeam.structures.superelement import check_interface, reduced
 
+        check_interface(nodes, "Frame.reduced")
         made = self.assembled(elements, max(int(modes), 1) if is_finite(modes) else None, tuple(nodes))
         return reduced(self, made, nodes, modes, "Frame.reduced")
 

@@ -8,7 +8,7 @@ equal dofs of two nodes become one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -74,8 +74,8 @@ class Joint:
         object.__setattr__(self, "to", (int(self.to[0]), tuples(self.to[1])))
         object.__setattr__(self, "place", tuples(self.place))
         if self.dofs is not None:
-            listed = tuple(self.dofs)
-            right = bool(listed) and len(set(listed)) == len(listed) and set(listed) <= set(COMPONENTS)
+            listed = tuple(self.dofs) if isinstance(self.dofs, Iterable) else ()
+            right = bool(listed) and all(dof in COMPONENTS for dof in listed) and len(set(listed)) == len(listed)
             require(right, f"dofs must be some of {', '.join(COMPONENTS)}, each once", self.dofs, "Joint",
                     "write 'xyz' for a ball hinge, or ('x', 'y', 'rz')")  # fmt: skip
             object.__setattr__(self, "dofs", listed)

@@ -105,7 +105,8 @@ def _releases(given: Any, where: str) -> tuple[str, ...]:
 
 def _offsets(given: Any, where: str) -> tuple[tuple[float, ...], ...]:
     """Two arms of three numbers; those of the plane get a zero."""
-    arms = [list(arm) for arm in given] if np.ndim(given) == 2 else []
+    rows = list(given) if isinstance(given, (list, tuple, np.ndarray)) else []
+    arms = [list(arm) if isinstance(arm, (list, tuple, np.ndarray)) else [] for arm in rows]
     right = len(arms) == 2 and all(len(arm) in (2, 3) and all(is_finite(x) for x in arm) for arm in arms)
     require(right, "offset must be two vectors of finite numbers", given, where, "write ((0, 0, 0.1), (0, 0, 0))")
     return tuple((*(float(x) for x in arm), *(3 - len(arm)) * [0.0]) for arm in arms)

@@ -196,8 +196,9 @@ class Structure(NamedBody):
         >>> chain.reduced([1, 3], modes=0).K.toarray().tolist()
         [[0.5, -0.5], [-0.5, 0.5]]
         """
-        from fembeam.structures.superelement import reduced
+        from fembeam.structures.superelement import check_interface, reduced
 
+        check_interface(nodes, "Structure.reduced")
         listed = [self.node(node) for node in nodes]
         own = self.condensed(listed)
         return reduced(own, own.assembled(), listed, modes, "Structure.reduced")

@@ -11,7 +11,7 @@ R.R. Craig, M.C.C. Bampton, AIAA Journal 6 (1968) 1313.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -38,7 +38,6 @@ def reduced(body: Any, made: Assembled, nodes: Sequence[Any], modes: int, where:
     whole = is_whole(modes) and modes >= 0
     require(whole, "modes must be a whole number, at least 0", modes, where, "0 keeps static shapes alone")
     listed = list(dict.fromkeys(nodes))
-    require(bool(listed), "nodes must name the places of joints, supports and stops", nodes, where, "give one or more")
     require(made.gyroscopic is None, "a body that spins must stay as it is", body, where, "leave its spin out")
     interface = {(node, c): dof for node in listed for c, dof in _dofs(body, made, node, where).items()}
     kept = np.array(list(interface.values()), dtype=int)
@@ -56,6 +55,12 @@ def reduced(body: Any, made: Assembled, nodes: Sequence[Any], modes: int, where:
     found = Structure(K, (M + M.T) / 2, C, labels, known, points, lines)
     along = [translations_of(body).index(c) for c in translations_of(found)]
     return found.knowing(root, np.asarray(T.T @ made.base_loads[:, along]))
+
+
+def check_interface(nodes: Any, where: str) -> None:
+    """Raise ValueError unless nodes are a list with one at least; a name by itself would be a list of letters."""
+    listed = isinstance(nodes, Iterable) and not isinstance(nodes, (str, Mapping)) and len(list(nodes)) > 0
+    require(listed, "nodes must name the places of joints, supports and stops", nodes, where, "write ['A', 'B']")
 
 
 def _dofs(body: Any, made: Assembled, node: Any, where: str) -> dict[str, int]:
