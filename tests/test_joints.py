@@ -118,3 +118,42 @@ def test_a_superelement_keeps_dofs_without_mass_of_its_nodes():
         for other in (half, half.reduced([0, ELEMENTS], modes=4))
     )
     np.testing.assert_allclose(found, exact, rtol=3e-4)
+
+
+def hinged(side, release):
+    """Half of a beam of 2 m in the plane, in one member."""
+    ends = {"A": (side, 0), "B": (side + 1.0, 0)}
+    return fb.Frame(ends, [fb.Member("A", "B", FLAT, release=release)])
+
+
+def test_a_hinge_on_both_sides_of_a_joint_frees_its_nodes():
+    """The modes failed from inside: "Factor is exactly singular"; a support or inertia on either side holds both."""
+    left, right, joint = hinged(0.0, "end rz"), hinged(1.0, "start rz"), fb.Joint("B", to=(1, "A"))
+    clamps = [fb.Clamped("A"), fb.Clamped((1, "B"))]
+
+    def rig(*supports, **parts):
+        return fb.Scene(left, [*clamps, *supports], bodies=[fb.Scene(right)], joints=[joint], **parts)
+
+    with pytest.raises(ValueError, match=r"'B' moves along 'rz', with no inertia, got .'A-B', 'A-B'. in Scene"):
+        rig().reduce(3)
+    whole = fb.Scene(left, clamps, bodies=[fb.Scene(hinged(1.0, ()))], joints=[joint]).reduce(3)
+    held = [rig(fb.Fixed(place, "rz")).reduce(3) for place in ((0, "B"), (1, "A"))]
+    for model in held:
+        assert np.allclose(model.omega, whole.omega, rtol=1e-9)
+
+
+def test_what_holds_a_released_node():
+    """An offset mass does, by m e²; a spring without inertia does not, which failed with the pivots of M."""
+    frame = fb.Frame(
+        {"A": (0, 0), "B": (1, 0), "C": (2, 0)},
+        [fb.Member("A", "B", FLAT, release="end rz"), fb.Member("B", "C", FLAT, release="start rz")],
+    )
+    clamps, spring = [fb.Clamped("A"), fb.Clamped("C")], fb.Spring("B", 0.1, direction="rz")
+    with pytest.raises(ValueError, match="'B' moves along 'rz', with no inertia"):
+        fb.Scene(frame, clamps, springs=[spring]).reduce(2)
+    arm, inertia = (
+        fb.Scene(frame, clamps, [mass], [spring]).reduce(2)
+        for mass in (fb.LumpedMass(1.0, 1.0, offset=(0.0, 0.1)), fb.LumpedMass("B", 1.0, inertia=0.01))
+    )
+    assert arm.omega[0] == pytest.approx(np.sqrt(10.0), rel=1e-3)
+    assert inertia.omega[0] == pytest.approx(np.sqrt(10.0), rel=1e-9)

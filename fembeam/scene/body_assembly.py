@@ -203,15 +203,13 @@ def _free_stiffness(scene: Scene, assembled: Assembled) -> Vector:
 
 
 def _holding(scene: Scene) -> dict[Any, list[str]]:
-    """{place: components} that supports, springs or inertia hold."""
+    """{place: components} that supports or inertia hold."""
     found: dict[Any, list[str]] = {}
     for part in scene.supports:
         found.setdefault(part.z, []).extend(dof for dof in part.dofs if dof in scene.beam.components)
-    for spring in scene.springs:
-        found.setdefault(spring.z, []).extend(c for c, n in zip(COMPONENTS, spring.along or (), strict=False) if n)
     for mass in scene.masses:
-        turning = [c for c in COMPONENTS[3:] if c in scene.beam.components and np.any(mass.inertia)]
-        found.setdefault(mass.z, []).extend([*COMPONENTS[:3], *turning])
+        moved = np.any(_moved_by(mass, scene.beam), axis=0)
+        found.setdefault(mass.z, []).extend(c for c, inert in zip(COMPONENTS, moved, strict=True) if inert)
     return found
 
 
@@ -278,12 +276,16 @@ def _strengthened(scene: Scene, assembled: Assembled, parts: list[tuple[Any, flo
 
 
 def _arms(assembled: Assembled, scene: Scene, mass: Any) -> sparse.csr_matrix:
-    """Rows A of a rigid body on a place, AᵀA its mass matrix: √m (u + θ × e), then √J θ."""
+    """Rows A of a rigid body on a place, AᵀA its mass matrix."""
+    return rows_along(scene.beam, assembled, mass.z, _moved_by(mass, scene.beam))
+
+
+def _moved_by(mass: Any, body: Any) -> Vector:
+    """(6, 6): of the components of its place the rows of a rigid body, √m (u + θ × e), then √J θ."""
     offset = mass.offset if isinstance(mass.offset, tuple) else (0.0, 0.0, float(mass.offset))
     J = np.array(mass.inertia if isinstance(mass.inertia, tuple) else 3 * (mass.inertia,))
-    axes = shaft_axes(mass, scene.beam) if isinstance(mass, Disk) else np.eye(6)[3:]
-    along = np.vstack([np.sqrt(mass.mass) * arm_matrix(offset)[:3], _root_of(J) @ axes])
-    return rows_along(scene.beam, assembled, mass.z, along)
+    axes = shaft_axes(mass, body) if isinstance(mass, Disk) else np.eye(6)[3:]
+    return np.vstack([np.sqrt(mass.mass) * arm_matrix(offset)[:3], _root_of(J) @ axes])
 
 
 def _root_of(J: Vector) -> Vector:

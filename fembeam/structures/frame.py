@@ -265,7 +265,7 @@ class Frame:
         named = f", or write {str(z)!r}, the node" if str(z) in self.nodes else in_mm(z, most)
         raise ValueError(f"z must lie on the frame, {least:g} to {most:g} m, got {z} in {where}; move it{named}")
 
-    def check_held(self, held: Mapping[str, Collection[str]], where: str) -> None:
+    def check_held(self, held: Mapping[Any, Collection[str]], where: str) -> None:
         """Raise ValueError where releases free a node: `held` are its components that supports or inertia hold."""
         from fembeam.structures.frame_checks import check_held
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy import linalg, sparse
 from scipy.sparse.csgraph import connected_components
 
 from fembeam.beams import SAME_PLACE
@@ -143,28 +143,57 @@ def _kept(frame: Frame, member: int, end: int) -> Vector:
 
 def _free_motion(frame: Frame, carried: list[Vector]) -> str | None:
     """The first motion that nothing carries, in words; None if everything is."""
-    columns = [COMPONENTS.index(name) for name in frame.components]
-    _, size, directions = np.linalg.svd(np.vstack(carried)[:, columns])
-    if size[-1] > ALIGNED:
-        return None
-    motion = directions[-1]
-    return frame.components[int(np.argmax(np.abs(motion)))]
+    return _unheld(_own_columns(frame, carried), frame.components)
 
 
-def check_held(frame: Frame, held: Mapping[str, Collection[str]], where: str) -> None:
+def _own_columns(frame: Frame, rows: list[Vector]) -> Vector:
+    """Rows (…, 6) for the components that a frame has alone."""
+    return np.vstack(rows)[:, [COMPONENTS.index(name) for name in frame.components]]
+
+
+def _unheld(rows: Vector, names: Sequence[str]) -> str | None:
+    """What moves most in the first motion that all rows leave at zero; None if there is none."""
+    _, size, directions = np.linalg.svd(rows)
+    return None if size[-1] > ALIGNED else names[int(np.argmax(np.abs(directions[-1])))]
+
+
+def check_held(frame: Frame, held: Mapping[Any, Collection[str]], where: str) -> None:
     """Raise ValueError if releases leave a node free: `held` are the components that supports or inertia there hold."""
+    at: dict[Any, list[str]] = {}
+    for place, components in held.items():
+        at.setdefault(frame.site(place, where), []).extend(components)
     for node in dict.fromkeys(end for one in frame.members if one.release for end in (one.a, one.b)):
-        _held(frame, node, held.get(node, ()), where)
+        free = _free_motion(frame, carried(frame, node, at.get(node, ())))
+        require_held(free, node, [frame.members[i].name for i, _ in _ends(frame, node)], where)
 
 
-def _held(frame: Frame, node: str, components: Collection[str], where: str) -> None:
-    """Raise ValueError if releases leave this node free."""
-    ends = [(i, end) for i, one in enumerate(frame.members) for end in range(2) if node == (one.a, one.b)[end]]
-    carried = [_kept(frame, i, end) @ arm_matrix(frame.members[i].offset[end]) for i, end in ends]
-    free = _free_motion(frame, [*carried, *(np.eye(6)[[COMPONENTS.index(name)]] for name in components)])
-    names = [frame.members[i].name for i, _ in ends]
-    require(free is None, f"releases must not free a node; {node!r} moves along {free!r} without any resistance", names,
-            where, "leave one of these members unreleased there, or hold the node")  # fmt: skip
+def check_joined(ends: Sequence[tuple[Frame, str, Collection[str]]], dofs: Sequence[str], where: str) -> None:
+    """Raise ValueError if releases leave two nodes free that a joint makes one; each with what else holds it."""
+    own = linalg.block_diag(*(_own_columns(frame, carried(frame, node, held)) for frame, node, held in ends))
+    same = np.eye(6)[[COMPONENTS.index(name) for name in dofs]]
+    equal = np.hstack(
+        [sign * _own_columns(frame, [same]) for sign, (frame, _, _) in zip((1.0, -1.0), ends, strict=True)]
+    )
+    free = _unheld(np.vstack([own, equal]), [name for frame, _, _ in ends for name in frame.components])
+    members = [frame.members[i].name for frame, node, _ in ends for i, _ in _ends(frame, node)]
+    require_held(free, ends[0][1], members, where)
+
+
+def require_held(free: str | None, node: str, members: list[str], where: str) -> None:
+    """Raise ValueError where a node is free to move along a component."""
+    require(free is None, f"releases must not free a node; {node!r} moves along {free!r}, with no inertia", members,
+            where, "leave one of these members unreleased there, or give the node a support or inertia")  # fmt: skip
+
+
+def _ends(frame: Frame, node: str) -> list[tuple[int, int]]:
+    """Number of the member, and 0 or 1, of all ends at a node."""
+    return [(i, end) for i, one in enumerate(frame.members) for end in range(2) if node == (one.a, one.b)[end]]
+
+
+def carried(frame: Frame, node: str, held: Collection[str]) -> list[Vector]:
+    """Rows (…, 6) of the motions of a node that its members carry, and of those that are `held` by something else."""
+    members = [_kept(frame, i, end) @ arm_matrix(frame.members[i].offset[end]) for i, end in _ends(frame, node)]
+    return [*members, *(np.eye(6)[[COMPONENTS.index(name)]] for name in held)]
 
 
 def _carries(frame: Frame, member: int) -> None:

@@ -18,6 +18,7 @@ from fembeam.beams import SHORTEST_PRESSED
 from fembeam.structures.assembled import COMPONENTS, Assembled
 from fembeam.structures.directions import nearest
 from fembeam.structures.frame import Frame
+from fembeam.structures.frame_checks import check_joined
 from fembeam.structures.frame_forces import FrameForces
 from fembeam.structures.frame_mesh import FrameMatrices, spaced
 from fembeam.structures.joints import Joint, joined_fields, joining, shared_dofs, translations_of
@@ -206,16 +207,30 @@ class JoinedBodies:
     def check_held(self, held: Mapping[Any, Collection[str]], where: str) -> None:
         """Raise ValueError where releases free a node of a frame that neither supports nor joints hold."""
         at: list[tuple[Any, Collection[str]]] = [(self.located(place, where), dofs) for place, dofs in held.items()]
-        for joint in self.joints:
-            dofs = shared_dofs(self.bodies, joint, where)
-            at += [((joint.body, joint.place), dofs), (joint.to, dofs)]
+        joined = [
+            ((joint.body, joint.place), joint.to, shared_dofs(self.bodies, joint, where)) for joint in self.joints
+        ]
+        ends = [[(one, dofs), (other, dofs)] for one, other, dofs in joined]
         for number, body in enumerate(self.bodies):
             if hasattr(body, "check_held"):
-                mine: dict[Any, list[str]] = {}
-                for (on, place), components in at:
-                    if on == number:
-                        mine.setdefault(place, []).extend(components)
-                body.check_held(mine, where)
+                body.check_held(_held_on(number, [*at, *(end for pair in ends for end in pair)]), where)
+        for index, (one, other, dofs) in enumerate(joined):
+            beside = [end for i, pair in enumerate(ends) for end in pair if i != index]
+            self._check_joined((one, other), dofs, [*at, *beside], where)
+
+    def _check_joined(self, ends: Any, dofs: list[str], held: list[tuple[Any, Collection[str]]], where: str) -> None:
+        """Raise ValueError where releases on both sides of a joint leave its nodes free together."""
+        found = []
+        for number, place in ends:
+            frame = self.bodies[number]
+            node = frame.site(place, where) if isinstance(frame, Frame) else None
+            if not isinstance(node, str):
+                return
+            mine = _held_on(number, held)
+            found.append(
+                (frame, node, [c for at, names in mine.items() if frame.site(at, where) == node for c in names])
+            )
+        check_joined(found, dofs, where)
 
     def assembled(
         self,
@@ -363,6 +378,15 @@ class JoinedForces:
 def _members(body: Any) -> list[str]:
     """Names of the members of a frame; none of a structure."""
     return [one.name for one in getattr(body, "members", ())]
+
+
+def _held_on(number: int, held: Sequence[tuple[Any, Collection[str]]]) -> dict[Any, list[str]]:
+    """{place: components} of one body, of all that is held as ((number, place), components)."""
+    mine: dict[Any, list[str]] = {}
+    for (on, place), components in held:
+        if on == number:
+            mine.setdefault(place, []).extend(components)
+    return mine
 
 
 def located_among(bodies: Mapping[int, Any], place: Any, where: str) -> tuple[int, Any]:
