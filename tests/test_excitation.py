@@ -410,6 +410,7 @@ test_bad_noise = refused(
     (lambda: BandNoise.of_psd("flat", BROAD), "psd must be a function of omega or a table .* got str"),
     (lambda: BandNoise.of_psd(([0, 2000], [1, -1]), BROAD), "got -1.0 at omega = 2000 rad/s"),
     (lambda: BandNoise.of_psd(([0, 1000], [1, 1]), BROAD), r"spans \[0, 1000\] rad/s and must cover the band"),
+    (lambda: BandNoise.of_psd(([0, 1000, math.inf], [1, 1, 1]), BROAD), "finite and strictly increasing omega"),
     (lambda: BandNoise.of_psd(([0, 3000, 2000], [1, 1, 1]), BROAD), "strictly increasing omega"),
     (lambda: BandNoise.of_psd(([0, 3000], [1]), BROAD), "two columns of equal length"),
     (lambda: dataclasses.replace(BandNoise.of_psd(roll_off, BROAD), std=1.0), "std follows from psd"),

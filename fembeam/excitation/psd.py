@@ -72,8 +72,8 @@ def checked_table(psd: Any, band: tuple[float, float]) -> tuple[tuple[float, ...
         raise ValueError(f"psd must be a function of omega or a table (omega, S), got {type(psd).__name__}") from None
     if omega.ndim != 1 or omega.shape != density.shape or omega.size < 2:
         raise ValueError(f"psd table needs two columns of equal length >= 2, got {omega.shape} and {density.shape}")
-    if not np.all(np.diff(omega) > 0):
-        raise ValueError("psd table must have strictly increasing omega; sort it")
+    if not (np.all(np.isfinite(omega)) and np.all(np.diff(omega) > 0)):
+        raise ValueError("psd table must have finite and strictly increasing omega; sort it")
     if not (omega[0] <= band[0] and band[1] <= omega[-1]):
         raise ValueError(f"psd table spans [{omega[0]:g}, {omega[-1]:g}] rad/s and must cover the band {band}")
     checked_density(omega, density)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
@@ -18,6 +18,7 @@ from fembeam.structures.directions import nearest
 from fembeam.support import require
 
 Vector = NDArray[np.float64]
+PAIRS = "write [(20, 40), (40, 88)]"
 
 
 class NamedBody:
@@ -107,11 +108,18 @@ class NamedMatrices(Assembled):
         return self.body.rows_of(places)
 
 
-def checked_edges(lines: Iterable[Sequence[Any]], nodes: dict[Hashable, Vector], where: str) -> tuple[Any, ...]:
+def checked_edges(lines: Any, nodes: dict[Hashable, Vector], where: str) -> tuple[Any, ...]:
     """Pairs of nodes; of a chain of several each with the next. ValueError for a node whose place is not known."""
-    chains = [tuple(int(n) if isinstance(n, np.integer) else n for n in chain) for chain in lines]
+    listed = isinstance(lines, Iterable) and not isinstance(lines, (str, Mapping))
+    require(listed, "lines must be a list", lines, where, PAIRS)
+    chains = []
+    for chain in lines:
+        paired = isinstance(chain, (list, tuple, np.ndarray)) and len(chain) > 1
+        require(paired, "each of lines must be two nodes, or a chain of more", chain, where, PAIRS)
+        chains.append(tuple(int(n) if isinstance(n, np.integer) else n for n in chain))
     for chain in chains:
         for node in chain:
+            require(isinstance(node, (str, int)), "lines must join names or numbers of nodes", node, where, PAIRS)
             require(node in nodes, f"lines must join nodes whose coordinates are given; {nearest(node, list(nodes))}",
                     node, where, "add it to nodes")  # fmt: skip
     return tuple(pair for chain in chains for pair in pairwise(chain))
