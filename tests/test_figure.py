@@ -127,6 +127,9 @@ def test_axes_of_contacts_and_basins(model, given):
 
 
 def test_another_number_of_axes_is_refused(given):
+    for bad in (5, given[0]):
+        with pytest.raises(ValueError, match=r"axes must be axes of matplotlib, got .* by plt.subplots"):
+            plot.loops({"Hertz": Hertz(1e9)}, axes=bad)
     with pytest.raises(ValueError, match=r"as many as the figure has panels, got 2 in fembeam\.plot; give 1"):
         plot.loops({"Hertz": Hertz(1e9)}, axes=given[1])
     figure, axes = sheet(1, 2, (1.0, 1.0), np.array(given[1]))

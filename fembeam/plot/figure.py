@@ -37,7 +37,7 @@ def sheet(
 
     Raises
     ------
-    ValueError : another number of axes.
+    ValueError : another number of axes, or what is none.
     """
     if axes is None:
         from fembeam.plot.window import Figure
@@ -45,6 +45,8 @@ def sheet(
         made = Figure(figsize=size, layout="constrained")
         return made, list(np.atleast_1d(made.subplots(rows, columns, **options)).ravel())
     given: list[Axes] = list(np.ravel(np.asarray(axes, dtype=object)))
+    drawn = all(hasattr(one, "set_title") for one in given)
+    require(drawn, "axes must be axes of matplotlib", axes, "fembeam.plot", "make them by plt.subplots()")
     require(len(given) == rows * columns, MANY_ROOM, len(given), "fembeam.plot", f"give {rows * columns}")
     figure: Any = given[0].figure
     return figure, given
