@@ -641,6 +641,8 @@ def test_shaded_bands_are_the_intervals_of_the_estimates():
 def test_a_figure_of_the_wrong_object_says_what_it_draws(run):
     with pytest.raises(TypeError, match=r"plot\.time_history draws one Run, got Hertz"):
         plot.time_history(Hertz(1.0))
+    with pytest.raises(TypeError, match=r"plot\.loops draws things by name, got Hertz\(.*; write \{'name': it\}"):
+        plot.loops(Hertz(1e9))
     with pytest.raises(TypeError, match=r"plot\.mode_shapes draws one Model, got Run"):
         plot.mode_shapes(run)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from inspect import signature
 from typing import TYPE_CHECKING, Any, ParamSpec
@@ -51,7 +51,7 @@ STYLE = {
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     """Draw in the library's style, and leave the user's settings alone.
 
-    TypeError unless the first argument is of the class that ``draw`` names for it.
+    TypeError unless the first argument is of the class, or a mapping, that ``draw`` names for it.
     """
     wanted = next(iter(signature(draw).parameters.values())).annotation
 
@@ -61,6 +61,8 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
 
         if args and str(wanted).isidentifier() and wanted not in [one.__name__ for one in type(args[0]).__mro__]:
             raise TypeError(f"fembeam.plot.{draw.__name__} draws one {wanted}, got {type(args[0]).__name__}")
+        if args and str(wanted).startswith("Mapping") and not isinstance(args[0], Mapping):
+            raise TypeError(f"fembeam.plot.{draw.__name__} draws things by name, got {args[0]!r}; write {{'name': it}}")
         with rc_context(STYLE):  # type: ignore[arg-type]
             return draw(*args, **kwargs)
 
