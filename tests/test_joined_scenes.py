@@ -258,6 +258,10 @@ LEGS = [fb.Scene(leg("BC")), fb.Scene(leg("BC"))]
 
 # What cannot be joined, turned or reduced, each in a sentence.
 test_refused = refused(
+    (lambda: scene_of([AT_B], stops=[fb.Stop("A", LAW, direction="z", on=(5, "B"))]),
+     "on must name a body, 1 to 1, got 5"),
+    (lambda: scene_of([AT_B], masses=[fb.LumpedMass("B", 1.0, name="C")]),
+     "part named 'C' must be at the place of that name, got 'B' in Scene"),
     (lambda: scene_of([AT_B, fb.Joint("B", (1, "B"), dofs="x")]), r"one dof twice \(x\), got \(0, 1\)"),
     (lambda: scene_of([fb.Joint("Bb", (1, "B"))]), r"'B' is the nearest there is, got 'Bb' in joints.0. of Scene"),
     (lambda: scene_of([fb.Joint("B", (1, "D"))]), r"is the nearest there is, got 'D' in joints.0. of Scene"),

@@ -37,7 +37,7 @@ def merged(scene: Scene, features: Sequence[str]) -> dict[str, Any]:
                 "leave it out; a Structure may have its own C, a Dashpot acts where it is")  # fmt: skip
     whole = JoinedBodies(tuple(one.beam for one in joined), scene.joints)
     parts = {
-        name: [_moved(part, number, count) for number, one in enumerate(joined) for part in getattr(one, name)]
+        name: [_moved(part, number, count, scene) for number, one in enumerate(joined) for part in getattr(one, name)]
         for name in features
     }
     return {"beam": whole, "bodies": scene.bodies[count:], "joints": (), **{k: tuple(v) for k, v in parts.items()}}
@@ -55,14 +55,16 @@ def _count(scene: Scene) -> int:
     return count
 
 
-def _moved(part: Any, number: int, count: int) -> Any:
+def _moved(part: Any, number: int, count: int, scene: Scene) -> Any:
     """A part of a body at its place of the whole, with the second place of a stop or element."""
     changes: dict[str, Any] = {"z": (number, part.z)} if number else {}
-    known = {one.name for one in fields(part)}
+    own = {one.name for one in fields(part)}
     for key in SECOND:
-        to = getattr(part, key) if key in known else None
+        to = getattr(part, key) if key in own else None
         if to is not None:
             body, place = to if is_numbered(to) else (0, to)
+            known = number > 0 or body <= len(scene.bodies)
+            require(known, f"{key} must name a body, {choice(scene)}", body, part.where, "add it to bodies")
             if number:
                 changes[key] = (0, (number, place))
             elif 0 < body <= count:

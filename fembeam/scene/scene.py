@@ -433,12 +433,13 @@ class Scene:
                 self._check_second(one.coordinate, key, f"{name}[{index}]{one.quoted} of Scene")
 
     def _check_names(self) -> None:
-        """Raise ValueError if two parts have one name, those of bodies included."""
+        """Raise ValueError if two parts have one name, those of bodies included, or one that of another place."""
         known: dict[str, str] = {}
         for path, part in self.named_parts.items():
             other = known.setdefault(part.name, path)
             require(other == path, "names must be unique", part.name, f"{other} and {path} of Scene",
                     "give each part its own, or none")  # fmt: skip
+        _ = self.part_places  # of joined bodies a part may be called what a place of another one is
 
     def _check_second(self, place: LocalCoordinate, key: str, where: str) -> None:
         """Raise ValueError unless what a stop or element acts on exists and can move."""
