@@ -190,6 +190,12 @@ def test_names_of_parameters():
     assert axis_name("springs[0].stiffness", scene) == "stiffness of rod / N/m"
     with pytest.raises(ValueError, match="no such parameter"):
         path_of(scene, "stops[valve].gap")
+    holes = cantilever(stops=[fb.Stop(z, Hertz(1e7), name=name) for z, name in ((0.3, "1"), (0.4, "2"), (0.5, "3"))])
+    for number, z in enumerate((0.3, 0.4, 0.5)):  # stops[1] was the one called so, as stops[0]
+        assert value_of(holes, f"stops[{number}].z") == z
+        assert with_value(holes, f"stops[{number}].gap", 1e-3).stops[number].gap == 1e-3
+    with pytest.raises(ValueError, match="no such parameter"):
+        path_of(holes, "stops[3].z")
     body = cantilever(stops=[fb.Stop(0.5, Hertz(1e7), name="far")])
     assert path_of(cantilever(bodies=[body]), "bodies[0].stops[far].gap") == "bodies[0].stops[0].gap"
 
@@ -221,6 +227,9 @@ def test_names_in_scene_files(tmp_path, file_of):
     assert file_of(FILE, "stops[0].name=exhaust").scene.stops[0].name == "exhaust"
     again = fb.load(replace(file.model().simulate(0.05, 1e-3), source=file.source).save(tmp_path / "run"))
     assert again.scene_file.scene == file.scene
+    second = '[[stops]]\nz = 0.4\nlaw = { kind = "hertz", stiffness = 1e7 }\nname = "0"\n[damping]'
+    numbered = file_of(FILE.replace("[damping]", second), "stops[0].gap=1e-4").scene
+    assert [stop.gap for stop in numbered.stops] == [1e-4, 0.0]
     for change, message in (
         ("stops[valv].gap=1", "stops has 1 item, counted from 0, none of the name 'valv'"),
         ("stops[0].name=3", r"\[\[stops\]\] number 1: name must be text, got 3"),

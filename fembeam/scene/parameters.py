@@ -103,10 +103,10 @@ def path_of(scene: Scene, name: str) -> str:
 
 
 def numbered(scene: Scene, path: str) -> str:
-    """A path with numbers for the names of parts: "stops[0].gap" for "stops[valve].gap"."""
+    """A path with numbers for the names of parts: "stops[0].gap" for "stops[valve].gap"; what is a number stays one."""
     for numbers, part in scene.named_parts.items():
         called = f"{numbers.rpartition('[')[0]}[{part.name}]."
-        if path.startswith(called):
+        if path.startswith(called) and not part.name.isdecimal():
             return f"{numbers}.{path.removeprefix(called)}"
     return path
 
@@ -124,7 +124,7 @@ def _by_name(scene: Scene, known: Iterable[str]) -> list[str]:
         f"{numbers.rpartition('[')[0]}[{part.name}]{path.removeprefix(numbers)}"
         for path in known
         for numbers, part in parts
-        if path.startswith(f"{numbers}.")
+        if path.startswith(f"{numbers}.") and not part.name.isdecimal()
     ]
 
 

@@ -125,10 +125,12 @@ def _override(tables: dict[str, Any], text: str) -> None:
     for i, (name, after) in enumerate(pairwise([*path, ""])):
         if isinstance(item, list):
             called = [number for number, one in enumerate(item) if isinstance(one, dict) and one.get("name") == name]
-            if not called and not (name.isdecimal() and int(name) < len(item)):
+            if name.isdecimal():  # a number, whatever parts are called
+                called = [int(name)] if int(name) < len(item) else []
+            if not called:
                 has = f"{'.'.join(path[:i])} has {counted(len(item), 'item')}"
                 raise ValueError(f"--set {text}: {has}, counted from 0, none of the name {name!r}")
-            name = called[0] if called else int(name)  # type: ignore[assignment]
+            name = called[0]  # type: ignore[assignment]
         elif not isinstance(item, dict):
             raise ValueError(f"--set {text}: {'.'.join(path[:i])} is no table")
         if not after:
