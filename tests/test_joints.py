@@ -151,6 +151,13 @@ def test_what_holds_a_released_node():
     clamps, spring = [fb.Clamped("A"), fb.Clamped("C")], fb.Spring("B", 0.1, direction="rz")
     with pytest.raises(ValueError, match="'B' moves along 'rz', with no inertia"):
         fb.Scene(frame, clamps, springs=[spring]).reduce(2)
+    hinges = [(f"{end} rx", f"{end} ry", f"{end} rz") for end in ("end", "start")]
+    chain = [fb.Member(*ends, FLAT, release=free) for ends, free in zip(("AB", "BC"), hinges, strict=True)]
+    space = fb.Frame({"A": (0, 0, 0), "B": (1, 0.5, 0.2), "C": (2, 0, 1)}, chain)
+    with pytest.raises(
+        ValueError, match="releases must not free a node; 'B' moves along"
+    ):  # about its arm it turns freely
+        fb.Scene(space, clamps, [fb.LumpedMass("B", 1.0, offset=(0.1, 0.1, 0.0))]).reduce(2)
     arm, inertia = (
         fb.Scene(frame, clamps, [mass], [spring]).reduce(2)
         for mass in (fb.LumpedMass(1.0, 1.0, offset=(0.0, 0.1)), fb.LumpedMass("B", 1.0, inertia=0.01))

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
 
 MOST_RIGID = 6
+INERT = 1.0 - 1e-9  # of 1: the share of a motion that a mass has inertia for
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,8 +209,10 @@ def _holding(scene: Scene) -> dict[Any, list[str]]:
     for part in scene.supports:
         found.setdefault(part.z, []).extend(dof for dof in part.dofs if dof in scene.beam.components)
     for mass in scene.masses:
-        moved = np.any(_moved_by(mass, scene.beam), axis=0)
-        found.setdefault(mass.z, []).extend(c for c, inert in zip(COMPONENTS, moved, strict=True) if inert)
+        rows = _moved_by(mass, scene.beam)
+        shares = [np.diag(np.linalg.pinv(block) @ block) for block in (rows[:, :3], rows[:, 3:])]
+        inert = np.concatenate(shares) > INERT
+        found.setdefault(mass.z, []).extend(c for c, moves in zip(COMPONENTS, inert, strict=True) if moves)
     return found
 
 
