@@ -7,7 +7,18 @@ import pytest
 from scipy.integrate import quad
 
 import fembeam as fb
-from contacts import BoucWen, Coulomb, ElastoPlastic, Hertz, Hysteretic, Iwan, Jenkins, KelvinVoigt, Polynomial
+from contacts import (
+    BoucWen,
+    Coulomb,
+    ElastoPlastic,
+    Hertz,
+    Hysteretic,
+    Iwan,
+    Jenkins,
+    KelvinVoigt,
+    Polynomial,
+    WaltonBraun,
+)
 from fembeam.study import equivalent
 
 K, F = 2e4, 10.0
@@ -102,6 +113,17 @@ def test_a_stop():
     hertz = quad(lambda x: math.cos(x) ** 2.5, 0.0, math.pi / 2)[0] * 2.0 / math.pi * 1e7 * 1e-3**0.5
     assert equivalent(Hertz(1e7), 1e-3).stiffness[0] == pytest.approx(hertz, rel=1e-8)
     assert equivalent(Hysteretic(1e7, 0.3), 1e-3, omega=100.0).energy[0] > 0.0
+
+
+@pytest.mark.parametrize("beside", [WaltonBraun(1e4, 3e4), WaltonBraun(1e4, 3e4) + Jenkins(2e3, 0.1), Hertz(1e7)])
+@pytest.mark.parametrize("mean", [0.0, 3e-4])
+def test_what_acts_beside_a_stop_acts_as_long_as_it_is_closed(beside, mean):
+    """c X² ω (θ - sin θ cos θ) in place of π c X² ω, θ the angle at which the stop opens."""
+    X, omega, c = 1e-3, 10.0, 10.0
+    angle = math.acos(-mean / X)
+    both, alone = (equivalent(law, [X], omega, mean) for law in (beside + KelvinVoigt(1.0, c), beside))
+    lost = c * X**2 * omega * (angle - math.sin(angle) * math.cos(angle))
+    assert both.energy[0] - alone.energy[0] == pytest.approx(lost, rel=1e-6)
 
 
 def test_bad_input_and_what_is_shown():

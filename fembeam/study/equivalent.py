@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from contacts import Law, Sum
 from contacts.path import walk
+from contacts.sums import Gated
 from fembeam import plot
 from fembeam.study.result import Result
 from fembeam.support import Part, by_rows, number, require, vector
@@ -97,7 +98,7 @@ def equivalent(
     amplitudes : X (k,), m, > 0.
     omega : rad/s, > 0, for laws whose force depends on the rate; None: a slow cycle.
     mean : m, finite, about which δ moves: -g for a gap g in a motion about the rest.
-    stop : whether there is no force where δ <= 0; so it is for laws that know δ > 0 only.
+    stop : whether there is no force where δ <= 0; so it is for laws that know δ > 0 only, and for dashpots beside them.
 
     Returns
     -------
@@ -139,8 +140,16 @@ def equivalent(
 def harmonics(law: Law, X: float, mean: float, omega: float | None = None, stop: bool = False) -> Vector:
     """(∮ F cos θ dθ, ∮ F dδ) of the steady cycle; of a sum, the sum of both."""
     if isinstance(law, Sum):
-        return np.sum([harmonics(part, X, mean, omega, stop) for part in law.parts], axis=0)
+        stop = stop or (law.one_sided and not law.memory)
+        return np.sum([_of_part(part, X, mean, omega, stop) for part in law.acting], axis=0)
     return _with_memory(law, X, mean) if law.memory else _without(law, X, mean, omega, stop)
+
+
+def _of_part(part: Law, X: float, mean: float, omega: float | None, stop: bool) -> Vector:
+    """`harmonics` of a law beside others, some of which make it act for δ > 0 only."""
+    if isinstance(part, Gated):
+        return harmonics(part.law, X, mean, omega, stop=True)
+    return harmonics(part, X, mean, omega, stop)
 
 
 def _without(law: Law, X: float, mean: float, omega: float | None, stop: bool) -> Vector:
