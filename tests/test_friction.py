@@ -375,6 +375,17 @@ def test_a_slip_at_entry_far_shorter_than_any_step(method):
     assert run.q_dot[-1, 1] == pytest.approx(0.082746796, abs=1e-8)  # of `DormandPrince`
 
 
+@pytest.mark.parametrize(("k_t", "mu"), [(1.8e14, 1e-3), (1e15, 1e-3), (1.8e15, 1e-2), (5.6e15, 1e-2)])
+def test_a_slip_within_a_swing_as_short_as_the_shortest_step(k_t, mu):
+    """Its spring swings in 1e-9 s, as long as the shortest step of a free mass, and the slip begins long before."""
+    system = replace(wall(KelvinVoigt(1e6, 5.0), mu, k_t, mass=1e-3), loads=[([1.0, 0.2], fb.Harmonic(1.0, 0.0))])
+    start = [-1e-9, 0.0], [0.1, 0.01], 1e-3
+    run, exact = (integrate(system, *start, method=method) for method in (Exponential(1e-9), SHARP))
+    assert run.transitions.event.tolist() == exact.transitions.event.tolist()
+    np.testing.assert_allclose(run.q_dot[-1], exact.q_dot[-1], rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(run.losses.loss, exact.losses.loss, rtol=1e-7)
+
+
 @pytest.mark.parametrize("turning", [-0.00764, -0.00722, -0.00714, -0.0067])
 def test_slips_within_the_rounding_of_an_indentation(turning):
     """Under δ^1.2 one at entry ends at 1e-23 m, and before the opening others begin at 1e-16 m and less."""

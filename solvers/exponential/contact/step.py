@@ -31,6 +31,7 @@ from solvers.compiled.kernels import (
     rhs,
     row_of,
     rubs,
+    slider_of,
     surface_tolerance,
 )
 from solvers.compiled.parts import ACCEPT, BEHIND, CONTACT, FIRST_END, PRESSED, part
@@ -88,12 +89,14 @@ from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.outputs import end_run, finish_step, record_forces, sample_step
 from solvers.exponential.contact.segment_ends import first_end, go_beyond, land_first, land_in_time
 from solvers.exponential.energy.contact_balance import account_contact
+from solvers.problem.friction import CODE, STICK, STIFFNESS
 
 _ERROR_GOAL = 0.3  # error aimed at, in units of the tolerance
 _ORDER = 15.0  # the error estimate falls like h^15
 _SHORTLY_BEFORE = 0.9  # part of the time to a border after which a step ends, for a landing to follow
 _CROSSING_KNOWN = 8  # levels, √2 each, shorter at once: a step not resolved yet may see a crossing near its start
 _FEWEST_STEPS = 100.0  # in the time of an impact, of the shortest ones
+_SWING = 0.1  # angle of it, rad, in the shortest step, beyond which a slip that begins within may be lost
 _COUNTS = 0.3  # speed of an impact, in units of the reference speed, whose force must be resolved
 NEITHER, MOVES_OUT, RESTS = range(3)  # what `_leave_or_rest` finds
 _ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # ratio of the errors of two steps whose lengths differ by √2, one level
@@ -417,7 +420,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
             level = _end_before(tables, state, scratch, level, tried)
         else:
             level = wanted = min(shortest, level + _levels_shorter(tried.error))
-    if level == shortest and _relaxes_within(problem, tables, state, scratch):
+    if level == shortest and _moves_within(problem, tables, state, scratch):
         return STEP_TOO_SMALL
     _accept(
         *(problem, tables, energy_tables, state, scratch, node_set, level, wanted),
@@ -437,14 +440,26 @@ def _is_too_brief(problem, tables, state, scratch):
     return brief and indentation_rate(problem, s, state.x) > _COUNTS * scratch.reference_speed[s]
 
 
+@inlined
+def _spring_swings_within(problem, tables, state, s):
+    """Whether the spring of a slider that sticks swings on the body so fast that the shortest step is no small part."""
+    if not (rubs(problem, s) and state.segment[s] > 0 and slider_of(problem, s)[CODE] == STICK):
+        return False
+    mobility = 0.0
+    for r in range(row_of(problem, s) + (0 if is_circle(problem, s) else 1), row_of(problem, s + 1)):
+        mobility += tables.accelerance[r, r]
+    return slider_of(problem, s)[STIFFNESS] * mobility * shortest_step(tables) ** 2 > _SWING * _SWING
+
+
 @merged
-def _relaxes_within(problem, tables, state, scratch):
-    """Whether a dashpot takes a rate to its equilibrium within the shortest step, which then does not resolve it."""
+def _moves_within(problem, tables, state, scratch):
+    """Whether a dashpot takes a rate to its equilibrium, or friction swings, within the shortest step, unresolved."""
     found = False
     for s in range(problem.law.size):
         if state.segment[s] > 0 and scratch.viscous[s] > 0.0:
             rate = scratch.viscous[s] * own_accelerance(problem, tables, s)
             found |= rate * shortest_step(tables) > 1.0
+        found |= _spring_swings_within(problem, tables, state, s)
     return found
 
 
