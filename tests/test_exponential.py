@@ -11,7 +11,17 @@ from problems import PAPER_LAW, free_mass, paper_scene, two_sided_scene
 from regularised import regularised
 
 import fembeam as fb
-from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Polynomial, Viscoelastic, WaltonBraun, law
+from contacts import (
+    Hertz,
+    Hysteretic,
+    Jenkins,
+    KelvinVoigt,
+    PiecewiseLinear,
+    Polynomial,
+    Viscoelastic,
+    WaltonBraun,
+    law,
+)
 from solvers import Contact, DormandPrince, Exponential, SolverError, Status, System, integrate, integrate_many
 from solvers.integration import prepared_once
 
@@ -251,6 +261,23 @@ def test_a_rate_comes_to_rest_within_any_time(clamp, time):
     system = System([[1.0]], [[0.0]], [[1e4]], [Contact([-1.0], made, -depth)])
     end = integrate(system, [0.0], [speed], 300.0 * time, method=Exponential(1e-8))
     assert end.q_dot[0, 0] == pytest.approx(-speed / a, rel=1e-6)
+
+
+@pytest.mark.parametrize("law", [KelvinVoigt(3e16, 0.0), WaltonBraun(1e17, 1e17), Jenkins(1e17, 1e12)])
+def test_what_is_pressed_at_the_start_swings_in_any_time(law):
+    """It swings like a cosine, in 1e-9 s and less: the first steps were as long, and lost or made energy."""
+    omega = np.sqrt(law.parameters[law.parameters > 1e15][0] / 1e-3)
+    system = System([[1e-3]], [[0.0]], [[1e3]], [Contact([-1.0], law, -1e-6, always=isinstance(law, Jenkins))])
+    run = integrate(system, [0.0], [0.0], 0.9 / omega, method=Exponential(1e-9))
+    assert run.q_dot[-1, 0] == pytest.approx(-1e-6 * omega * np.sin(0.9), rel=1e-6)
+
+
+def test_a_slider_far_beyond_its_limit_slips_at_once_however_stiff():
+    """From 3e15 N/m on it stuck first: 1 g was thrown at 3590 m/s."""
+    system = System([[1e-3]], [[0.0]], [[1e3]], [Contact([-1.0], Jenkins(3e15, 1e-3), -1e-5, always=True)])
+    run = integrate(system, [0.0], [1e-2], 1e-3, method=Exponential(1e-9))
+    exact = 1e-2 * np.cos(1.0) - 1e-3 * np.sin(1.0)  # of 1000 rad/s under 1e-3 N
+    assert run.q_dot[-1, 0] == pytest.approx(exact, rel=1e-8)
 
 
 def test_impacts_shorter_than_rounding_of_time_are_refused():

@@ -82,6 +82,7 @@ from solvers.exponential.contact.node_response import (
     WHEN,
     force_of,
     free_response,
+    motion_of,
     own_accelerance,
     shortest_step,
 )
@@ -96,7 +97,7 @@ _ORDER = 15.0  # the error estimate falls like h^15
 _SHORTLY_BEFORE = 0.9  # part of the time to a border after which a step ends, for a landing to follow
 _CROSSING_KNOWN = 8  # levels, √2 each, shorter at once: a step not resolved yet may see a crossing near its start
 _FEWEST_STEPS = 100.0  # in the time of an impact, of the shortest ones
-_SWING = 0.1  # angle of it, rad, in the shortest step, beyond which a slip that begins within may be lost
+_SWING = 0.1  # angle of it, rad, in the shortest step, beyond which this may lose an event or err
 _COUNTS = 0.3  # speed of an impact, in units of the reference speed, whose force must be resolved
 NEITHER, MOVES_OUT, RESTS = range(3)  # what `_leave_or_rest` finds
 _ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # ratio of the errors of two steps whose lengths differ by √2, one level
@@ -451,15 +452,29 @@ def _spring_swings_within(problem, tables, state, s):
     return slider_of(problem, s)[STIFFNESS] * mobility * shortest_step(tables) ** 2 > _SWING * _SWING
 
 
+@inlined
+def _swings_within(problem, tables, state, scratch, s):
+    """The same of an element by itself, as stiff as its forces have changed over the change of δ on the step."""
+    force, deltas = force_of(problem, scratch, s), motion_of(problem, scratch, s)[0]
+    low, high, least, most = force[0], force[0], deltas[0], deltas[0]
+    for i in range(1, S):
+        low, high = min(low, force[i]), max(high, force[i])
+        least, most = min(least, deltas[i]), max(most, deltas[i])
+    change = (high - low) * own_accelerance(problem, tables, s) * shortest_step(tables) ** 2
+    moved = most - least + surface_tolerance(problem, s, state.x)
+    return state.segment[s] > 0 and not is_circle(problem, s) and change > _SWING * _SWING * moved
+
+
 @merged
 def _moves_within(problem, tables, state, scratch):
-    """Whether a dashpot takes a rate to its equilibrium, or friction swings, within the shortest step, unresolved."""
+    """Whether a dashpot, a spring of friction or a force moves an element so fast that no step resolves it."""
     found = False
     for s in range(problem.law.size):
         if state.segment[s] > 0 and scratch.viscous[s] > 0.0:
             rate = scratch.viscous[s] * own_accelerance(problem, tables, s)
             found |= rate * shortest_step(tables) > 1.0
         found |= _spring_swings_within(problem, tables, state, s)
+        found |= _swings_within(problem, tables, state, scratch, s)
     return found
 
 
