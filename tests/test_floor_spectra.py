@@ -87,7 +87,26 @@ def test_table_and_print(run, tmp_path):
     largest = found["valve, x"].acceleration[0].max()
     assert re.search(rf"^valve, x +0.02 +{largest:.5g} ", str(found), re.M)
     found.save(tmp_path / "floor.csv")
-    assert (tmp_path / "floor.csv").read_text(encoding="utf-8").startswith("place,zeta,period,omega,acceleration")
+    assert (
+        (tmp_path / "floor.csv")
+        .read_text(encoding="utf-8")
+        .startswith(
+            "place,zeta,period [s],omega [rad/s],acceleration [m/s²],pseudo_acceleration [m/s²],velocity [m/s],"
+        )
+    )
+
+
+def test_rotations_have_units_of_their_own(run, tmp_path):
+    found = fb.study.floor_spectra(run, [("valve", "x"), ("B", "ry")], periods=PERIODS)
+    assert "largest acceleration / m/s² or rad/s²" in str(found)
+    turned = fb.study.floor_spectra(run, [("B", "ry")], periods=PERIODS)
+    turned.save(tmp_path / "turned.csv")
+    head = (tmp_path / "turned.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert head.endswith("acceleration [rad/s²],pseudo_acceleration [rad/s²],velocity [rad/s],displacement [rad]")
+    acceleration, rotation = (axis.get_ylabel() for axis in turned.figure().axes)
+    assert acceleration == "largest acceleration / rad s⁻²"
+    assert rotation.startswith("largest rotation / ")
+    assert rotation.endswith("rad")
 
 
 def test_a_scene_file_gives_the_numbers_of_python(file, run, tmp_path):

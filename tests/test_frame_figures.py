@@ -212,3 +212,17 @@ def test_static_shapes_are_called_so(plane, tmp_path):
     assert r"$\omega_{3}$" not in above
     files.write(run, tmp_path)
     assert "<td>static shape</td>" in html.write_page(tmp_path).read_text(encoding="utf-8")
+
+
+def test_rotations_are_drawn_in_radians():
+    frame = fb.Frame.polyline({"A": (0, 0), "B": (0, 1), "C": (0.8, 1)}, fb.Section.circle(2.1e11, 7850.0, 0.02))
+    base, damping = {"x": fb.Harmonic(1e-3, 30.0)}, fb.ModalDamping(0.05)
+    model, turned = fb.Scene(frame, [fb.Clamped("A")], base=base, damping=damping).reduce(modes=2), ("C", "rz")
+    orbit, run = model.orbit(), model.simulate(0.5, 1e-2)
+    branch = model.branch("base.x.omega", (29.0, 31.0)).run()
+    figures = fb.plot.orbit(orbit, turned), fb.plot.branch(branch, turned), fb.plot.time_history(run, z=turned)
+    drawn = [axis for figure in figures for axis in figure.axes]
+    labels = [axis.get_ylabel() for axis in drawn]
+    assert labels == ["u(C, rz) / mrad", "velocity / rad/s", "max |u(C, rz)| / mrad", "rotation / mrad"]
+    assert drawn[0].lines[0].get_ydata() == pytest.approx(1e3 * orbit.run.displacement(turned))
+    assert drawn[2].lines[0].get_ydata().max() == pytest.approx(1e3 * np.abs(branch.extremes(turned)).max())

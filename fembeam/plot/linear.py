@@ -10,7 +10,7 @@ import numpy as np
 
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.style import Vector, place_name, plain_decades, styled, verbatim
-from fembeam.plot.units import length_for
+from fembeam.plot.units import length_for, unit_for
 from fembeam.scene import split
 from fembeam.structures import UP
 from fembeam.support import require
@@ -53,7 +53,9 @@ def response_spectrum(
     figure, (upper, lower) = sheet(2, 1, (7.0, 5.2), axes, sharex=True)
     several = spectrum if isinstance(spectrum, Mapping) else {"": spectrum}
     require(bool(several), "nothing to draw", spectrum, "plot.response_spectrum", "give one spectrum or more")
-    scale, unit = length_for([one.displacement for one in several.values()])
+    plain = " or ".join(dict.fromkeys(one.unit for one in several.values()))
+    shown = [one.displacement for one in several.values()]
+    scale, unit = length_for(shown) if plain == "m" else unit_for(shown, plain)
     moves = any(one.acceleration.any() or one.displacement.any() for one in several.values())
     draw = Axes.loglog if moves else Axes.semilogx
     for name, one in several.items():
@@ -66,8 +68,9 @@ def response_spectrum(
             draw(upper, period, one.pseudo_acceleration[i, order], "k--", linewidth=0.7)  # seen where they coincide
             draw(lower, period, scale * one.displacement[i, order], color=colour)
     upper.lines[-1].set_label("pseudo-acceleration ω² max |x|")
-    upper.set(ylabel="largest acceleration / m s⁻²", title="Response spectrum")
-    lower.set(xlabel="period / s", ylabel=f"largest displacement / {unit}")
+    rates = " or ".join(f"{word} s⁻²" for word in plain.split(" or "))
+    upper.set(ylabel=f"largest acceleration / {rates}", title="Response spectrum")
+    lower.set(xlabel="period / s", ylabel=f"largest {'rotation' if plain == 'rad' else 'displacement'} / {unit}")
     for axis in (upper, lower):
         axis.margins(x=0.0)
         plain_decades(axis.xaxis, *axis.get_xlim())

@@ -23,7 +23,7 @@ from fembeam.plot.style import (
     styled,
     verbatim,
 )
-from fembeam.plot.units import length_for, unit_for
+from fembeam.plot.units import motion_for, unit_for
 from fembeam.scene import signals_of, turns_at
 from fembeam.scene.parameters import scalars
 from fembeam.support import require
@@ -77,7 +77,7 @@ def branch(
     place = observed(model) if z is None else z
     figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
     peaks = [np.array([peak(orbit, place) for orbit in one.orbits]) for one in several]
-    scale, unit = length_for([*peaks, *([] if cloud is None else [cloud[1]])])
+    scale, unit = motion_for(place, [*peaks, *([] if cloud is None else [cloud[1]])])
     if cloud is not None:
         _draw_cloud(axis, cloud, scale)
     periods = [one.family.period for one in several]
@@ -103,7 +103,7 @@ def bifurcation(found: Bifurcation, axes: Axes | None = None) -> Figure:
     """Largest |u| of every settled period against the parameter; `axes` to draw into, None makes a figure."""
     figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)
     peaks = found.cloud()[1]
-    scale, unit = unit_for(peaks, "rad") if turns_at(found.z) else length_for(peaks)
+    scale, unit = motion_for(found.z, peaks)
     _draw_cloud(axis, found.cloud(), scale)
     axis.set(xlabel=verbatim(found.title), ylabel=f"max |{displacement_name(found.z)}| / {unit}")
     return figure
@@ -306,8 +306,8 @@ def orbit(one: Orbit, z: Any = None, axes: Sequence[Axes] | None = None) -> Figu
     place = observed(one.model) if z is None else z
     figure, (left, right) = sheet(1, 2, (6.4, 2.8), axes, width_ratios=[3, 2])
     t, u, v = one.run.t, one.run.displacement(place), one.run.velocity(place)
-    (scale, unit), (tick, second) = length_for(u), unit_for(t, "s", usual=-3)
-    rate, speed = unit_for(v, "m/s")
+    (scale, unit), (tick, second) = motion_for(place, u), unit_for(t, "s", usual=-3)
+    rate, speed = unit_for(v, "rad/s" if turns_at(place) else "m/s")
     u, v = scale * u, rate * v
     left.plot(tick * t, u)
     for t_in, t_out in zip(one.contacts.t_in, one.contacts.t_out, strict=True):

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.plot.figure import heading, sheet
 from fembeam.plot.style import BLUE, RED, Vector, displacement_name, styled, verbatim
-from fembeam.plot.units import length_for, unit_for
-from fembeam.scene import turns_at
+from fembeam.plot.units import motion_for
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,7 +43,7 @@ def peak_curve(found: Peak, axes: Sequence[Axes] | None = None) -> Figure:
     tops = sorted([*found.tops, *([found.least] if found.least else [])], key=lambda one: one.value)
     p, at = np.array([one.value for one in tops]), np.array([one.at for one in tops])
     amplitude = np.array([one.amplitude for one in tops])
-    scale, unit = _scale(found.z, amplitude)
+    scale, unit = motion_for(found.z, amplitude)
     height = scale * amplitude
     stable = np.array([one.stable for one in tops])
     upper.plot(*_between(p, height, scale * np.array([one.slope for one in tops])), "-", color=BLUE)
@@ -80,7 +79,7 @@ def backbone(found: Backbone, axes: Sequence[Axes] | None = None) -> Figure:
     'ω / rad s⁻¹'
     """
     figure, (upper, lower) = sheet(2, 1, (6.4, 4.8), axes, sharex=True)
-    scale, unit = _scale(found.z, found.amplitude)
+    scale, unit = motion_for(found.z, found.amplitude)
     x, stable = scale * found.amplitude, found.stable
     for axis, y in ((upper, found.omega), (lower, found.zeta)):
         axis.plot(x, y, "-", color=BLUE)
@@ -115,7 +114,7 @@ def fold_curve(found: Fold, axes: Sequence[Axes] | None = None) -> Figure:
     'drive frequency ω / rad s⁻¹'
     """
     figure, (upper, lower) = sheet(2, 1, (6.4, 4.8), axes, sharex=True, height_ratios=(1, 1))
-    scale, unit = _scale(found.z, found.amplitude)
+    scale, unit = motion_for(found.z, found.amplitude)
     height = scale * found.amplitude
     for axis, y in ((upper, found.at), (lower, height)):
         axis.plot(found.values, y, ".-", color=BLUE)
@@ -128,11 +127,6 @@ def fold_curve(found: Fold, axes: Sequence[Axes] | None = None) -> Figure:
         upper.legend()
     heading([upper, lower], "Folds of the response", axes is None)
     return figure
-
-
-def _scale(z: Any, amplitude: Vector) -> tuple[float, str]:
-    """Factor and unit of amplitudes at a place."""
-    return unit_for(amplitude, "rad") if turns_at(z) else length_for(amplitude)
 
 
 def _dots(axis: Axes, x: Vector, y: Vector, stable: NDArray[np.bool_]) -> None:

@@ -47,8 +47,8 @@ from fembeam.plot.run_signals import (
 )
 from fembeam.plot.spectra import segment_for
 from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, entry, own_colour, place_name, styled, verbatim
-from fembeam.plot.units import length_for, unit_for
-from fembeam.scene import persistent_drive, unit_of
+from fembeam.plot.units import length_for, motion_for, unit_for
+from fembeam.scene import persistent_drive, turns_at, unit_of
 from fembeam.support import require
 
 if TYPE_CHECKING:
@@ -89,10 +89,11 @@ def time_history(
     body, place = _watched(run, lo, hi) if z is None else (0, z)
     figure, drawn = sheet(2 if len(run.stops) else 1, 1, (7.0, 4.2), axes, sharex=True)
     t, u = _displacement(run, place, body, lo, hi)
-    (scale, unit), (tick, second) = length_for(u), unit_for((lo, hi), "s")
+    (scale, unit), (tick, second) = motion_for(place, u), unit_for((lo, hi), "s")
     drawn[0].plot(tick * t, scale * u, color=BLUE)
-    drawn[0].set_ylabel(f"displacement / {unit}")
-    title = f"Displacement at {verbatim(_name(run, body, place))} relative to the frame"
+    kind = "rotation" if turns_at(place) else "displacement"
+    drawn[0].set_ylabel(f"{kind} / {unit}")
+    title = f"{kind.capitalize()} at {verbatim(_name(run, body, place))} relative to the frame"
     if len(run.stops):
         stops = _stops_at(run, body, place)
         _shade_contacts(drawn, run, stops, lo, hi, tick)

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from fembeam.scene import turns_at
+
 PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 LEAST, MOST = 0.01, 2000.0  # of the largest number on an axis in its usual unit; beyond it takes another prefix
 LARGEST = {"m": 0, "s": 0}  # no km, no ks
@@ -44,6 +46,17 @@ def length_for(shown: Any) -> tuple[float, str]:
     ((1000.0, 'mm'), (1000000.0, 'µm'), (1.0, 'm'))
     """
     return (1.0, "m") if largest(shown) > 1.0 else unit_for(shown, "m", usual=-3)
+
+
+def motion_for(z: Any, shown: Any) -> tuple[float, str]:
+    """Of what a place does: of a rotation rad, else as lengths.
+
+    Examples
+    --------
+    >>> motion_for(("lever", "rx"), 2e-3), motion_for(("lever", "x"), 2e-3)
+    ((1000.0, 'mrad'), (1000.0, 'mm'))
+    """
+    return unit_for(shown, "rad") if turns_at(z) else length_for(shown)
 
 
 def largest(shown: Any) -> float:

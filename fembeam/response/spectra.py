@@ -9,12 +9,13 @@ With z = x' - λ̄ x, λ = -ζω + iω√(1 - ζ²), this is z' = λ z - a, whos
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fembeam.scene import turns_at
 from fembeam.support import numbers, require, vector
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ class ResponseSpectrum:
     omega : (p,) rad/s. zeta : (d,) damping ratios.
     displacement, velocity : (d, p) max |x| in m and max |x'| in m/s, relative to what carries the oscillator.
     acceleration : (d, p) max |x'' + a| = max |2 ζ ω x' + ω² x| in m/s², absolute.
+    unit : of the displacement; of a rotation rad, and so the others.
     """
 
     omega: Vector
@@ -52,6 +54,7 @@ class ResponseSpectrum:
     displacement: Vector
     velocity: Vector
     acceleration: Vector
+    unit: str = "m"
 
     def __repr__(self) -> str:
         low, high = self.omega.min(), self.omega.max()
@@ -140,7 +143,8 @@ def floor_spectrum(
         warnings.warn(f"contacts of {shortest:.2g} s are not resolved by samples {step:.2g} s apart: their "
                       f"acceleration is missed or counted too long; simulate with dt below {shortest / FEW:.2g}",
                       UserWarning, stacklevel=3)  # fmt: skip
-    return response_spectrum(run.t, run.acceleration(z, body, absolute=True), omega, zeta, **options)
+    found = response_spectrum(run.t, run.acceleration(z, body, absolute=True), omega, zeta, **options)
+    return replace(found, unit="rad") if turns_at(z) else found
 
 
 def _checked_record(t: ArrayLike, acceleration: ArrayLike) -> tuple[float, Vector]:

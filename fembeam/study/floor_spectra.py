@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
     from fembeam.model import Run
 
+RATES = {"acceleration": "/s²", "pseudo_acceleration": "/s²", "velocity": "/s", "displacement": ""}
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FloorSpectra(Result):
@@ -50,6 +52,13 @@ class FloorSpectra(Result):
             for j, (period, omega) in enumerate(zip(one.period.tolist(), one.omega.tolist(), strict=True))
         ]
 
+    def _units(self) -> dict[str, str]:
+        return {"period": "s", "omega": "rad/s"} | {name: self._unit(rate) for name, rate in RATES.items()}
+
+    def _unit(self, rate: str) -> str:
+        """The unit of responses, "" or with "/s", "/s²": of rotations rad."""
+        return " or ".join(f"{unit}{rate}" for unit in dict.fromkeys(one.unit for one in self.spectra.values()))
+
     def figure(self) -> Figure:
         """The spectra over the period; see `plot.response_spectrum`."""
         return plot.response_spectrum(self.spectra)
@@ -60,13 +69,12 @@ class FloorSpectra(Result):
             for zeta, size in zip(one.zeta.tolist(), one.acceleration, strict=True):
                 most = int(size.argmax())
                 rows.append((name, zeta, float(size[most]), float(one.period[most])))
-        return [repr(self), (("", "zeta", "largest acceleration / m/s²", "at period / s"), rows)]
+        return [repr(self), (("", "zeta", f"largest acceleration / {self._unit('/s²')}", "at period / s"), rows)]
 
 
 def _responses(one: ResponseSpectrum, i: int, j: int) -> dict[str, float]:
     """The largest responses of one oscillator."""
-    names = "acceleration", "pseudo_acceleration", "velocity", "displacement"
-    return {name: float(getattr(one, name)[i, j]) for name in names}
+    return {name: float(getattr(one, name)[i, j]) for name in RATES}
 
 
 def floor_spectra(
