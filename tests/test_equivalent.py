@@ -145,3 +145,9 @@ def test_bad_input_and_what_is_shown():
         "energy per cycle", "equivalent stiffness", "loss factor",
     ]  # fmt: skip
     assert fb.study.Equivalent is type(found)
+
+
+def test_files_have_units(tmp_path):
+    equivalent(Jenkins(K, F), AMPLITUDES).save(tmp_path / "law.csv")
+    head = (tmp_path / "law.csv").read_text(encoding="utf-8").splitlines()[0]
+    assert head == "amplitude [m],energy [J],stiffness [N/m],loss_stiffness [N/m],loss_factor"

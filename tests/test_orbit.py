@@ -136,12 +136,25 @@ def test_branch_marks_the_flip_and_its_copy_from_a_file_is_the_same(model, tmp_p
     assert "1 contact, unstable" in fb.plot.orbit(flips[0])._suptitle.get_text()
 
 
-def test_brute_force_agrees_with_the_branch(model):
+def test_brute_force_agrees_with_the_branch(model, tmp_path):
     found = fb.study.bifurcation(model, "omega", [200.0, 215.0], settle=150, keep=4)
     branch = model.branch("omega", (200.0, 215.0), at=200.0, step=0.5).run()
     peaks = [max(-low, high) for low, high in (branch.orbits[0].extremes(TIP), branch.orbits[-1].extremes(TIP))]
     np.testing.assert_allclose(found.peaks, np.repeat([[peaks[0]], [peaks[1]]], 4, axis=1), rtol=1e-6)
     assert found.figure().axes[0].get_xlabel() == "drive frequency ω / rad s⁻¹"
+    found.save(tmp_path / "peaks.csv")
+    head, first, *_ = (tmp_path / "peaks.csv").read_text(encoding="utf-8").splitlines()
+    assert (head, first) == ("base.omega [rad/s],peak [m]", f"200.0,{found.peaks[0, 0]}")
+
+
+def test_brute_force_of_a_rotation_is_in_radians():
+    frame = fb.Frame.polyline({"A": (0, 0), "B": (0, 1), "C": (0.8, 1)}, fb.Section.circle(2.1e11, 7850.0, 0.02))
+    base, damping = {"x": fb.Harmonic(1e-3, 30.0)}, fb.ModalDamping(0.05)
+    model, turned = fb.Scene(frame, [fb.Clamped("A")], base=base, damping=damping).reduce(modes=2), ("C", "rz")
+    found = fb.study.bifurcation(model, "base.x.omega", [30.0], turned, settle=100, keep=1)
+    assert found.peaks[0, 0] == pytest.approx(np.abs(model.orbit().extremes(turned)).max(), rel=1e-4)
+    assert f"{1e3 * found.peaks[0, 0]:.5g}" in str(found)
+    assert "largest peak / mrad" in str(found)
 
 
 def test_brute_force_reduces_as_the_model_was(model):

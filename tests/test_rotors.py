@@ -104,11 +104,14 @@ def test_many_spins_of_a_diagram_need_little_memory():
     assert peak < 15e6
 
 
-def test_table_text_and_figure():
+def test_table_text_and_figure(tmp_path):
     found = rotor().campbell(np.linspace(0.0, 400.0, 5), modes=2)
     rows = found.table()
     assert [row["spin"] for row in rows] == [0.0, 100.0, 200.0, 300.0, 400.0]
     assert rows[3]["mode 1"] < 0.0 < rows[3]["mode 2"]
+    found.save(tmp_path / "rotor.csv")
+    head, *_ = (tmp_path / "rotor.csv").read_text(encoding="utf-8").splitlines()
+    assert head == "spin [rad/s],mode 1 [rad/s],mode 2 [rad/s]"
     assert "critical speeds: 211.048 rad/s (backward), 221.961 rad/s (forward)" in str(found)
     axis = found.figure().axes[0]
     assert [text.get_text() for text in axis.get_legend().get_texts()] == [

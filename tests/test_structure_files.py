@@ -234,6 +234,7 @@ def test_figures_are_drawn(lines):
     assert "u(tip, y)" in plot.orbit(orbit).axes[0].get_ylabel()
     found = study.bifurcation(model, "omega", [179.0, 181.0], settle=3, keep=2)
     assert "u(tip, y)" in plot.bifurcation(found).axes[0].get_ylabel()
+    assert "omega / rad s⁻¹  smallest peak / mm" in str(found)
 
 
 def test_lines_are_shown_in_pictures_and_in_paraview(tmp_path):

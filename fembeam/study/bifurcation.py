@@ -17,8 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam import plot
 from fembeam.model import Model, extremes_of, load_period, observed
-from fembeam.plot.axis_names import axis_name
-from fembeam.scene import Place, changes_structure, path_of, with_value
+from fembeam.plot.axis_names import axis_name, parameter_unit
+from fembeam.plot.units import motion_for
+from fembeam.scene import Place, changes_structure, path_of, turns_at, with_value
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import samples_per_period
 from fembeam.study.result import Result
@@ -35,8 +36,9 @@ class Bifurcation(Result):
     Attributes
     ----------
     name : path of the parameter. z : place whose displacement is watched. title : name of the parameter for axes.
+        unit : of the parameter, empty without one.
     parameter : (k,) values. strobes : (k, p, 2n) states at t = 0 of p successive periods: the Poincaré map.
-    peaks : (k, p) largest |u(z)| in each of these periods, m; between samples by cubics.
+    peaks : (k, p) largest |u(z)| in each of these periods, m or rad; between samples by cubics.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Bifurcation(Result):
     strobes: Vector
     peaks: Vector
     title: str = ""
+    unit: str = ""
 
     def __repr__(self) -> str:
         at, each = counted(len(self.parameter), "value"), counted(self.peaks.shape[1], "period")
@@ -52,13 +55,18 @@ class Bifurcation(Result):
 
     def _parts(self) -> list[Part]:
         """Smallest and largest peak at each value."""
-        lowest, highest = 1e3 * self.peaks.min(axis=1), 1e3 * self.peaks.max(axis=1)
+        scale, unit = motion_for(self.z, self.peaks)
+        lowest, highest = scale * self.peaks.min(axis=1), scale * self.peaks.max(axis=1)
         rows = list(zip(self.parameter.tolist(), lowest.tolist(), highest.tolist(), strict=True))
-        return [repr(self), ((self.name, "smallest peak / mm", "largest peak / mm"), rows)]
+        name = f"{self.name} / {self.unit}" if self.unit else self.name
+        return [repr(self), ((name, f"smallest peak / {unit}", f"largest peak / {unit}"), rows)]
 
     def table(self) -> list[dict[str, Any]]:
-        """One period a row, the peak in m."""
+        """One period a row, the peak in m or rad."""
         return [{self.name: parameter, "peak": peak} for parameter, peak in zip(*self.cloud(), strict=True)]
+
+    def _units(self) -> dict[str, str]:
+        return {self.name: self.unit, "peak": "rad" if turns_at(self.z) else "m"}
 
     figure = plot.bifurcation
 
@@ -115,7 +123,8 @@ def bifurcation(
     task = partial(_settled, model, path, place, settle, keep, state)
     results = spread(task, list(values), executor, "bifurcation")
     strobes, peaks = (np.array([result[i] for result in results]) for i in (0, 1))
-    return Bifurcation(path, place, values, strobes, peaks, axis_name(path, model.scene))
+    told = axis_name(path, model.scene), parameter_unit(path, model.scene)
+    return Bifurcation(path, place, values, strobes, peaks, *told)
 
 
 def _settled(

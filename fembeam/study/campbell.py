@@ -66,6 +66,9 @@ class Campbell(Result):
             for spin, row in zip(self.spins, self.signed, strict=True)
         ]
 
+    def _units(self) -> dict[str, str]:
+        return dict.fromkeys(self.table()[0], "rad/s")
+
     figure = plot.campbell
 
     def _parts(self) -> list[Part]:

@@ -76,6 +76,9 @@ class Equivalent(Result):
         names = "amplitude", "energy", "stiffness", "loss_stiffness", "loss_factor"
         return by_rows({name: getattr(self, name) for name in names})
 
+    def _units(self) -> dict[str, str]:
+        return {"amplitude": "m", "energy": "J", "stiffness": "N/m", "loss_stiffness": "N/m"}
+
     figure = plot.equivalent
 
     def _parts(self) -> list[Part]:

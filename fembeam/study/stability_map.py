@@ -79,6 +79,9 @@ class StabilityMap(Result):
             for j, step in enumerate(self.steps)
         ]
 
+    def _units(self) -> dict[str, str]:
+        return {"step": "s", "stiffness": "N/m^p"}
+
     figure = plot.stability_map
 
 
