@@ -1,5 +1,6 @@
 """Ctrl-C while a result is made of several runs: none of them is taken for a whole one, and what was found is kept."""
 
+import os
 from dataclasses import replace
 from functools import partial
 
@@ -13,6 +14,7 @@ from contacts import Hertz
 from fembeam.study import ensemble, stationary, vary
 from fembeam.study.execution import executors
 from fembeam.study.execution.checkpoint import Checkpoint
+from fembeam.support import written_whole
 from solvers.exponential.method import Engine as Engine
 
 SCENE = paper_scene(fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1), 0.02, Hertz(2.1e8), masses=())
@@ -126,3 +128,17 @@ def test_a_stationary_response_goes_on_as_if_it_had_not_been_interrupted(base, s
     assert (found.duration, found.discarded, found.settling) == (whole.duration, whole.discarded, whole.settling)
     with pytest.raises(ValueError, match="belongs to another study: stationary"):
         stationary(model, checkpoint=path, **asked | {"segment": 500})
+
+
+def test_a_file_that_has_its_name_stays_when_ctrl_c_comes_then(tmp_path, monkeypatch):
+    """It ended as "results cannot be written", of the draft that had been renamed."""
+    rename = os.replace
+
+    def replaced(*names):
+        rename(*names)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "replace", replaced)
+    with pytest.raises(KeyboardInterrupt), written_whole(tmp_path / "kept.npz") as file:
+        file.write(b"all")
+    assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == [("kept.npz", b"all")]

@@ -45,7 +45,7 @@ def written_whole(target: Path) -> Iterator[Any]:
         os.chmod(name, 0o666 & ~mask)
         os.replace(name, target)
     except BaseException:
-        os.unlink(name)
+        Path(name).unlink(missing_ok=True)  # Ctrl-C comes after the file has its name, too
         raise
 
 
