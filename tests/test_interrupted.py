@@ -1,6 +1,7 @@
 """Ctrl-C while a result is made of several runs: none of them is taken for a whole one, and what was found is kept."""
 
 import os
+import time
 from dataclasses import replace
 from functools import partial
 
@@ -11,6 +12,7 @@ from problems import paper_scene
 import fembeam as fb
 import solvers
 from contacts import Hertz
+from fembeam.scene_file import study_tables
 from fembeam.study import ensemble, stationary, vary
 from fembeam.study.execution import executors
 from fembeam.study.execution.checkpoint import Checkpoint
@@ -142,3 +144,18 @@ def test_a_file_that_has_its_name_stays_when_ctrl_c_comes_then(tmp_path, monkeyp
     with pytest.raises(KeyboardInterrupt), written_whole(tmp_path / "kept.npz") as file:
         file.write(b"all")
     assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == [("kept.npz", b"all")]
+
+
+def test_ctrl_c_does_not_wait_for_processes_and_these_say_nothing(capfd):
+    def interrupted():
+        with study_tables._pool(2) as pool:
+            busy, idle = pool.submit(time.sleep, 60.0), pool.submit(abs, -1)
+            assert idle.result() == 1
+            assert not busy.done()
+            raise KeyboardInterrupt
+
+    started = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert time.monotonic() - started < 30.0
+    assert capfd.readouterr().err == ""

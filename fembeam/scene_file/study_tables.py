@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Callable, Mapping, Sequence
+import signal
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from multiprocessing import parent_process
+from multiprocessing import active_children, parent_process
 from multiprocessing.connection import wait
 from pathlib import Path
 from threading import Thread
@@ -809,13 +810,26 @@ def _check_trials(table: VaryTable | MinimiseTable, scene: Scene, names: list[st
     Trial.of(scene, names, asked, Plan(**_plan_of(table)), {}).check(points)
 
 
-def _pool(workers: int) -> AbstractContextManager[ProcessPoolExecutor | None]:
-    """So many processes, None of one."""
-    return ProcessPoolExecutor(workers, initializer=_end_with_parent) if workers > 1 else nullcontext()
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor | None]:
+    """So many processes, None of one; after Ctrl-C what they compute is not waited for."""
+    if workers == 1:
+        yield None
+        return
+    with ProcessPoolExecutor(workers, initializer=_end_with_parent) as pool:
+        try:
+            yield pool
+        except KeyboardInterrupt:
+            for process in active_children():
+                process.terminate()
+            raise
 
 
 def _end_with_parent() -> None:
-    """A process of the pool ends when what began it was killed; else it waits for work, and holds its output open."""
+    """A process of the pool ends when what began it was killed; else it waits for work, and holds its output open.
+
+    Signals end it without a word: it holds nothing to keep.
+    """
 
     def watch(sentinel: int) -> None:
         wait([sentinel])
@@ -823,6 +837,9 @@ def _end_with_parent() -> None:
 
     if (parent := parent_process()) is not None:
         Thread(target=watch, args=(parent.sentinel,), daemon=True).start()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, lambda *_: os._exit(1))
 
 
 STUDIES: Constructors = {
