@@ -1,9 +1,11 @@
 """Ctrl-C while a result is made of several runs: none of them is taken for a whole one, and what was found is kept."""
 
 import os
+import signal
 import time
 from dataclasses import replace
 from functools import partial
+from threading import Timer
 
 import numpy as np
 import pytest
@@ -124,9 +126,9 @@ def test_a_stationary_response_goes_on_as_if_it_had_not_been_interrupted(base, s
     assert len(written) == segments
     numbers = [{name: (*one.interval(), one.value) for name, one in each.numbers().items()} for each in (whole, found)]
     np.testing.assert_equal(numbers[1], numbers[0])
-    for name, signal in whole.signals.items():
-        np.testing.assert_array_equal(found[name].psd.density, signal.psd.density)
-        np.testing.assert_array_equal(found[name].pdf.density, signal.pdf.density)
+    for name, one in whole.signals.items():
+        np.testing.assert_array_equal(found[name].psd.density, one.psd.density)
+        np.testing.assert_array_equal(found[name].pdf.density, one.pdf.density)
     assert (found.duration, found.discarded, found.settling) == (whole.duration, whole.discarded, whole.settling)
     with pytest.raises(ValueError, match="belongs to another study: stationary"):
         stationary(model, checkpoint=path, **asked | {"segment": 500})
@@ -146,16 +148,21 @@ def test_a_file_that_has_its_name_stays_when_ctrl_c_comes_then(tmp_path, monkeyp
     assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == [("kept.npz", b"all")]
 
 
-def test_ctrl_c_does_not_wait_for_processes_and_these_say_nothing(capfd):
+@pytest.mark.skipif(os.name != "posix", reason="sends signals")
+@pytest.mark.parametrize(
+    "seconds", [[60.0, 60.0, 60.0, 60.0, 60.0, 60.0], [60.0, 0.1]], ids=["more follow", "one idle"]
+)
+def test_ctrl_c_does_not_wait_for_processes_and_these_say_nothing(seconds, capfd):
     def interrupted():
         with study_tables._pool(2) as pool:
-            busy, idle = pool.submit(time.sleep, 60.0), pool.submit(abs, -1)
-            assert idle.result() == 1
-            assert not busy.done()
-            raise KeyboardInterrupt
+            Timer(2.0, os.kill, [os.getpid(), signal.SIGINT]).start()
+            executors.spread(time.sleep, seconds, pool)
 
-    started = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
+    before, started = signal.signal(signal.SIGINT, signal.default_int_handler), time.monotonic()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            interrupted()
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert time.monotonic() - started < 30.0
     assert capfd.readouterr().err == ""

@@ -50,6 +50,7 @@ from fembeam.study.variation import points_of
 from fembeam.support import (
     Part,
     changes,
+    interrupts,
     is_numbered,
     is_pair,
     is_whole,
@@ -57,6 +58,7 @@ from fembeam.support import (
     require_non_negative,
     require_positive,
 )
+from solvers.problem.whole_runs import must_be_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -821,14 +823,14 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor | None]:
             yield pool
         except KeyboardInterrupt:
             for process in active_children():
-                process.terminate()
+                os.kill(process.pid or 0, signal.SIGINT)
             raise
 
 
 def _end_with_parent() -> None:
     """A process of the pool ends when what began it was killed; else it waits for work, and holds its output open.
 
-    Signals end it without a word: it holds nothing to keep.
+    Ctrl-C stops what it runs, and no wait for work: that would print a traceback and break the pool.
     """
 
     def watch(sentinel: int) -> None:
@@ -837,9 +839,7 @@ def _end_with_parent() -> None:
 
     if (parent := parent_process()) is not None:
         Thread(target=watch, args=(parent.sentinel,), daemon=True).start()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, lambda *_: os._exit(1))
+    interrupts.heard_while(must_be_whole)
 
 
 STUDIES: Constructors = {

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-_state: dict[str, Any] = {"received": 0, "waits": False}
+_state: dict[str, Any] = {"received": 0, "waits": False, "ended": False}
 
 
 @contextmanager
@@ -50,6 +50,22 @@ def _on_signal(number: int, _: Any) -> None:
     os.write(2, b"\nfembeam: stopping as soon as what was computed can be kept; once more stops at once\n")
 
 
+def heard_while(running: Callable[[], bool]) -> None:
+    """In a process that works for another: SIGINT raises KeyboardInterrupt while that holds, else `check_ended` does.
+
+    SIGTERM ends it at once.
+    """
+
+    def heard(number: int, _: Any) -> None:
+        _state.update(received=number, ended=True)
+        if running():
+            raise KeyboardInterrupt
+
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, heard)
+    signal.signal(signal.SIGTERM, lambda *_: os._exit(1))
+
+
 @contextmanager
 def deferred() -> Iterator[None]:
     """The first signal waits until `check` is called, so that nothing computed is lost; a second one does not."""
@@ -63,6 +79,12 @@ def deferred() -> Iterator[None]:
 def check() -> None:
     """Stop here if a signal came."""
     if received():
+        raise KeyboardInterrupt
+
+
+def check_ended() -> None:
+    """Stop here in a process that a signal has ended while it waited for work."""
+    if _state["ended"]:
         raise KeyboardInterrupt
 
 

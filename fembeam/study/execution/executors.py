@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, as_completed
 from typing import TypeVar
 
-from fembeam.support import counting, require
+from fembeam.support import counting, interrupts, require
 from solvers.problem.whole_runs import whole_runs
 
 Item = TypeVar("Item")
@@ -78,6 +78,7 @@ def _named(function: Callable[[Item], Result], index: int, item: Item) -> Result
     """function(item); an error learns which item it was."""
     try:
         with whole_runs():
+            interrupts.check_ended()
             return function(item)
     except Exception as error:
         error.add_note(f"item {index}: {item!r}"[:200])
