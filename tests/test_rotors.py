@@ -424,3 +424,17 @@ def test_rotor_of_nelson_and_mcvaugh():
     rotor = fb.Scene(shaft, masses=[fb.Disk("4", 1.401, diametral=0.00136, polar=0.002)], springs=bearings)
     found = rotor.campbell(np.linspace(0.0, 11000.0, 23)).critical * 30.0 / np.pi
     np.testing.assert_allclose(found, [-15470, 17159, -46612, 49983, -64752, 96457], rtol=7e-3)
+
+
+def test_the_line_of_critical_speeds_is_that_of_either_sense():
+    """Over spins of both signs it was drawn level, at the largest; a critical speed below the first spin widened it."""
+    axis = rotor().campbell(np.linspace(-400.0, 400.0, 5), modes=2).figure().axes[0]
+    lines = {line.get_label(): line for line in axis.lines}
+    line = lines["ω = |Ω|"]
+    assert np.interp([-400.0, -200.0, 0.0, 300.0], *line.get_data()).tolist() == [400.0, 200.0, 0.0, 300.0]
+    x, y = lines["critical speeds"].get_data()
+    assert sorted(np.round(x).tolist()) == [-222.0, -211.0, 211.0, 222.0]
+    np.testing.assert_array_equal(y, np.abs(x))
+    one = rotor().campbell([300.0], modes=2).figure().axes[0]
+    assert "critical speeds" not in [line.get_label() for line in one.lines]
+    assert one.get_xlim()[0] < 300.0 < one.get_xlim()[1]

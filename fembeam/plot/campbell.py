@@ -20,7 +20,7 @@ KINDS = ((1, RED, "forward"), (-1, BLUE, "backward"), (0, GREY, "on a line"))
 
 @styled
 def campbell(result: Campbell, axes: Axes | None = None) -> Figure:
-    """Frequencies over spin, forward and backward whirl in different colours; where ω = Ω lie the critical speeds.
+    """Frequencies over spin, forward and backward whirl in different colours; where ω = |Ω| lie the critical speeds.
 
     `axes` to draw into; None makes a figure.
 
@@ -38,13 +38,15 @@ def campbell(result: Campbell, axes: Axes | None = None) -> Figure:
         mine = result.turning == kind
         if mine.any():
             axis.plot(spins[mine], result.omega[mine], ".", color=colour, markersize=3, label=name)
-    ends = np.array([result.spins[0], result.spins[-1]])
-    axis.plot(ends, np.abs(ends), "--", color=GREY, linewidth=1.0, label="ω = Ω")
-    met = np.abs(result.critical)
+    low, high = result.spins[0], result.spins[-1]
+    line = np.unique([low, min(max(0.0, low), high), high])
+    axis.plot(line, np.abs(line), "--", color=GREY, linewidth=1.0, label="ω = Ω" if low >= 0.0 else "ω = |Ω|")
+    met = np.concatenate((result.critical, -result.critical))
+    met = met[(low <= met) & (met <= high)]
     if met.size:
-        axis.plot(met, met, "o", color=ORANGE, fillstyle="none", label="critical speeds")
+        axis.plot(met, np.abs(met), "o", color=ORANGE, fillstyle="none", label="critical speeds")
     axis.set(xlabel="spin Ω / rad s⁻¹", ylabel="frequency ω / rad s⁻¹", title="Campbell diagram")
     axis.set_ylim(bottom=0.0, top=1.05 * result.omega.max())
-    axis.margins(x=0.0)
+    axis.margins(x=0.0 if high > low else None)
     axis.legend()
     return figure
