@@ -1,5 +1,6 @@
 """Names of parts, places, laws and folders in figures: drawn letter by letter, whatever matplotlib reads in them."""
 
+import dataclasses
 import re
 from pathlib import Path
 
@@ -9,8 +10,9 @@ from matplotlib.text import Text
 from problems import ROD_FILE
 
 import fembeam as fb
+import solvers
 from contacts import Hertz, Jenkins, KelvinVoigt
-from fembeam import plot
+from fembeam import plot, study
 from fembeam.cli import main
 from fembeam.plot.axis_names import axis_name
 from fembeam.plot.style import verbatim
@@ -134,3 +136,37 @@ def test_run_of_a_scene_file(tmp_path, monkeypatch, whole_figures):
     Path("rod.toml").write_text(f"{ROD_FILE}{tables}\n[simulate]\nduration = 0.2\ndt = 1e-3\n", encoding="utf-8")
     assert main(["run", "rod.toml", "--out", "out"]) == 0
     assert Path("out/report.html").exists()
+
+
+def outside(figure):
+    """Labels of axes and entries of legends that the figure cuts off."""
+    figure.draw_without_rendering()
+    texts = [text for axis in figure.axes for text in (axis.xaxis.label, axis.yaxis.label)]
+    texts += [text for legend in figure.legends for text in legend.get_texts()]
+    frame = figure.bbox.padded(1.0)
+    boxes = {text.get_text(): text.get_window_extent() for text in texts if text.get_text()}
+    return [name for name, box in boxes.items() if not (frame.contains(*box.min) and frame.contains(*box.max))]
+
+
+def test_long_names_of_what_varies_are_within_the_figure(scene):
+    name = "the third upper snubber of the feedwater line in room 0123, north side"
+    scene = dataclasses.replace(scene, stops=[dataclasses.replace(scene.stops[0], name=name)])
+    gap, more = {"stops[0].gap": [0.0, 1e-4]}, {"base.amplitude": [1e-4, 1e-3]}
+    asked = {"minus the largest displacement in the middle of the beam": lambda run: -abs(run.displacement(0.2)).max()}
+    for values in (gap, gap | more, more | gap, gap | more | {"base.omega": [80.0, 90.0]}):
+        assert outside(study.vary(scene, values, asked, 0.1, 1e-3, modes=1).figure()) == []
+
+
+def test_the_legend_of_a_single_map_is_within_the_figure(scene):
+    """Three columns of it were wider: "able and accurate"."""
+    found = study.stability_map(scene, solvers.RK4, [1e-5, 1e-4], modes=[1], duration=0.01)
+    assert outside(found.figure()) == []
+
+
+def test_values_spread_evenly_in_their_logarithm_are_shown_so(scene):
+    gaps = np.geomspace(1e-6, 1e-2, 4)
+    figures = [study.vary(scene, {"stops[0].gap": x}, "peak_force", 0.1, modes=1).figure() for x in (gaps, [0.0, 1.0])]
+    figures += [study.equivalent(Jenkins(2e4, 10.0), x).figure() for x in (gaps, [1e-3, 2e-3])]
+    assert [figure.axes[0].get_xscale() for figure in figures] == ["log", "linear"] * 2
+    (dot,) = study.equivalent(Jenkins(2e4, 10.0), [1e-3]).figure().axes[0].lines
+    assert dot.get_marker() == "o"

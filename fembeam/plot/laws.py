@@ -9,7 +9,7 @@ import numpy as np
 
 from contacts import PUBLISHED, Bounce, Hysteretic, Identified, KelvinVoigt, Law, Viscoelastic, bounce, restitution
 from fembeam.plot.figure import heading, legend, sheet
-from fembeam.plot.style import BLUE, CYCLE, GREY, RED, Vector, entry, own_colour, styled, verbatim
+from fembeam.plot.style import BLUE, CYCLE, GREY, RED, Vector, entry, logarithmic, own_colour, styled, verbatim
 from fembeam.plot.units import length_for, unit_for
 from fembeam.support import require
 
@@ -94,7 +94,8 @@ def equivalent(found: Equivalent, axes: Sequence[Axes] | None = None) -> Figure:
     names = ("energy per cycle / J", "equivalent stiffness / N/m", "loss factor")
     scale, unit = length_for(found.amplitude)
     for axis, values, name in zip(three, columns, names, strict=True):
-        axis.plot(scale * found.amplitude, values)
+        axis.plot(scale * found.amplitude, values, marker="o" if len(values) == 1 else None)
+        logarithmic(axis, found.amplitude)
         axis.set(xlabel=f"amplitude of δ / {unit}", ylabel=name)
         axis.set_ylim(bottom=min(0.0, float(np.nanmin(values))))
     heading(three, f"{verbatim(found.name)} as a spring and a dashpot", axes is None)

@@ -122,13 +122,13 @@ def stability_map(*maps: StabilityMap, axes: Axes | Sequence[Axes] | None = None
         ax.set(xscale="log", xlabel="step / s", yticks=range(len(found.rows)), title=verbatim(found.method))
         ax.set_xlim(*_edges(found.steps)[[0, -1]])
         ax.set_yticklabels([f"{row:g}" for row in found.rows])
-        ax.set_ylabel({"modes": "number of modes", "stiffness": "contact stiffness / SI"}[found.axis])
+        ax.set_ylabel({"modes": "number of modes", "stiffness": "contact stiffness / N/m^p"}[found.axis])
     entries: list = [Patch(color=colour, label=verdict.words) for verdict, colour in colours.items()]
     entries += [
         Line2D([], [], color="black", ls=s, label=f"predicted limit {w}")
         for s, w in (("-", "in flight"), (":", "in contact"))
     ]
-    legend(drawn[-1], axes is None, "outside lower center", handles=entries, ncols=3)
+    legend(drawn[-1], axes is None, "outside lower center", handles=entries, ncols=3 if len(maps) > 1 else 2)
     return figure
 
 

@@ -31,6 +31,7 @@ P = ParamSpec("P")
 
 BLUE, RED, GREEN, ORANGE, GREY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#777777"  # Okabe and Ito
 ENTRY = 40  # characters of a line in a legend
+EVEN = 0.1  # of the largest, below which the median is where values are spread evenly in their logarithm
 CYCLE = BLUE, RED, GREEN, ORANGE, "#CC79A7", "#56B4E9"
 
 
@@ -88,8 +89,8 @@ def verbatim(name: Any) -> str:
     return f" {text}" if text.startswith("_") else text
 
 
-def entry(name: Any) -> str:
-    """A user's name as the entry of a legend, on several lines where it is long.
+def entry(name: Any, width: int = ENTRY) -> str:
+    """A user's name as the entry of a legend, on several lines where it is longer than so many letters.
 
     Examples
     --------
@@ -97,7 +98,23 @@ def entry(name: Any) -> str:
     guide of the main steam line at the
     turbine hall, north
     """
-    return verbatim(textwrap.fill(str(name), ENTRY, break_on_hyphens=False))
+    return verbatim(textwrap.fill(str(name), width, break_on_hyphens=False))
+
+
+def logarithmic(axis: Axes, x: Vector) -> bool:
+    """Whether values along x are spread evenly in their logarithm; then so is the axis.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> axis = Figure().subplots()
+    >>> logarithmic(axis, np.linspace(0.1, 1.0, 9)), logarithmic(axis, np.geomspace(1e-6, 1.0, 9)), axis.get_xscale()
+    (False, True, 'log')
+    """
+    spread = len(x) > 2 and bool(0.0 < x.min() <= np.median(x) < EVEN * x.max())
+    if spread:
+        axis.set_xscale("log")
+    return spread
 
 
 def short(number: float) -> str:
