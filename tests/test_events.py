@@ -145,15 +145,10 @@ def dip(depth, phase, rtol):
 PHASES = np.linspace(0.05, 2.5, 61)
 
 
-@pytest.mark.parametrize("rtol", [1e-8, 1e-12])
-def test_dips_longer_than_the_steps_are_all_found(rtol):
-    assert [len(dip(1e-2, phase, rtol).contacts) for phase in PHASES] == [1] * len(PHASES)
-
-
-@pytest.mark.parametrize("depth", [1e-4, 1e-6])
+@pytest.mark.parametrize("depth", [1e-2, 1e-4, 1e-6])
 @pytest.mark.parametrize("rtol", [1e-8, 1e-10])
-def test_dips_shorter_than_a_step_are_all_found(depth, rtol):
-    # entry and exit lie within one step, and the dip is far deeper than the tolerance
+def test_dips_longer_and_shorter_than_a_step_are_all_found(depth, rtol):
+    # entry and exit of the shorter ones lie within one step, and all are far deeper than the tolerance
     runs = [dip(depth, phase, rtol) for phase in PHASES]
     assert [len(run.contacts) for run in runs] == [1] * len(PHASES)
     lengths = [run.contacts.t_out[0] - run.contacts.t_in[0] for run in runs]
@@ -288,12 +283,6 @@ def test_start_at_rest_on_the_surface_pulled_out():
     np.testing.assert_allclose(run.q[:, 0], 1.5 * run.t**2, atol=1e-13)
 
 
-def test_start_on_the_surface_moving_in_is_a_contact_at_once():
-    log = bounce(LN, 1.0).contacts
-    assert log.t_in[0] == 0.0
-    assert log.speed_in[0] == 1.0
-
-
 def test_start_inside_a_contact_is_logged_from_the_start():
     stiffness, depth = 1e4, 0.02
     run = integrate(free_mass(PiecewiseLinear([stiffness])), [-depth], [0.0], 0.1, method=FINE)
@@ -337,12 +326,6 @@ def test_bouncing_ball_comes_to_rest_in_permanent_contact(law, method):
     assert np.all(np.diff(peaks) < 0.0)
 
 
-def test_elastic_ball_bounces_for_ever():
-    run = integrate(free_mass(Hertz(1e8), loads=WEIGHT), [1e-4], [0.0], 10.0, method=DormandPrince(1e-11))
-    assert len(run.contacts) > 500
-    np.testing.assert_allclose(run.contacts.speed_in, math.sqrt(2 * 9.81e-4), rtol=1e-6)
-
-
 # --- ends and the log ---------------------------------------------------------------------------------------------
 
 
@@ -384,15 +367,6 @@ def test_log_grows_with_the_number_of_contacts():
     assert len(run.contacts) == math.floor(60.0 * omega / (2 * math.pi)) + 1
     assert np.all(np.diff(run.contacts.t_in) > 0.0)
     np.testing.assert_allclose(run.contacts.speed_in, 1.0, rtol=1e-4)
-
-
-def test_log_columns_have_their_kinds():
-    log = bounce(LN).contacts
-    assert log.stop.dtype.kind == "i"
-    assert log.entry_rate_clipped.dtype.kind == "b"
-    assert {len(column) for column in log.arrays().values()} == {len(log)} == {1}
-    empty = integrate(System.modal([1.0], 0.0), [1.0], [0.0], 1.0).contacts
-    assert len(empty) == 0
 
 
 def test_peak_force_of_a_dashpot_is_at_entry():

@@ -121,13 +121,6 @@ def test_spectrum_is_flat_in_the_band_and_empty_outside():
     assert t[1] * y.size == pytest.approx(noise.period, rel=1e-14)
 
 
-def test_variance_is_the_sum_of_the_density():
-    noise = BandNoise(2e-3, BROAD, seed=1, period=7.0)
-    spacing = 2 * np.pi / 7.0
-    assert spacing * noise.psd_at(noise.omega).sum() == pytest.approx(4e-6, rel=1e-12)
-    np.testing.assert_allclose(np.abs(noise.amplitude) ** 2, 2 * spacing * noise.psd_at(noise.omega), rtol=1e-12)
-
-
 def test_second_derivative_agrees_with_the_motion_line_by_line():
     noise = BandNoise(1e-3, BROAD, seed=2)
     _, y = noise.series()

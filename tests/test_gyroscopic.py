@@ -432,8 +432,3 @@ def test_a_rotor_that_can_float_is_refused_in_words():
     held = System(np.eye(2), np.zeros((2, 2)), 1e-8 * np.eye(2), gyroscopic=TURN)
     run = integrate(held, [0.0, 0.0], [1.0, 0.0], 1.0)
     np.testing.assert_allclose(run.q_dot[-1], [math.cos(1.0), math.sin(1.0)], rtol=1e-7)
-
-
-def test_symmetric_part_belongs_to_the_damping():
-    with pytest.raises(ValueError, match="C must be symmetric"):
-        System(np.eye(2), TURN, np.eye(2))

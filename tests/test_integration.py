@@ -297,12 +297,6 @@ def test_linear_mode_of_any_damping(zeta):
     np.testing.assert_allclose(run.q_dot[:, 0], exact[:, 1], atol=2e-12)
 
 
-def test_rigid_body_under_a_constant_force():
-    system = System.modal([0.0, 3.0], 0.1, loads=[([1.0, 0.0], fb.Harmonic(2.0, 0.0))])
-    run = integrate(system, [0.5, 0.0], [-1.0, 0.0], 2.0, 0.25, FINE)
-    np.testing.assert_allclose(run.q[:, 0], 0.5 - run.t + run.t**2, atol=1e-13)
-
-
 def test_rigid_body_and_overdamped_modes_that_hit():
     stop = Contact([1.0, 0.7, 0.3], Hysteretic(1e6, 0.6), gap=0.01)
     system = System.modal([0.0, 20.0, 90.0], [0.0, 1.0, 2.5], [stop], [([1.0, 0.0, 1.0], fb.Harmonic(9.0, 11.0))])
@@ -322,24 +316,6 @@ def test_dashpot_that_couples_the_modes():
     assert {int(c[0]) for c in theirs.contacts} == {0, 1}
     assert distance(ours, theirs) < 1e-10
     assert distance(steps, theirs) < 2e-4
-
-
-def test_full_matrices_equal_their_modes():
-    rng = np.random.default_rng(2)
-    root = rng.normal(size=(3, 3))
-    M, K = root @ root.T + np.eye(3), 100 * (root.T @ root + np.eye(3))
-    direction = np.array([1.0, -0.5, 0.2])
-    full = System(M, 0.02 * K, K, [Contact(direction, Hertz(1e5), 0.01)], [([0.0, 1.0, 0.0], fb.Harmonic(20.0, 8.0))])
-    phi, k = full.blocks.T[:3, :3], full.blocks.k
-    modal = System.modal(
-        *(np.sqrt(k), 0.01 * np.sqrt(k)),
-        contacts=[Contact(phi.T @ direction, Hertz(1e5), 0.01)],
-        loads=[(phi.T @ [0.0, 1.0, 0.0], fb.Harmonic(20.0, 8.0))],
-    )
-    one = integrate(full, np.zeros(3), np.zeros(3), 3.0, 0.1, FINE)
-    other = integrate(modal, np.zeros(3), np.zeros(3), 3.0, 0.1, FINE)
-    assert len(one.contacts) == len(other.contacts) >= 2
-    np.testing.assert_allclose(one.q, other.q @ phi.T, atol=1e-10 * np.abs(one.q).max())
 
 
 # --- signals ------------------------------------------------------------------------------------------------------
@@ -411,11 +387,6 @@ def test_a_duration_may_be_an_array_without_dimensions():
     run = integrate(system, *start, np.array(0.5))
     np.testing.assert_array_equal(run.end, integrate(system, *start, 0.5).end)
     np.testing.assert_array_equal(integrate_many(system, *np.array(start)[:, None], np.array(0.5)).q, run.q)
-
-
-def test_plain_callable_of_time_against_its_closed_answer():
-    run = integrate(System([[2.0]], [[0.0]], [[0.0]], loads=[([1.0], lambda t: 6.0 * t)]), [0.0], [0.0], 2.0, 0.1, FINE)
-    np.testing.assert_allclose(run.q[:, 0], run.t**3 / 2, atol=1e-12)
 
 
 def test_plain_loads_that_the_first_nodes_miss_are_no_jumps():
@@ -572,14 +543,6 @@ def test_a_law_that_is_not_finite_is_named_with_many_starts():
     system, q, v = pressed(breaks(k=100.0))
     with pytest.raises(SolverError, match=r"t = 0 s of 1 s: a contact law gave .* \(2 of 2 starts failed\)"):
         integrate_many(system, [q, q], [v, v], 1.0, Exponential())
-
-
-def test_run_without_anything_to_do_stays_at_rest():
-    for method in (DormandPrince(), HenonRK2(1e-2, 1e-3)):
-        run = integrate(linear_stop(), [0.0], [0.0], 10.0, 1.0, method)
-        assert not run.q.any()
-        assert not run.q_dot.any()
-        assert run.status is Status.DONE
 
 
 # --- refused arguments --------------------------------------------------------------------------------------------

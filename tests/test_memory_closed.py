@@ -233,17 +233,23 @@ def blow(speed, largest):
 @pytest.mark.parametrize("method", [Exponential(1e-12), DormandPrince(1e-13)], ids=["main", "stepping"])
 @pytest.mark.parametrize("kind", ["kept", "forgotten"])
 def test_seven_blows_on_a_yielding_stop(kind, method):
-    """Restitution, set, duration and loss of each blow, of growing and of smaller speeds."""
+    """Restitution, set, duration, peak, impulse and loss of each blow, of growing and of smaller speeds."""
     law = WaltonBraun(LOADING, UNLOADING, kind)
     ball = System([[MASS]], [[0.0]], [[0.0]], [Contact([1.0], law)])
     largest, memory = 0.0, None
-    for speed in SPEEDS:
+    for number, speed in enumerate(SPEEDS):
         out, largest, duration = blow(speed, largest if kind == "kept" else 0.0)
         run = integrate(ball, [2e-3], [-speed], 0.2, method=method, memory=memory)
         log, memory = run.contacts, run.memory
         assert len(log) == 1
         assert abs(log.speed_out[0] - out) < 1e-10
         assert abs(log.t_out[0] - log.t_in[0] - duration) < 1e-10
+        assert log.impulse[0] == pytest.approx(MASS * (speed + out), rel=1e-9)
+        if number == 0:
+            assert log.peak_force[0] == pytest.approx(largest, rel=1e-10)
+            assert log.peak_indentation[0] == pytest.approx(largest / LOADING, rel=1e-10)
+            passed = ["contact", "unload", "open", "forget"][: 3 if kind == "kept" else 4]
+            assert run.transitions.event.tolist() == passed
         assert abs(run.losses.loss[0] - 0.5 * MASS * (speed**2 - out**2)) < 1e-10
         set_ = largest * (1.0 / LOADING - 1.0 / UNLOADING)
         left = run.transitions.delta[run.transitions.event == "open"]

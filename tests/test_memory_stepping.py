@@ -73,16 +73,6 @@ def test_times_forces_and_paths_of_the_log():
     assert np.allclose(work, DECAY.limit * path, rtol=1e-9)
 
 
-def test_stiff_sliders_approach_dry_friction():
-    """Turning points of Coulomb's free decay lie on a line: 2f/K less per half cycle; it rests where that ends."""
-    stiff, f = 1e8, 0.07
-    system = System([[1.0]], [[0.0]], [[1.0]], [element(Jenkins(stiff, f))])
-    found = integrate(system, [1.0], [0.0], 28.0, method=DormandPrince(1e-9)).transitions
-    turns = found.delta[found.event == "stick"]
-    assert np.allclose(np.abs(turns[:8]), 1.0 - 2.0 * f * np.arange(8), atol=1e-4)  # the first where it begins
-    assert np.allclose(turns[8:], turns[7], atol=1e-8)  # |q| = 0.02 <= f/K: it rings there, no further than f/k
-
-
 def test_elements_on_one_coordinate_are_renewed_together():
     """Two equal sliders side by side are one of twice the size: transitions in pairs at the same instant."""
     halves = Jenkins(0.5 * DECAY.stiffness, 0.5 * DECAY.limit)
@@ -93,15 +83,6 @@ def test_elements_on_one_coordinate_are_renewed_together():
         assert distance(solution) < 1e-10
         found = solution.transitions.t[: 2 * len(events)]
         assert np.abs(found[0::2] - found[1::2]).max() < 1e-12
-
-
-def test_many_sliders_reverse_at_one_instant():
-    """Four sliders of different limits follow Masing's rule: sticking starts for all that slip at one reversal."""
-    laws = [Jenkins(1.0, 0.05 * (j + 1)) for j in range(4)]
-    found = run(DormandPrince(1e-11), *laws, duration=8.0).transitions
-    times, counts = np.unique(np.round(found.t[found.event == "stick"], 9), return_counts=True)
-    assert counts[0] == 4
-    assert len(times) >= 2
 
 
 @pytest.mark.parametrize("phase", np.linspace(0.1, 1.1, 7))
@@ -216,25 +197,6 @@ def test_sparse_matrices_carry_the_same_latches(method):
 
 
 # --- yielding stops --------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("kind", "seen"), [("kept", 1), ("forgotten", 2)])
-def test_blows_on_a_yielding_stop(kind, seen):
-    """A free mass thrown between a yielding stop and a spring: restitution √(k₁/k₂), set, peak, impulse."""
-    mass, speed, loading, unloading = 2.0, 0.5, 1e4, 4e4
-    stop = Contact([1.0], WaltonBraun(loading, unloading, kind))
-    ball = System([[mass]], [[0.0]], [[0.0]], [stop])
-    solution = integrate(ball, [0.01], [-speed], 0.1, dt=0.02, method=DormandPrince(1e-12))
-    log = solution.contacts
-    deepest = speed * math.sqrt(mass / loading)
-    assert len(log) == 1
-    assert np.allclose([log.t_in[0], log.speed_in[0], log.speed_out[0]], [0.02, speed, 0.5 * speed], rtol=1e-10)
-    assert np.allclose([log.peak_indentation[0], log.peak_force[0]], [deepest, loading * deepest], rtol=1e-10)
-    quarters = 0.5 * math.pi * (math.sqrt(mass / loading) + math.sqrt(mass / unloading))
-    assert np.allclose([log.t_out[0] - log.t_in[0], log.impulse[0]], [quarters, 1.5 * mass * speed], rtol=1e-9)
-    assert abs(solution.energy.residual).max() < 1e-10
-    events = solution.transitions.event.tolist()
-    assert events == ["contact", "unload", "open", "forget"][: 2 + seen]
 
 
 @pytest.mark.parametrize("method", CONSTANT, ids=NAMES)

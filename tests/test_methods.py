@@ -9,7 +9,6 @@ from oscillators import Tone
 from problems import (
     HertzBounce,
     as_sparse,
-    bilinear,
     coupled_dashpot,
     linear_stop,
     paper_scene,
@@ -187,14 +186,6 @@ def test_hertz_bounce_has_its_closed_answers(method):
     assert log.peak_indentation[0] == pytest.approx(answer.peak_indentation, rel=2e-4)
     assert log.t_out[0] == pytest.approx(answer.duration, rel=2e-4)
     assert log.speed_out[0] == pytest.approx(speed, rel=1e-3)
-
-
-@methods
-def test_bilinear_oscillator_has_its_period(method):
-    one, two = 3.0, 15.0
-    period = math.pi / one + math.pi / two
-    end = integrate(bilinear(one, two), [1.0], [0.0], 3.0 * period, method=method(period / 2000))
-    assert end.q[-1, 0] == pytest.approx(1.0, abs=1e-4)
 
 
 @methods

@@ -100,27 +100,6 @@ def test_many_independent_stops_move_as_alone(count, ratio, duration):
         same_log(log_of(both, i), log_of(alone, 0), 1e-5, duration)
 
 
-def test_independent_bodies_keep_their_energy():
-    """Two beams of a scene, each with its own stop."""
-    beams = [
-        {
-            "beam": fb.Beam(length, STEEL),
-            "supports": [fb.Clamped(0.0)],
-            "stops": [fb.Stop(0.9 * length, law=Hertz(stiffness), gap=gap)],
-        }
-        for length, stiffness, gap in ((0.26, 2e8, 0.0), (0.19, 5e6, 1e-4))
-    ]
-    scene = fb.Scene(
-        **beams[0],
-        bodies=[fb.Scene(**beams[1], forces=[fb.PointForce(0.19, fb.Harmonic(0.5, 200.0))])],
-        damping=fb.ModalDamping(0.01),
-        forces=[fb.PointForce(0.26, fb.Harmonic(0.4, 120.0))],
-    )
-    run = scene.reduce(3).simulate(0.3, 1e-3)
-    assert len(set(run.contacts.stop.tolist())) == 2
-    assert np.abs(run.energy.residual).max() < 1e-7 * np.abs(run.energy.input).max()
-
-
 def test_a_short_contact_while_another_lasts_is_found_between_the_nodes():
     """A fast oscillator touches its stop 1 % deep, again and again, while a slow one lies on its own."""
     fast = Part(900.0, 0.0, PiecewiseLinear([1e7]), 0.99, fb.Harmonic(0.0, 1.0), 0.0, 900.0)
@@ -363,11 +342,3 @@ def test_two_stops_behind_each_other_are_one_whose_law_bends(options):
     np.testing.assert_allclose(two.force(0) + two.force(1), one.force(0), atol=1e-7 * one.force(0).max())
     own = two.contacts.t_in[two.contacts.stop == 0]
     np.testing.assert_allclose(own, one.contacts.t_in, atol=1e-9)
-
-
-def test_two_laws_behind_each_other_against_an_independent_method():
-    scene = bumper(fb.Stop(0.25, Hertz(1e6), gap=1e-3), fb.Stop(0.25, KelvinVoigt(3e3, 1.0), gap=1.5e-3))
-    run, other = (scene.reduce(3).simulate(0.1, 1e-4, solver=method(1e-10)) for method in (Exponential, DormandPrince))
-    assert np.all(np.bincount(run.contacts.stop) >= 1)
-    np.testing.assert_allclose(run.q, other.q, atol=1e-6 * np.abs(run.q).max())
-    np.testing.assert_allclose(run.contacts.peak_force, other.contacts.peak_force, rtol=1e-5)

@@ -107,12 +107,6 @@ def test_elastic_stops_leave_the_volume_to_damping(law, opposite, near):
     assert product == pytest.approx(math.exp(-2.0 * np.sum(5.0 * ZETA * OMEGA) * period), rel=1e-8)
 
 
-def test_hysteretic_stop_takes_volume_too():
-    system, period = beam(HYSTERETIC), 2.0 * math.pi / 195.0
-    lossless = math.exp(-2.0 * np.sum(5.0 * ZETA * OMEGA) * period)
-    assert np.prod(orbit(system, period).multipliers).real < 0.9 * lossless
-
-
 # --- closed pieces ------------------------------------------------------------------------------------------------
 
 

@@ -279,13 +279,6 @@ def test_refusal_knows_how_long_the_run_is():
         integrate(system, [1.0], [0.0], 9.0, method=heun(h))
 
 
-def test_refusal_can_be_overridden():
-    system = System.modal([100.0], 0.1)
-    with pytest.raises(ValueError, match="unstable"):
-        integrate(system, [0.0], [0.0], 1.0, method=RK4(0.1))
-    assert integrate(system, [0.0], [0.0], 1.0, method=RK4(0.1, force_unstable=True)).status.good
-
-
 # --- stopped -------------------------------------------------------------------------------------------------------
 
 
@@ -314,13 +307,6 @@ def test_blow_up_with_coupled_damping_is_stopped():
     dt = 1.3 * RK4(1.0).stable_dt(system).flight
     run = integrate(system, [0.1, 0.0, 0.0], np.zeros(3), 1000 * dt, method=RK4(dt, force_unstable=True), check=False)
     assert run.status in (Status.GAINED, Status.DIVERGED)
-
-
-def test_blow_up_in_contact_is_stopped():
-    system, rest = pressed(1e-3)
-    dt = 1.5 * RK4(1.0).stable_dt(system, 1e-3).contact
-    run = integrate(system, rest + 1e-5, np.zeros(2), 4000 * dt, method=RK4(dt, force_unstable=True), check=False)
-    assert not run.status.good or np.abs(run.q[-1] - rest).max() < 1.0
 
 
 def test_a_stop_that_gives_more_than_it_took_is_noticed():

@@ -528,11 +528,6 @@ def test_a_transient_that_lasts_is_warned_of():
     assert not found.settling.died_out
 
 
-def test_memory_is_the_slowest_decay():
-    model = cantilever(2, base=fb.BandNoise(1e-4, (0.0, 600.0)))
-    assert correlation_time(model) == pytest.approx(1.0 / (0.05 * model.omega[0]))
-
-
 def test_memory_of_many_modes():
     """A decay of 0.5 1/s beside frequencies of 1e5 rad/s and their squares."""
     model = cantilever(20, damping=0.005, base=fb.BandNoise(1e-4, (0.0, 600.0)))
