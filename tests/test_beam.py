@@ -147,12 +147,6 @@ def test_a_mass_of_nothing_changes_nothing():
     np.testing.assert_allclose(turned.omega, dense.omega, rtol=1e-9)
 
 
-def test_units_scale():
-    beam = Beam(0.7, Section(E=2.1e11, rho=7800.0, A=1e-4, I=2e-10))
-    expected = np.square(np.array(CLAMPED_FREE) / 0.7) * math.sqrt(2.1e11 * 2e-10 / (7800.0 * 1e-4))
-    np.testing.assert_allclose(omegas(Scene(beam, [Clamped(0.0)]), 3), expected, rtol=1e-6)
-
-
 @pytest.mark.parametrize("count", [1, 2, 5, 30])
 def test_every_kept_mode_is_right(count):
     found = omegas(Scene(Beam(1.0, UNIT), [Clamped(0.0)]), count)
@@ -189,12 +183,6 @@ def test_fourth_order_with_constant_1_1440():
     order = -np.polyfit(np.log(counts), np.log(error), 1)[0]
     assert order == pytest.approx(4, abs=0.15)
     assert error * (counts / (3 * np.pi)) ** 4 == pytest.approx(1 / 1440, rel=0.03)
-
-
-def test_equal_spans_are_one_beam():
-    one = Scene(Beam(1.0, UNIT), [Clamped(0.0)])
-    two = Scene(Beam.of_spans([(0.5, UNIT), (0.5, UNIT)]), [Clamped(0.0)])
-    np.testing.assert_allclose(omegas(two, 4, elements=40), omegas(one, 4, elements=40), rtol=1e-12)
 
 
 def test_stepped_beam_against_its_characteristic_determinant():

@@ -66,17 +66,6 @@ def test_a_lumped_mass_makes_the_shear_jump_by_its_inertia():
     np.testing.assert_allclose(after - before, mass * model.omega**2 * model.phi(0.3), rtol=1e-5)
 
 
-def test_static_moment_converges_with_modes():
-    error = []
-    for count in (4, 8, 16, 32):
-        model = fb.Scene(fb.Beam(L, SQUARE), CLAMPED).reduce(count)
-        run = model.simulate(1e-4, 1e-4, start=model.equilibrium({L: -10.0}))
-        z = np.linspace(0.0, L, 41)
-        error.append(np.abs(run.moment(z)[0] + 10.0 * (L - z)).max() / (10.0 * L))
-    assert np.all(np.diff(error) < 0)
-    assert error[-1] < 0.01
-
-
 def test_static_moment_line_is_exact_with_the_residual_shape():
     scene = fb.Scene(fb.Beam(L, SQUARE), CLAMPED, stops=[fb.Stop(0.3, Hertz(1e7), gap=1.0)])
     model = scene.reduce(2, residual=True)

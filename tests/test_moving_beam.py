@@ -82,19 +82,6 @@ def test_parts_on_a_moving_support():
     assert np.allclose(reactions["Pinned at z = 0.7 m"].force - bare, carried, atol=1e-6 * abs(bare).max())
 
 
-def test_equal_motions_are_a_base_motion():
-    """On all coordinates to rounding: motion, reactions, moments."""
-    base = fb.Scene(BEAM, [fb.Clamped(0.0), fb.Pinned(1.0)], [fb.LumpedMass(0.4, 0.2)], base=WAVE, **DAMPED)
-    one, two = (s.reduce("all", elements=12).simulate(0.3, 5e-3) for s in (base, two_supports(WAVE, WAVE)))
-    z = [0.0, 0.03, 0.4, 1.0]  # one inside an element beside a support
-    for quantity in ("displacement", "velocity", "acceleration"):
-        assert equal(getattr(one, quantity)(z, absolute=True), getattr(two, quantity)(z), 1e-8), quantity
-    for quantity in ("moment", "shear"):
-        assert equal(getattr(one, quantity)(z), getattr(two, quantity)(z), 1e-9)
-    for mine, other in zip(one.reactions(), two.reactions(), strict=True):
-        assert equal(mine.force, other.force, 1e-8)
-
-
 def test_settlement():
     """A slow settlement y of a propped end, and a slow turn θ of the clamp: 3 EI y/L³ and 3 EI θ/L² in the prop."""
     slow, turn = fb.Harmonic(1.0, 1e-4, phase=0.5), fb.Harmonic(0.3, 1e-4, phase=0.5)

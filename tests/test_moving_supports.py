@@ -126,17 +126,6 @@ def test_one_end_moves(omega):
     assert errors[1] < 0.2 * errors[0]  # what the modes left out had of the inertia
 
 
-def test_settlement():
-    """A slow settlement by y of a propped end: 3 EI y/L² in the clamp, 3 EI y/L³ in the prop, nothing else moves."""
-    frame = fb.Frame({"A": (0, 0), "B": (2.0, 0)}, [fb.Member("A", "B", SPAN)])
-    slow = fb.Harmonic(1.0, 1e-4, phase=0.5)
-    scene = fb.Scene(frame, [fb.Clamped("A"), fb.Fixed("B", "y", motion={"y": slow})])
-    run = scene.reduce(modes=1).simulate(1.0, 0.25)
-    assert np.allclose(np.abs(run.section_forces(("A-B", 0.0))["M"]), 0.75 * slow(run.t), rtol=1e-6)
-    assert np.allclose(run.reactions()[1]["y"], 3 / 8 * slow(run.t), rtol=1e-6)
-    assert np.allclose(run.displacement(("A-B", 1.0), "y"), 5 / 16 * slow(run.t), rtol=1e-6)
-
-
 def test_contacts():
     """Stops between places of the structure do not know which way its feet were said to move."""
     stops = [fb.Stop("C", KelvinVoigt(1e6, 1e3), gap=1e-4, direction="x", on=("A-B", 1.5))]

@@ -152,17 +152,6 @@ def test_names_are_saved(run, tmp_path):
     assert str(again) == str(run)
 
 
-def test_a_file_with_too_few_names_is_refused(run, tmp_path):
-    path = run.save(tmp_path / "run")
-    with np.load(path) as data:
-        arrays = dict(data)
-    about = json.loads(str(arrays["about"]))
-    about["names"].pop()
-    np.savez(path, **arrays | {"about": json.dumps(about)})
-    with pytest.raises(ValueError, match="5 contacts need as many names"):
-        fb.load(path)
-
-
 def test_names_in_tables_and_pages(run, tmp_path):
     assert re.search(r"^valve, main +\d+ ", str(run), re.M)
     assert "indentation, stop at 0.3 m, above" in str(run)

@@ -139,12 +139,6 @@ def test_wrong_shapes_are_noticed(cantilever, tip, monkeypatch):
 # --- truncation ------------------------------------------------------------------------------------------
 
 
-def test_effective_masses_of_a_cantilever(cantilever):
-    basis = reduction.modal_basis(cantilever.M, cantilever.K, 3, root=cantilever.root)
-    masses = basis.effective_mass(cantilever.base_load)
-    np.testing.assert_allclose(masses, [0.613076, 0.188300, 0.064732], atol=1e-6)
-
-
 def test_by_frequency_and_by_mass(cantilever):
     M, K, R, load = cantilever.M, cantilever.K, cantilever.root, cantilever.base_load
     omega = reduction.modal_basis(M, K, 20, root=R).omega

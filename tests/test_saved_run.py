@@ -175,6 +175,7 @@ def changed(path, change):
         (lambda about, arrays: arrays.update(reactions=arrays["reactions"][..., 1:]), "reactions must have shape"),
         (lambda about, arrays: arrays.update(moments_1=arrays["moments_1"] * np.nan), "moments_1 must be finite"),
         (lambda about, arrays: about["readout"]["parts"][0].update(kind="System"), "'System'"),
+        (lambda about, arrays: about["names"].pop(), "contacts need as many names"),
         (lambda about, arrays: about["readout"]["beams"].pop(), "bodies"),
         (lambda about, arrays: about["readout"].update(base=17), "base"),
         (lambda about, arrays: about["readout"]["parts"].pop(), "parts"),

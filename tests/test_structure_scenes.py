@@ -366,14 +366,6 @@ def test_influence_is_that_of_beams_alone():
         _ = fb.Scene(space_truss()).matrices().influence
 
 
-def test_stops_of_a_beam_have_names_too():
-    scene = fb.Scene(BEAM, [fb.Clamped(0.0)], stops=[fb.Stop(0.5, LAW, 1e-3, name="snubber"), fb.Stop(0.4, LAW, 1e-3)],
-                     forces=[fb.PointForce(0.5, drive())])  # fmt: skip
-    run = scene.reduce(modes=1).simulate(0.01, 1e-3)
-    assert [run.name(0), run.name(1)] == ["snubber", "stop at 0.4 m, below"]
-    assert "snubber" in str(run)
-
-
 def test_a_support_of_a_beam_by_components():
     """Fixed on a Beam is Clamped, or Pinned, or Guided."""
     for dofs, kind in (((), fb.Clamped), (("y",), fb.Pinned), (("rx",), fb.Guided)):
