@@ -163,6 +163,14 @@ def two_sided_scene(gap=2e-4, law=None, mid_gap=None):
     return paper_scene(stops=stops)
 
 
+def soft_behind_stiff():
+    """M and K of a chain whose soft end stands behind stiff springs, and its ω², of the same K in 60 digits."""
+    springs, order = [1e12, 1e9, 1e6, 1e2, 1e-2], np.ix_([4, 3, 0, 2, 1], [4, 3, 0, 2, 1])
+    K = np.diag(np.add(springs, [*springs[1:], 0.0])) - np.diag(springs[1:], 1) - np.diag(springs[1:], -1)
+    exact = [3.3329999888596007e-3, 99.99999032334257, 999098.0088152341, 500001251.8761322, 1001000499750.1251]
+    return np.diag([3.0, 1.0, 1.0, 1.0, 2.0]), K[order], exact
+
+
 def coupled_dashpot(contacts=(), loads=()):
     """Three masses in a chain whose one dashpot couples the modes."""
     K = 1e4 * np.array([[2.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])

@@ -286,6 +286,7 @@ $EndElements
 """
 
 
+PLAIN = {"first": "$", "system": "", "more": "", "kind": "B31", "nodes": "2", "moved": "", "second": ""}
 BARS = """BEGIN BULK
 {first}
 GRID,10,,0.,0.,0.
@@ -311,12 +312,12 @@ ENDDATA
 )
 def test_what_is_passed_over_in_nastran_files(tmp_path, parts, said):
     """Systems, pins, offsets and included files would be lost without a word; without them the bar is read."""
-    path, nothing = tmp_path / "bar.bdf", {"first": "$", "system": "", "more": ""}
-    path.write_text(BARS.format(**nothing | parts))
+    path = tmp_path / "bar.bdf"
+    path.write_text(BARS.format(**PLAIN | parts))
     with pytest.raises(ValueError, match=re.escape(said)):
         fb.Frame.from_mesh(path, {1: THICK})
-    for rest in (nothing, nothing | {"system": 0}, nothing | {"more": ",GGG,+B\n+B,,,0.,0.,0.0E+00"}):
-        path.write_text(BARS.format(**rest))
+    for rest in ({}, {"system": 0}, {"more": ",GGG,+B\n+B,,,0.,0.,0.0E+00"}):
+        path.write_text(BARS.format(**PLAIN | rest))
         assert fb.Frame.from_mesh(path, {1: THICK}, plane=False).nodes["n1"] == (0.0, 0.0, 1.0)
 
 
@@ -352,41 +353,29 @@ PART = """*Part, name=post
 )
 def test_what_is_passed_over_in_abaqus_files(tmp_path, parts, said):
     """Instances that are moved would stay where their parts are; what cannot be read is said."""
-    path, plain = tmp_path / "post.inp", {"kind": "B31", "nodes": "2", "moved": "", "second": ""}
-    path.write_text(PART.format(**plain | parts))
+    path = tmp_path / "post.inp"
+    path.write_text(PART.format(**PLAIN | parts))
     with pytest.raises(ValueError, match=re.escape(said)):
         fb.Frame.from_mesh(path, {"steel": THICK})
-    path.write_text(PART.format(**plain))
+    path.write_text(PART.format(**PLAIN))
     assert fb.Frame.from_mesh(path, {"steel": THICK}).nodes["n1"] == (0.0, 0.0, 1.0)
 
 
 @pytest.mark.parametrize(
-    ("suffix", "more", "said"),
+    ("parts", "said"),
     [
-        ("bdf", "RBE2,5,7,123456,10\nRBAR,6,7,10,123456\nRBE2,8,7,1,10\nCONM2,9,7,,5.", "1 CONM2, 1 RBAR, 2 RBE2 in"),
-        ("inp", "*MPC\nBEAM,1,2\n*Rigid body, ref node=1, elset=steel\n", "1 *MPC, 1 *RIGID BODY in"),
+        ({"first": "RBE2,5,7,123456,10\nRBAR,6,7,10,123456\nRBE2,8,7,1,10\nCONM2,9,7,,5."}, "1 CONM2, 1 RBAR, 2 RBE2"),
+        ({"first": "GRID,8,,0.,1.,1.\nCROD,5,1,7,8\nCTUBE,6,1,8,10"}, "1 CROD, 1 CTUBE in"),
+        ({"second": "*MPC\nBEAM,1,2\n*Rigid body, ref node=1, elset=steel\n"}, "1 *MPC, 1 *RIGID BODY in"),
+        ({"kind": "T3D2"}, "1 T3D2 in"),
     ],
 )
-def test_what_is_no_line_is_counted_in_a_warning(tmp_path, suffix, more, said):
-    """Rigid elements and masses were passed over without a word."""
-    path = tmp_path / f"bar.{suffix}"
-    plain = {"kind": "B31", "nodes": "2", "moved": "", "second": more}
-    text = BARS.format(first=more, system="", more="") if suffix == "bdf" else PART.format(**plain)
-    path.write_text(text)
+def test_what_is_no_beam_is_counted_in_a_warning(tmp_path, parts, said):
+    """Rigid elements and masses were passed over, and pinned bars became beams, rigidly joined, without a word."""
+    bars = "first" in parts
+    path, text = tmp_path / f"bar.{'bdf' if bars else 'inp'}", BARS if bars else PART
+    path.write_text(text.format(**PLAIN | parts))
     with pytest.warns(UserWarning, match=re.escape(said)) as warned:
-        fb.Frame.from_mesh(path, THICK)
-    assert warned[0].filename == __file__
-
-
-@pytest.mark.parametrize(
-    ("suffix", "said"), [("bdf", "1 CROD, 1 CTUBE in"), ("inp", "1 T3D2 in")], ids=["nastran", "abaqus"]
-)
-def test_pinned_bars_are_told_of(tmp_path, suffix, said):
-    """They became beams, rigidly joined, without a word."""
-    path, plain = tmp_path / f"bar.{suffix}", {"kind": "T3D2", "nodes": "2", "moved": "", "second": ""}
-    rods = "GRID,8,,0.,1.,1.\nCROD,5,1,7,8\nCTUBE,6,1,8,10"
-    path.write_text(BARS.format(first=rods, system="", more="") if suffix == "bdf" else PART.format(**plain))
-    with pytest.warns(UserWarning, match=said) as warned:
         fb.Frame.from_mesh(path, THICK)
     assert warned[0].filename == __file__
 
