@@ -14,6 +14,7 @@ from functools import partial
 import numpy as np
 import pytest
 from problems import ROD_FILE, paper_scene
+from refusals import refused_by
 from scipy import stats
 
 import fembeam as fb
@@ -498,7 +499,10 @@ def test_tables_are_checked_when_read(file_of, old, new, said):
 # --- bad input --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("change", "said"), [
+GIVEN = {"quantity": "rms", "duration": 0.05, "dt": 1e-3}
+
+test_bad_input = refused_by(
+    lambda change: fb.study.vary(paper_scene(), **{**GIVEN, "parameters": {"gap": [0.0]}, **change}),
     ({"parameters": {"stops[0].gapp": [1e-3]}}, r"no such parameter; .*'stops\[0\].gapp' .*mean stops\[0\].gap\?"),
     ({"parameters": {"gap": ["wide"]}}, "values of gap must be finite numbers, got .'wide'."),
     ({"parameters": {"gap": [0.0, math.nan]}}, "values of gap must be finite numbers"),
@@ -527,14 +531,11 @@ def test_tables_are_checked_when_read(file_of, old, new, said):
     ({"seeds": range(4)}, "seeds need noise"),
     ({"checkpoint": 3}, "checkpoint must be the path of a file, got 3"),
     ({"duration": -1.0}, "duration must be finite and positive"),
-])  # fmt: skip
-def test_bad_input(change, said):
-    arguments = {"parameters": {"gap": [0.0]}, "quantity": "rms", "duration": 0.05, "dt": 1e-3, **change}
-    with pytest.raises(ValueError, match=said):
-        fb.study.vary(paper_scene(), **arguments)
+)
 
 
-@pytest.mark.parametrize(("change", "said"), [
+test_bad_bounds = refused_by(
+    lambda change: fb.study.minimise(paper_scene(), **{**GIVEN, "parameters": {"gap": (0.0, 1e-3)}, **change}),
     ({"parameters": {"gap": (1.0, 0.0)}}, "bounds of gap must be two finite values, ascending"),
     ({"parameters": {"gap": 1.0}}, "bounds of gap must be two finite values"),
     ({"parameters": {}}, "parameters must be {path: "),
@@ -543,11 +544,7 @@ def test_bad_input(change, said):
     ({"tolerance": 0.5}, "tolerance must lie in"),
     ({"most": 8}, "most must be above the 8 first points"),
     ({"quantity": "mean_force", "parameters": {"gap": (1.0, 2.0)}}, "mean_force must have a value at every point"),
-])  # fmt: skip
-def test_bad_bounds(change, said):
-    arguments = {"parameters": {"gap": (0.0, 1e-3)}, "quantity": "rms", "duration": 0.05, "dt": 1e-3, **change}
-    with pytest.raises(ValueError, match=said):
-        fb.study.minimise(paper_scene(), **arguments)
+)
 
 
 def test_what_is_no_such_thing():
