@@ -50,14 +50,21 @@ def static(made, load, *places):
     return u
 
 
-def whirl(made, *places, disk=None):
+def rigid_motions(made, position):
+    """Translations along x, y, z and rotations about them through the origin, (N, 6)."""
+    names = ("x", "y", "z", "rx", "ry", "rz")
+    at = np.array([position(place) for place, _ in made.labels])
+    turning = [np.hstack([np.cross(axis, at), np.tile(axis, (len(at), 1))]) for axis in np.eye(3)]
+    turned = [[t[i, names.index(c)] if c in names else 0.0 for i, (_, c) in enumerate(made.labels)] for t in turning]
+    return np.column_stack([made.translations, np.array(turned).T])
+
+
+def whirl(made, *places):
     """Whirl frequencies, signed: plus where y follows x by a quarter turn, as the spin turns."""
     free = free_dofs(made, *places)
     M, K = (A[free][:, free].toarray() for A in (made.M, made.K))
     G = np.zeros_like(M) if made.gyroscopic is None else made.gyroscopic[free][:, free].toarray()
     tip = made.rows("B")[:, free].toarray()
-    for name, matrix in (disk or {}).items():
-        {"M": M, "G": G}[name][:] += tip.T @ matrix @ tip
     n = len(free)
     blocks = [[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, G)]]
     values, vectors = linalg.eig(np.block(blocks))

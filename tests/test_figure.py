@@ -67,37 +67,26 @@ def spectrum():
     return fb.response_spectrum([0.0, 1.0, 2.0], [0.0, 1.0, 0.0], periods=[0.5, 1.0])
 
 
-@pytest.mark.parametrize(
-    ("draw", "panels"),
-    [
-        (lambda model, axes: plot.loops({"Hertz": Hertz(1e9)}, axes=axes[0]), 1),
-        (lambda model, axes: plot.restitutions(axes=axes), 2),
-        (lambda model, axes: plot.identification(collisions(), axes=axes), 2),
-        (lambda model, axes: plot.orbit(model.orbit(), axes=axes), 2),
-        (lambda model, axes: plot.branch(model.branch("amplitude", (0.9e-3, 1e-3)).run(), axes=axes[0]), 1),
-        (lambda model, axes: plot.mode_shapes(model, axes=axes[0]), 1),
-        (lambda model, axes: plot.time_history(model.simulate(0.3, 1e-3), axes=axes), 2),
-        (lambda model, axes: plot.spectrum(model.simulate(0.3, 1e-3), axes=axes), 2),
-        (lambda model, axes: plot.densities(model.simulate(0.3, 1e-3), axes=axes), 2),
-        (lambda model, axes: plot.floor_spectrum(model.simulate(0.3, 1e-3), axes=axes), 2),
-        (lambda model, axes: plot.response_spectrum(spectrum(), axes=axes), 2),
-        (lambda model, axes: plot.frequency_response(model.frequency_response([1.0, 2.0]), axes=axes), 2),
-    ],
-    ids=[
-        "loops",
-        "restitutions",
-        "identification",
-        "orbit",
-        "branch",
-        "modes",
-        "history",
-        "psd",
-        "densities",
-        "floor",
-        "response spectrum",
-        "frequency response",
-    ],
-)
+DRAWN = {
+    "loops": (lambda model, axes: plot.loops({"Hertz": Hertz(1e9)}, axes=axes[0]), 1),
+    "restitutions": (lambda model, axes: plot.restitutions(axes=axes), 2),
+    "identification": (lambda model, axes: plot.identification(collisions(), axes=axes), 2),
+    "orbit": (lambda model, axes: plot.orbit(model.orbit(), axes=axes), 2),
+    "branch": (lambda model, axes: plot.branch(model.branch("amplitude", (0.9e-3, 1e-3)).run(), axes=axes[0]), 1),
+    "modes": (lambda model, axes: plot.mode_shapes(model, axes=axes[0]), 1),
+    "history": (lambda model, axes: plot.time_history(model.simulate(0.3, 1e-3), axes=axes), 2),
+    "psd": (lambda model, axes: plot.spectrum(model.simulate(0.3, 1e-3), axes=axes), 2),
+    "densities": (lambda model, axes: plot.densities(model.simulate(0.3, 1e-3), axes=axes), 2),
+    "floor": (lambda model, axes: plot.floor_spectrum(model.simulate(0.3, 1e-3), axes=axes), 2),
+    "response spectrum": (lambda model, axes: plot.response_spectrum(spectrum(), axes=axes), 2),
+    "frequency response": (
+        lambda model, axes: plot.frequency_response(model.frequency_response([1.0, 2.0]), axes=axes),
+        2,
+    ),
+}
+
+
+@pytest.mark.parametrize(("draw", "panels"), DRAWN.values(), ids=DRAWN)
 def test_axes_that_are_given_are_drawn_into_and_nothing_else_is_changed(model, given, draw, panels):
     figure, axes = given
     assert draw(model, axes) is figure

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from frames import portal, space_l, turned
+from frames import portal, rigid_motions, space_l, turned
 
 import fembeam as fb
 import reduction
@@ -85,15 +85,6 @@ def shaken(damping=0.01):
     stops = [fb.Stop("B", KelvinVoigt(1e6, 50.0), gap=2e-4, direction=n) for n in ("z", "-z", "y", "-y")]
     masses = [fb.LumpedMass("C", mass=0.2, inertia=(1e-4, 2e-4, 3e-4), offset=(0.01, 0.0, 0.02))]
     return fb.Scene(space_l(), [fb.Clamped("A")], masses, stops=stops, base=signals, damping=fb.ModalDamping(damping))
-
-
-def rigid_motions(made, position):
-    """Translations along x, y, z and rotations about them through the origin, (N, 6)."""
-    names = ("x", "y", "z", "rx", "ry", "rz")
-    at = np.array([position(place) for place, _ in made.labels])
-    turning = [np.hstack([np.cross(axis, at), np.tile(axis, (len(at), 1))]) for axis in np.eye(3)]
-    turned_ = [[t[i, names.index(c)] if c in names else 0.0 for i, (_, c) in enumerate(made.labels)] for t in turning]
-    return np.column_stack([made.translations, np.array(turned_).T])
 
 
 def test_reactions_balance_inertia():
