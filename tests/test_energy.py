@@ -116,19 +116,6 @@ def test_work_of_a_tone_at_resonance_grows_with_time():
     assert np.abs(run.energy.residual).max() < 1e-12 * work.max()
 
 
-def test_steady_motion_takes_what_damping_takes():
-    """In steady motion under a tone a ramp: the power is ζ ω³ |Z|² for ever."""
-    omega, zeta = 40.0, 0.05
-    run = integrate(
-        System.modal([omega], zeta, [], [([1.0], fb.Harmonic(1.0, omega))]), [0.0], [0.0], 20.0, 2.0 * np.pi / omega
-    )
-    power = zeta * omega**3 * (1.0 / (2.0 * zeta * omega**2)) ** 2
-    late = run.t > 15.0
-    slope = np.polyfit(run.t[late], run.energy.input[late], 1)[0]
-    assert slope == pytest.approx(power, rel=1e-6)
-    assert np.polyfit(run.t[late], run.energy.damping[late], 1)[0] == pytest.approx(power, rel=1e-6)
-
-
 def test_a_signal_longer_than_the_run_and_many_tones_balance():
     """Tables that go on beyond the end; more tones than rows are kept for, where the work is summed by series."""
     noise = System.modal(
