@@ -117,21 +117,12 @@ STATES = [
     *((GATED, (code, rate), 7e-4, 0.1) for code, rate in ((0.0, 0.3), (1.0, 0.3), (1.0, 0.001))),
     *((STOPS, (a, 0.3, b, 0.2, c, 50.0), 7e-4, 0.1) for c, a, b in itertools.product((0.0, 1.0), repeat=3)),
 ]
-CODES = {
-    Jenkins: [0],
-    Coulomb: [0],
-    ElastoPlastic: [0],
-    Iwan: [0, 2],
-    BoucWen: [0],
-    WaltonBraun: [0],
-    Gated: [0],
-    Sum: [0, 2, 4],
-}
+CODES = {Iwan: [0, 2], Sum: [0, 2, 4]}
 
 
 def codes(law):
     """Which latched numbers are segment codes."""
-    return [i for i in CODES[type(law)] if i < len(law.memory)]
+    return [i for i in CODES.get(type(law), [0]) if i < len(law.memory)]
 
 
 @pytest.mark.parametrize("law", {type(law): law for law, *_ in STATES}.values(), ids=lambda law: type(law).__name__)

@@ -33,16 +33,7 @@ PLAIN = {  # annotations of what is no signal
     *("tuple[float, float]", "tuple[Direction, Direction] | None"),
     "float | tuple[float, float, float] | tuple[tuple[float, ...], ...]",
 }
-STRUCTURE = {
-    "z",
-    "beam",
-    "damping",
-    "bodies",
-    "joints",
-    "law",
-    "friction",
-    *FEATURES,
-}  # fields of other annotations that are none
+STRUCTURE = {*("z", "beam", "damping", "bodies", "joints", "law", "friction"), *FEATURES}  # are none, others annotated
 TABLES = {"motion"}  # signals by name, see below
 VALUES = {"z": 0.3, "stiffness": 1e3, "mass": 0.1, "velocity": 0.0, "damping": 0.1, "law": Hertz(1e8)}
 TONE, NOISE = fb.Harmonic(1e-5, 300.0), fb.BandNoise(1e-5, (0.0, 600.0), seed=3)
