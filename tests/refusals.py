@@ -26,7 +26,8 @@ def refused_files(text, *cases, error=ValueError):
     @pytest.mark.parametrize(("old", "new", "said"), cases, ids=[str(i) for i in range(len(cases))])  # in the path
     def test(file_of, old, new, said):
         assert old in text
-        with pytest.raises(error, match=said):
+        with pytest.raises(error, match=said) as caught:
             file_of(text.replace(old, new, 1))
+        assert "scene.toml" in str(caught.value)
 
     return test

@@ -285,10 +285,7 @@ def test_a_body_of_fewer_dofs_keeps_all_of_them(options, counts):
 
 
 test_of_modes_that_no_body_has_the_body_is_named = refused(
-    (
-        lambda: beside_a_block().reduce([1, 2]),
-        r"one that every body has \(bodies\[0\] has 1 mode only\), got \[1, 2\]",
-    ),
+    (lambda: beside_a_block().reduce([1, 2]), r"one that every body has \(bodies\[0\] has 1 mode only\), got \[1, 2\]"),
     (
         lambda: fb.Scene(BLOCK.beam, bodies=[BLOCK]).reduce(modes=2),
         r"modes must be at most 1 \(free dofs of the scene's own body\), got 2",

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from problems import ROD
-from refusals import refused_by
+from refusals import refused, refused_by
 
 import fembeam as fb
 import solvers
@@ -456,26 +456,17 @@ test_bad_seeds = refused_by(
 )
 
 
-def test_bad_input(tmp_path):
-    with pytest.raises(ValueError, match=r"model must be a Model, got Scene.* scene.reduce\(modes=…\) makes one"):
-        ensemble(small_model().scene, 2, base_at)
-    with pytest.raises(ValueError, match="quantity must be a function of a model, got 'peak_force'"):
-        ensemble(small_model(), 2, "peak_force")
-    with pytest.raises(ValueError, match="values must be several, got 3"):
-        Estimate.of_mean(3.0)
-    with pytest.raises(ValueError, match=r"estimates must be of Estimate, got \[2.0\]"):
-        Estimate.joint(np.divide, Estimate.of_mean([1.0, 2.0]), 2.0)
-    with pytest.raises(ValueError, match="needs a BandNoise"):
-        ensemble(small_model(fb.Harmonic(1e-3, 100.0)), 2, base_at)
-    with pytest.raises(ValueError, match="until must be"):
-        ensemble(small_model(), 2, base_at, until=0.0)
-    with pytest.raises(ValueError, match=r"folder .* does not exist"):
-        ensemble(small_model(), 2, base_at, checkpoint=tmp_path / "nowhere" / "kept.npz")
-    lengths = iter([2, 3])
-    with pytest.raises(ValueError, match=r"must have one form; .* gave .*\(3,\)"):
-        ensemble(small_model(), 2, lambda model: np.ones(next(lengths)))
-    with pytest.raises(RuntimeError, match="must be a number or an array of numbers, got str"):
-        ensemble(small_model(), 2, lambda model: "much")
+test_bad_input = refused(
+    (lambda: ensemble(small_model().scene, 2, base_at), r"a Model, got Scene.* scene.reduce\(modes=…\) makes one"),
+    (lambda: ensemble(small_model(), 2, "peak_force"), "quantity must be a function of a model, got 'peak_force'"),
+    (lambda: Estimate.of_mean(3.0), "values must be several, got 3"),
+    (lambda: Estimate.joint(np.divide, Estimate.of_mean([1.0, 2.0]), 2.0), r"must be of Estimate, got \[2.0\]"),
+    (lambda: ensemble(small_model(fb.Harmonic(1e-3, 100.0)), 2, base_at), "needs a BandNoise"),
+    (lambda: ensemble(small_model(), 2, base_at, until=0.0), "until must be"),
+    (lambda: ensemble(small_model(), 2, base_at, checkpoint="nowhere/kept.npz"), r"folder .* does not exist"),
+    (lambda: ensemble(small_model(), 2, partial(next, iter([np.ones(2), np.ones(3)]))), r"one form; .* gave .*\(3,\)"),
+    (lambda: ensemble(small_model(), 2, lambda model: "much"), "number or an array of numbers, got str", RuntimeError),
+)
 
 
 def stopped(model):

@@ -165,14 +165,11 @@ def test_section_forces_of_a_file(tmp_path):
     ]
 
 
-@pytest.mark.parametrize(("old", "new", "says"), [
+test_outputs_that_are_not_there = refused_files(
+    PORTAL + OUTPUTS,
     ('["C", "x"]', '["C", "x"], "E"', "places; use one of the names"),
     ('["C", "x"]', '["C", "q"]', "direction must be one of x, y, z, rx, ry, rz, or a vector, got 'q' in places, 'C'"),
     ('["C", "x"]', '["C", "x"], "B"', r"must be asked for on a member of a frame, got 'C' in places"),
     ('places = [["B-C", 1.5], ["C", "x"]]', "", r"section forces need places, got \['moment'\] in simulate"),
     ('"moment"', '"slope"', "slope is of a Beam"),
-])  # fmt: skip
-def test_outputs_that_are_not_there(file_of, old, new, says):
-    """Before anything is computed."""
-    with pytest.raises(ValueError, match=says):
-        file_of(PORTAL + OUTPUTS.replace(old, new))
+)

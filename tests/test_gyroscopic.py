@@ -140,16 +140,18 @@ def test_blocks_have_the_whirling_frequencies_and_no_damping():
     np.testing.assert_array_equal(blocks.c, 0.0)
 
 
-def test_whirl_arguments_are_refused():
-    basis, rows = reduction.Basis(np.eye(2), np.array([1.0, 2.0])), np.eye(2)
-    with pytest.raises(ValueError, match=r"G must be skew, G = -Gᵀ; its largest \|G \+ Gᵀ\| is 0.5"):
-        reduction.whirl(basis, [[0.0, 1.0], [-0.5, 0.0]], *rows)
-    with pytest.raises(ValueError, match=r"G must be \(2, 2\), as the basis has 2 dofs, got \(3, 3\)"):
-        reduction.whirl(basis, np.zeros((3, 3)), *rows)
-    with pytest.raises(ValueError, match=r"rows \(k, 2\) of the same places, got \(1, 2\) and \(2, 2\)"):
-        reduction.whirl(basis, TURN, rows[0], rows)
-    with pytest.raises(ValueError, match=r"needs a rotor that is held, got 1 rigid-body modes"):
-        reduction.critical_speeds(reduction.Basis(np.eye(2), np.array([0.0, 2.0])), TURN, *rows)
+PAIR, ROWS = reduction.Basis(np.eye(2), np.array([1.0, 2.0])), np.eye(2)
+LOOSE = reduction.Basis(np.eye(2), np.array([0.0, 2.0]))
+
+test_whirl_arguments_are_refused = refused_by(
+    reduction.whirl,
+    (PAIR, [[0.0, 1.0], [-0.5, 0.0]], *ROWS, r"G must be skew, G = -Gᵀ; its largest \|G \+ Gᵀ\| is 0.5"),
+    (PAIR, np.zeros((3, 3)), *ROWS, r"G must be \(2, 2\), as the basis has 2 dofs, got \(3, 3\)"),
+    (PAIR, TURN, ROWS[0], ROWS, r"rows \(k, 2\) of the same places, got \(1, 2\) and \(2, 2\)"),
+)
+test_a_loose_rotor_has_no_critical_speeds = refused_by(
+    reduction.critical_speeds, (LOOSE, TURN, *ROWS, "needs a rotor that is held, got 1 rigid-body modes")
+)
 
 
 # --- flight -----------------------------------------------------------------------------------------------------------

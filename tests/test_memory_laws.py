@@ -251,10 +251,7 @@ test_bad_input = refused(
     (lambda: Coulomb(1.0, 1e4, damping=-1.0), "damping of Coulomb must be finite and >= 0"),
     (lambda: ElastoPlastic(1e4, 1.0, 1e4), "hardening of ElastoPlastic must be smaller than stiffness 10000 N/m"),
     (lambda: ElastoPlastic(1e4, 0.0), "yield_force of ElastoPlastic must be finite and > 0"),
-    (
-        lambda: Iwan([1e4], [1.0, 2.0]),
-        r"limits of Iwan must be as many as stiffness, .*, got shapes \(2,\) and \(1,\)",
-    ),
+    (lambda: Iwan([1e4], [1.0, 2.0]), r"limits of Iwan must be as many as stiffness, .*, got shapes \(2,\) and \(1,\)"),
     (lambda: Iwan([1e4, -1.0], [1.0, 2.0]), "stiffness and limits of Iwan must be > 0"),
     (lambda: Iwan([1e4], [math.inf]), "limits of Iwan must hold a finite one"),
     (lambda: Iwan([], []), "limits of Iwan must be as many as stiffness, .* one per element"),

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from refusals import refused
+from refusals import refused_by
 
 import fembeam as fb
 
@@ -121,17 +121,12 @@ def test_lines_that_are_no_beam_are_refused(tmp_path, points, lines, message):
         fb.Beam.from_mesh(path, THIN)
 
 
-test_missing_groups_are_named = refused(
-    (
-        lambda: fb.Beam.from_mesh(RIG, {**SECTIONS, "flange": THIN}),
-        r"groups of the file \(it has thick, thin\), got \['flange'\]",
-    ),
-    (lambda: fb.Beam.from_mesh(RIG, {"thick": THICK}), r"one section, got 'none for thin' in .*rig.msh at z = 0.12 m"),
-    (
-        lambda: fb.Beam.from_mesh(RIG, {"thick": THICK, "thin": 3.0}),
-        r"section of span 1 must be a Section, got 3.0",
-        TypeError,
-    ),
+test_missing_groups_are_named = refused_by(
+    lambda sections: fb.Beam.from_mesh(RIG, sections),
+    ({**SECTIONS, "flange": THIN}, r"groups of the file \(it has thick, thin\), got \['flange'\]"),
+    ({"thick": THICK}, r"one section, got 'none for thin' in .*rig.msh at z = 0.12 m"),
+    ({"thick": THICK, "thin": 3.0}, r"section of span 1 must be a Section, got 3.0"),
+    error=(ValueError, TypeError),
 )
 
 

@@ -6,15 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 from oscillators import Tone
-from problems import (
-    HertzBounce,
-    as_sparse,
-    coupled_dashpot,
-    linear_stop,
-    paper_scene,
-    reference,
-    two_sided_scene,
-)
+from problems import HertzBounce, as_sparse, coupled_dashpot, linear_stop, paper_scene, reference, two_sided_scene
 from refusals import refused
 
 import fembeam as fb

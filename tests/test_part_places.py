@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 from problems import ROD, ROD_FILE
+from refusals import refused_files
 from structures import beam_structure
 
 import fembeam as fb
@@ -134,17 +135,15 @@ places = ["valve", 0.2]
 
 def test_scene_files(file_of):
     assert file_of(FILE).scene.stops[0].z == 0.4
-    for old, new, message in (
-        ('z = "valve"', 'z = "vlave"', r"'valve' is the nearest there is, got 'vlave' in stops\[0\]"),
-        (
-            'places = ["valve"',
-            'places = ["vlave"',
-            r"\[simulate\]: .*'valve' is the nearest there is, got 'vlave' in places",
-        ),
-        ('z = "valve"', 'z = "0.4"', "z must be a number, got '0.4' in Stop"),
-    ):
-        with pytest.raises(SceneFileError, match=message):
-            file_of(FILE.replace(old, new))
+
+
+test_refused_in_files = refused_files(
+    FILE,
+    ('z = "valve"', 'z = "vlave"', r"'valve' is the nearest there is, got 'vlave' in stops\[0\]"),
+    ('["valve"', '["vlave"', r"\[simulate\]: .*'valve' is the nearest there is, got 'vlave' in places"),
+    ('z = "valve"', 'z = "0.4"', "z must be a number, got '0.4' in Stop"),
+    error=SceneFileError,
+)
 
 
 @pytest.mark.parametrize(("make", "message"), [

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from problems import STEEL, paper_scene
-from refusals import refused
+from refusals import refused, refused_by
 
 import reduction
 import solvers
@@ -292,15 +292,10 @@ def test_scene_reduce_rejects(arguments, message, monkeypatch):
         struck().reduce(**arguments)
 
 
-test_static_shapes_need_a_place = refused(
-    (
-        lambda: Scene(Beam(0.26, STEEL), [Clamped(0.0)]).reduce(residual=True),
-        "static shapes need a stop, a force or a dashpot",
-    ),
-    (
-        lambda: Scene(Beam(0.26, STEEL), [Clamped(0.0)]).reduce(interface=True),
-        r"or an element, got none in .*leave out interface=True, or add one",
-    ),
+test_static_shapes_need_a_place = refused_by(
+    lambda name: Scene(Beam(0.26, STEEL), [Clamped(0.0)]).reduce(**{name: True}),
+    ("residual", "static shapes need a stop, a force or a dashpot"),
+    ("interface", r"or an element, got none in .*leave out interface=True, or add one"),
 )
 
 

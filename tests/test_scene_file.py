@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from problems import paper_scene
+from refusals import refused_files
 
 import fembeam as fb
 import solvers
@@ -214,63 +215,45 @@ def test_solvers_by_name(file_of):
     assert heun.studies["simulate"].solver == solvers.HenonRK2(1e-5, 1e-6)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("mass = 25.4e-3", "mas = 1", r"\[\[masses\]\] number 1: unknown key 'mas'; did you mean 'mass'\?"),
-        ("mass = 25.4e-3", "", r"\[\[masses\]\] number 1: the key 'mass' is missing"),
-        ("mass = 25.4e-3", 'mass = "25"', r"\[\[masses\]\] number 1: mass must be a number, got '25'"),
-        ("mass = 25.4e-3", "mass = true", r"mass must be a number, got true"),
-        (
-            "inertia = 3.0e-6",
-            "inertia = [0.1, 0.2]",
-            r"list of 3 numbers or a list of lists of numbers",
-        ),
-        ("mass = 25.4e-3", "mass = nan", r"\[\[masses\]\] number 1: mass must be finite"),
-        ("stiffness =", "stifness =", r"\[\[stops\]\] number 1 law: unknown key 'stifness'; did you mean 'stiffness'"),
-        ('"lankarani_nikravesh"', '"hysteretc"', r"law: kind must be one of .*did you mean 'hysteretic'"),
-        ('"lankarani_nikravesh"', '["hertz"]', r"law: kind must be one of"),
-        (
-            'kind = "clamped"',
-            "",
-            r"\[\[supports\]\] number 1: kind must be one of clamped, pinned, guided; it is missing",
-        ),
-        ("[damping]", "[dampning]", r"unknown table 'dampning'; did you mean 'damping'"),
-        ("[[stops]]", "[stops]", r"write \[\[stops\]\]"),
-        ("[base]", "[[base]]", r"write \[base\], once"),
-        ("zeta = ", "alpha = 1\nzeta = ", r"\[damping\]: give either zeta, or alpha and beta"),
-        ("E = 1.9e11", "E = -1.9e11", r"\[beam\] section: E must be finite and positive"),
-        ("[0.0, 1226.6]", "[1226.6, 0.0]", r"\[base\]: BandNoise band must run from lo to hi"),
-        ("[0.0, 1226.6]", "[1226.6]", r"\[base\]: band must be a list of 2 numbers"),
-        (
-            "modes = 2",
-            "modes = true",
-            r"\[reduce\]: modes must be a whole number or a list of whole numbers or 'all', got true",
-        ),
-        ("modes = 2", "mode = 2", r"\[reduce\]: unknown key 'mode'; did you mean 'modes'"),
-        ("modes = 2", "modes = 2\ngravity = 9.81", r"unknown key 'gravity'; gravity stands above all tables \(valid"),
-        ("[beam]", 'gravity = "9.81"\n[beam]', r"toml:\d+: the file: gravity must be a number, or three, got '9.81'"),
-        ("modes = 2", "modes = -1", r"\[reduce\]: modes must be a count above 0 or a list"),
-        ("[base]", "[base.y]", r"\[base.y\]: the base of a beam moves along y alone: write \[base\] with kind = "),
-        ("seed = 1", "frequency_hz = 9", r"unknown key 'frequency_hz'; frequencies are in rad/s, 2π times hertz: band"),
-        ("modes = 2", "modes = 'most'", r"\[reduce\]: modes must be"),
-        ("modes = 2", "modes = 2\nelements = 0", r"\[reduce\]: elements must be a whole number above 0"),
-        ("modes = 2", "omega_max = -1.0", r"\[reduce\]: omega_max must be positive"),
-        ("modes = 2", "mass_share = 1.5", r"\[reduce\]: mass_share must lie in"),
-        ("dt = 1e-3", "dt = 0", r"\[simulate\]: dt must be finite and positive"),
-        ("discard = 5", "discard = 700", r"\[simulate\]: discard must be below the duration of 600 s"),
-        ("discard = 5", 'solver = { kind = "henon" }', r"\[simulate\] solver: kind must be one of .*henon_rk2"),
-        ("duration = 600", "duration = 600 s", r"not valid TOML: .*line \d+"),
-        ("z = 0.24445", "z = 0.3", r"z must lie on the beam.*LumpedMass"),
-        ("length = 0.2599", "length = 1" + 400 * "0", r"length must be a number"),
-        ("[beam]", "[beam]\nspans = 3\n#", r"spans must be a list|unknown key"),
-    ],
+test_mistakes_are_named = refused_files(
+    EXAMPLE,
+    ("mass = 25.4e-3", "mas = 1", r"\[\[masses\]\] number 1: unknown key 'mas'; did you mean 'mass'\?"),
+    ("mass = 25.4e-3", "", r"\[\[masses\]\] number 1: the key 'mass' is missing"),
+    ("mass = 25.4e-3", 'mass = "25"', r"\[\[masses\]\] number 1: mass must be a number, got '25'"),
+    ("mass = 25.4e-3", "mass = true", r"mass must be a number, got true"),
+    ("inertia = 3.0e-6", "inertia = [0.1, 0.2]", r"list of 3 numbers or a list of lists of numbers"),
+    ("mass = 25.4e-3", "mass = nan", r"\[\[masses\]\] number 1: mass must be finite"),
+    ("stiffness =", "stifness =", r"\[\[stops\]\] number 1 law: unknown key 'stifness'; did you mean 'stiffness'"),
+    ('"lankarani_nikravesh"', '"hysteretc"', r"law: kind must be one of .*did you mean 'hysteretic'"),
+    ('"lankarani_nikravesh"', '["hertz"]', r"law: kind must be one of"),
+    ('kind = "clamped"', "", r"\[\[supports\]\] number 1: kind must be one of clamped, pinned, guided; it is missing"),
+    ("[damping]", "[dampning]", r"unknown table 'dampning'; did you mean 'damping'"),
+    ("[[stops]]", "[stops]", r"write \[\[stops\]\]"),
+    ("[base]", "[[base]]", r"write \[base\], once"),
+    ("zeta = ", "alpha = 1\nzeta = ", r"\[damping\]: give either zeta, or alpha and beta"),
+    ("E = 1.9e11", "E = -1.9e11", r"\[beam\] section: E must be finite and positive"),
+    ("[0.0, 1226.6]", "[1226.6, 0.0]", r"\[base\]: BandNoise band must run from lo to hi"),
+    ("[0.0, 1226.6]", "[1226.6]", r"\[base\]: band must be a list of 2 numbers"),
+    ("modes = 2", "modes = true", r"\[reduce\]: .* a whole number or a list of whole numbers or 'all', got true"),
+    ("modes = 2", "mode = 2", r"\[reduce\]: unknown key 'mode'; did you mean 'modes'"),
+    ("modes = 2", "modes = 2\ngravity = 9.81", r"unknown key 'gravity'; gravity stands above all tables \(valid"),
+    ("[beam]", 'gravity = "9.81"\n[beam]', r"toml:\d+: the file: gravity must be a number, or three, got '9.81'"),
+    ("modes = 2", "modes = -1", r"\[reduce\]: modes must be a count above 0 or a list"),
+    ("[base]", "[base.y]", r"\[base.y\]: the base of a beam moves along y alone: write \[base\] with kind = "),
+    ("seed = 1", "frequency_hz = 9", r"unknown key 'frequency_hz'; frequencies are in rad/s, 2π times hertz: band"),
+    ("modes = 2", "modes = 'most'", r"\[reduce\]: modes must be"),
+    ("modes = 2", "modes = 2\nelements = 0", r"\[reduce\]: elements must be a whole number above 0"),
+    ("modes = 2", "omega_max = -1.0", r"\[reduce\]: omega_max must be positive"),
+    ("modes = 2", "mass_share = 1.5", r"\[reduce\]: mass_share must lie in"),
+    ("dt = 1e-3", "dt = 0", r"\[simulate\]: dt must be finite and positive"),
+    ("discard = 5", "discard = 700", r"\[simulate\]: discard must be below the duration of 600 s"),
+    ("discard = 5", 'solver = { kind = "henon" }', r"\[simulate\] solver: kind must be one of .*henon_rk2"),
+    ("duration = 600", "duration = 600 s", r"not valid TOML: .*line \d+"),
+    ("z = 0.24445", "z = 0.3", r"z must lie on the beam.*LumpedMass"),
+    ("length = 0.2599", "length = 1" + 400 * "0", r"length must be a number"),
+    ("[beam]", "[beam]\nspans = 3\n#", r"spans must be a list|unknown key"),
+    error=SceneFileError,
 )
-def test_mistakes_are_named(file_of, old, new, message):
-    assert old in EXAMPLE
-    with pytest.raises(SceneFileError, match=message) as caught:
-        file_of(EXAMPLE.replace(old, new, 1))
-    assert "scene.toml" in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -360,6 +343,11 @@ law = { kind = "hertz", stiffness = 1e7 }
 )
 
 
+GAPS = "parameters = { 'stops[0].gap' = [1e-3, 2e-3] }\nquantity = 'rms'\nduration = 1\n"
+MINIMISE, ENSEMBLE = f"[minimise]\n{GAPS}dt = 1e-3\n", "[ensemble]\nrealisations = 4\nduration = 9.0\ndt = 1e-3\n"
+BASINS = "[basins]\nx_span = [0.0, 1.0]\ny_span = [0.0, 1.0]\n"
+
+
 @pytest.mark.parametrize(
     ("table", "message"),
     [
@@ -367,38 +355,21 @@ law = { kind = "hertz", stiffness = 1e7 }
         ("[branch]\nspan = [20.0, 40.0]\nstep = nan", r"step must lie in \(0, 1\], got nan"),
         ("[branch]\nspan = [20.0, 40.0]\nparameter = 'x'", "no such parameter"),
         ("[basins]\nx_span = [1.0, 0.0]\ny_span = [0.0, 1.0]", r"x_span must be two finite values, ascending"),
-        ("[basins]\nx_span = [0.0, 1.0]\ny_span = [0.0, 1.0]\npoints = 1", "points must be one or two whole numbers"),
-        ("[basins]\nx_span = [0.0, 1.0]\ny_span = [0.0, 1.0]\nthreads = 0", "threads must be above 0, got 0"),
+        (f"{BASINS}points = 1", "points must be one or two whole numbers"),
+        (f"{BASINS}threads = 0", "threads must be above 0, got 0"),
         ("[peak]\nover = 'stops[0].gap'\nvalues = [1e-3, 2e-3]\nspan = [20.0, 40.0]\nz = 2.0", "must lie on the beam"),
         ("[peak]\nover = 'damping.zeta[0]'\nvalues = [-0.1, 0.1]\nspan = [20.0, 40.0]", "zeta"),
         ("[backbone]\nlevels = [1e-3, 2e-3]\nspan = [20.0, 40.0]\nz = 2.0", "must lie on the beam"),
+        (f"[vary]\n{GAPS}dt = 2.0", "dt must be at most the duration of 1 s, got 2.0"),
+        ("[mode_count]\ncounts = [1, 2]\nquantity = 'rms'\nduration = 0.5\ndt = 2.0", "dt must be at most the dura"),
+        (f"{ENSEMBLE}until = 2.0", r"until must lie in \(0, 1\), got 2.0"),
+        (f"{ENSEMBLE}discard = -1", "discard must be finite and not neg"),
+        (f"{ENSEMBLE}segment = 3", "segment must be at least 8 samples"),
+        (f"{MINIMISE}tolerance = 0.5", r"tolerance must lie in \(0, 0.1\), got 0.5"),
+        (f"{MINIMISE}constraints = {{ peak_force = nan }}", "the bound of peak_force must be a finite number"),
         (
-            "[vary]\nparameters = { 'stops[0].gap' = [1e-3, 2e-3] }\nquantity = 'rms'\nduration = 1\ndt = 2.0",
-            "dt must be at most the duration of 1 s, got 2.0",
-        ),
-        (
-            "[mode_count]\ncounts = [1, 2]\nquantity = 'rms'\nduration = 0.5\ndt = 2.0",
-            "dt must be at most the duration",
-        ),
-        (
-            "[ensemble]\nrealisations = 4\nduration = 9.0\ndt = 1e-3\nuntil = 2.0",
-            r"until must lie in \(0, 1\), got 2.0",
-        ),
-        ("[ensemble]\nrealisations = 4\nduration = 9.0\ndt = 1e-3\ndiscard = -1", "discard must be finite and not neg"),
-        ("[ensemble]\nrealisations = 4\nduration = 9.0\ndt = 1e-3\nsegment = 3", "segment must be at least 8 samples"),
-        (
-            "[minimise]\nparameters = { 'stops[0].gap' = [1e-3, 2e-3] }\nquantity = 'rms'\nduration = 1\ndt = 1e-3\n"
-            "tolerance = 0.5",
-            r"tolerance must lie in \(0, 0.1\), got 0.5",
-        ),
-        (
-            "[minimise]\nparameters = { 'stops[0].gap' = [1e-3, 2e-3] }\nquantity = 'rms'\nduration = 1\ndt = 1e-3\n"
-            "constraints = { peak_force = nan }",
-            "the bound of peak_force must be a finite number",
-        ),
-        (
-            "[basins]\nx_span = [0.0, 1.0]\ny_span = [0.0, 1.0]\nx = 'displacment'",
-            "x must be 'displacement', 'velocity' or the number of a state, got 'displacment'",
+            f"{BASINS}x = 'displacment'",
+            "must be 'displacement', 'velocity' or the number of a state, got 'displacment'",
         ),
     ],
 )

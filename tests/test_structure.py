@@ -165,19 +165,15 @@ def test_given_modes_are_the_structure_they_came_from():
     np.testing.assert_allclose(other.displacement("middle", "rx"), one.displacement("middle", "rx"), atol=1e-12)
 
 
+ONE_MODE = fb.Structure.of_modes([1.0], [[0.5]], [(1, "x")])
+
 test_given_modes_that_do_not_fit_are_refused = refused(
     (lambda: fb.Structure.of_modes([2.0, 1.0], np.ones((1, 2)), [(1, "x")]), "omega must be .* ascending"),
     (lambda: fb.Structure.of_modes([1.0, 2.0], np.ones((1, 3)), [(1, "x")]), "shapes must be finite and have"),
     (lambda: fb.Structure.of_modes([1.0], [[1.0]], [(1, "x")], {"w": [1.0]}), "participation must be named"),
     (lambda: fb.Structure.of_modes([1.0], [[1.0]], [(1, "x")], {"x": [1.0, 2.0]}), "must be 1 finite numbers"),
-    (
-        lambda: fb.Scene(fb.Structure.of_modes([1.0], [[0.5]], [(1, "x")]), [fb.Fixed(1)]).matrices(),
-        "a support must hold a node",
-    ),
-    (
-        lambda: fb.Scene(fb.Structure.of_modes([1.0], [[0.5]], [(1, "x")]), base={"x": fb.Harmonic(1.0, 1.0)}),
-        "base must move along nothing",
-    ),
+    (lambda: fb.Scene(ONE_MODE, [fb.Fixed(1)]).matrices(), "a support must hold a node"),
+    (lambda: fb.Scene(ONE_MODE, base={"x": fb.Harmonic(1.0, 1.0)}), "base must move along nothing"),
 )
 
 

@@ -288,10 +288,7 @@ test_mode_count_rejects = refused_by(
     ((SCENE, 3, "peak_force", 1.0), "counts must be a list of numbers of modes, got 3"),
     ((SCENE.reduce(modes=1), [1], "peak_force", 1.0), "scene must be a Scene, got .* of a model, give model.scene"),
     ((SCENE, [1], "peak_force", 1.0, None, 0.0, (), None, None, [0.0, 0.0]), "start must be a function of a model"),
-    (
-        (SCENE, [1], "peak_force", 1.0, None, 0.0, (), None, None, None, None, 4),
-        "executor must be one of concurrent",
-    ),
+    ((SCENE, [1], "peak_force", 1.0, None, 0.0, (), None, None, None, None, 4), "executor must be one of concurrent"),
     ((STIFF, [1], "peak_force"), "study without duration needs a periodic response: an orbit"),
     ((STIFF, [1], "peak_force", 0.01), "reference value must be finite and not zero"),
     ((FREE, [1], "contact_time", 0.01), "reference value must be finite and not zero"),
