@@ -27,16 +27,8 @@ BLOCK = re.compile(r"^```python\n(.*?)^```", re.M | re.S)
 
 
 def run(folder, *command):
-    environment = {**os.environ, "MPLBACKEND": "Agg"}
-    done = subprocess.run(
-        [sys.executable, *command],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=300,
-        check=False,
-    )
+    options = {"env": {**os.environ, "MPLBACKEND": "Agg"}, "capture_output": True, "text": True, "timeout": 300}
+    done = subprocess.run([sys.executable, *command], cwd=folder, check=False, **options)
     assert done.returncode == 0, done.stderr
     return done
 

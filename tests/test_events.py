@@ -347,11 +347,9 @@ def test_run_that_ends_inside_a_contact_leaves_it_open(method):
 
 def test_open_contacts_come_last_and_the_log_is_in_order_of_ends():
     # one stop stays loaded from the start, the other is hit again and again
-    system = System(
-        *(np.eye(2), np.zeros((2, 2)), np.diag([1e4, 0.0])),
-        [Contact([1.0, 0.0], PiecewiseLinear([1e4]), -1e-3), Contact([0.0, 1.0], Hertz(1e8))],
-        [([0.0, -1.0], fb.Harmonic(9.81, 0.0))],
-    )
+    stops = [Contact([1.0, 0.0], PiecewiseLinear([1e4]), -1e-3), Contact([0.0, 1.0], Hertz(1e8))]
+    weight = [0.0, -1.0], fb.Harmonic(9.81, 0.0)
+    system = System(np.eye(2), np.zeros((2, 2)), np.diag([1e4, 0.0]), stops, [weight])
     log = integrate(system, [5e-4, 0.01], [0.0, 0.0], 1.0, method=FINE).contacts
     assert log.stop[-1] == 0
     assert log.t_in[-1] == 0.0

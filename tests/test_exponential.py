@@ -532,11 +532,8 @@ def two_sided(n):
 def test_stops_on_both_sides_and_at_mid_beam(n):
     """Against the reference, the energy ledger, and the mirror image, all three stops struck."""
     system, rest = two_sided(n), np.zeros(n)
-    mirrored = System(
-        *(system.M, system.C, system.K),
-        [Contact(-c.direction, c.law, c.gap) for c in system.contacts],
-        [(-vector, signal) for vector, signal in system.loads],
-    )
+    stops = [Contact(-c.direction, c.law, c.gap) for c in system.contacts]
+    mirrored = system.like(contacts=stops, loads=[(-vector, signal) for vector, signal in system.loads])
     duration = 2.5 * PERIOD
     ours, theirs = (integrate(system, rest, rest, duration, duration / 50, m) for m in (Exponential(1e-11), RK))
     assert set(ours.contacts.stop.tolist()) == {0, 1, 2}

@@ -83,12 +83,8 @@ def test_path_of_slip(method):
 @METHODS
 def test_a_slip_that_lasts_a_whole_run_counts(method):
     """Of a run that goes on from one that slips, and ends before the slip does; of each slider of a sum."""
-    laws = [
-        Jenkins(2e4, 10.0),
-        Iwan([2e4, 1e4], [4.0, 9.0]),
-        Jenkins(2e4, 60.0),
-        Jenkins(2e4, 10.0) + Polynomial([1e4]),
-    ]
+    slider = Jenkins(2e4, 10.0)
+    laws = [slider, Iwan([2e4, 1e4], [4.0, 9.0]), Jenkins(2e4, 60.0), slider + Polynomial([1e4])]
     first = swing(laws, 0.20, method)
     rest = integrate(heavy(laws), first.q[-1], first.q_dot[-1], 0.02 * 2 * np.pi / OMEGA, method=method,
                      memory=first.memory)  # fmt: skip

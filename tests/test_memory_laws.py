@@ -84,11 +84,8 @@ JENKINS = Jenkins(2e4, 10.0)
 SUM = Jenkins(2e4, 10.0) + Polynomial([1e3, 0.0, 1e9]) + Jenkins(5e3, 20.0) + KelvinVoigt(1e3, 5.0)
 COULOMB = Coulomb(10.0, 2e4, 12.0, 3.0)
 IWAN = Iwan([2e4, 1e4, 3e3], [10.0, 20.0, math.inf])
-WENS = [
-    BoucWen(1e4, 0.2, 1.0, beta, gamma, n)
-    for n in (1, 2)
-    for beta, gamma in ((600.0, 300.0), (600.0, -300.0), (200.0, 500.0))
-]
+SHAPES = (600.0, 300.0), (600.0, -300.0), (200.0, 500.0)
+WENS = [BoucWen(1e4, 0.2, 1.0, *shape, n) for n in (1, 2) for shape in SHAPES]
 # one way and the other, before and after z = 0, and before the first reversal
 WEN_STATES = [
     ((1.0, 1e-4, -4e-4), 2e-4, 0.1),
@@ -298,12 +295,9 @@ def test_who_may_act_where():
     assert not (DENTED + DENTED).opens
     assert STOPS.jumps
     assert (DENTED + Hysteretic(1e7, 0.5)).jumps is False
-    assert [type(part).__name__ for part in STOPS.acting] == ["Gated", "Gated", "WaltonBraun"]
-    assert [type(part).__name__ for part in (JENKINS + Hertz(1e8) + Polynomial([1.0])).acting] == [
-        "Jenkins",
-        "Gated",
-        "Polynomial",
-    ]
+    acting = STOPS.acting, (JENKINS + Hertz(1e8) + Polynomial([1.0])).acting
+    names = [[type(part).__name__ for part in parts] for parts in acting]
+    assert names == [["Gated", "Gated", "WaltonBraun"], ["Jenkins", "Gated", "Polynomial"]]
     assert STOPS.events == ("contact", "open", "contact", "open", "contact", "unload", "reload", "open")
 
 

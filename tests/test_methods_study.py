@@ -137,13 +137,8 @@ def test_the_front_is_what_no_point_beats():
     def point(method, seconds, error, modes=2):
         return Point(method, "", modes, np.array([seconds]), np.array([error]), np.array([error]), 1.0, 1.0)
 
-    points = [
-        point("a", 1.0, 1e-3),
-        point("b", 2.0, 1e-5),
-        point("a", 3.0, 1e-4),
-        point("b", 1.5, 1e-2),
-        point("a", 9.0, 1e-9, 5),
-    ]
+    rows = ("a", 1.0, 1e-3), ("b", 2.0, 1e-5), ("a", 3.0, 1e-4), ("b", 1.5, 1e-2), ("a", 9.0, 1e-9, 5)
+    points = [point(*row) for row in rows]
     result = SpeedAccuracy(points, 1.0, {2: 0.0, 5: 0.0}, {2: 0.1, 5: 0.0})
     assert result.front(2) == points[:2]
     assert result.beaten("a") == [points[1]]

@@ -320,14 +320,9 @@ def test_damaged_file_is_refused(run, tmp_path, damage):
     path = run.save(tmp_path / "run.npz")
     whole = path.read_bytes()
     middle = len(whole) // 2
-    path.write_bytes(
-        {
-            "cut": whole[:middle],
-            "flip": whole[:middle] + bytes(255 - b for b in whole[middle : middle + 64]) + whole[middle + 64 :],
-            "text": b"hello",
-            "empty": b"",
-        }[damage]
-    )
+    turned = bytes(255 - b for b in whole[middle : middle + 64])
+    flipped = whole[:middle] + turned + whole[middle + 64 :]
+    path.write_bytes({"cut": whole[:middle], "flip": flipped, "text": b"hello", "empty": b""}[damage])
     with pytest.raises(ValueError, match=r"run.npz is not a saved run, or is damaged"):
         fb.load(path)
 

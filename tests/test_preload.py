@@ -173,9 +173,7 @@ def test_stops_close_together_under_compression(apart, frame):
 
 
 def test_a_buckled_beam_is_refused():
-    with pytest.raises(
-        ValueError, match=r"axial_force must stay above -2.4674 N, where the beam buckles, got -2.5 in Beam"
-    ):
+    with pytest.raises(ValueError, match=r"axial_force must stay above -2.4674 N, where the beam buckles, got -2.5"):
         fb.Scene(fb.Beam(1.0, UNIT, axial_force=-2.5), CLAMPED).reduce(2)
 
 
@@ -192,9 +190,7 @@ def test_bad_options(option, value):
 
 def test_elements_far_too_coarse_or_too_fine_are_noticed():
     scene = fb.Scene(fb.Beam(1.0, UNIT), CLAMPED)
-    with pytest.warns(
-        UserWarning, match=r"elements are too coarse for the highest mode: its frequency is off by about"
-    ):
+    with pytest.warns(UserWarning, match="elements are too coarse for the highest mode: its frequency is off by"):
         scene.reduce(6, elements=4)
     pressed = fb.Scene(fb.Beam(1.0, UNIT, axial_force=-0.1), CLAMPED)
     with pytest.warns(UserWarning, match=r"elements are too fine: rounding may change the lowest frequency"):

@@ -63,9 +63,7 @@ def test_npz_is_refused_in_words(tmp_path):
     with pytest.raises(ValueError, match=r"expected arrays of numbers in a .npz, got something else"):
         read_matrices(tmp_path / "objects.npz")
     np.savez(tmp_path / "name.npz", K=K, labels=np.array([(1, "x"), (2, "x"), (3, "u"), (4, "x")]))
-    with pytest.raises(
-        ValueError, match=r"labels\[2\]: expected a node and one of x, y, z, rx, ry, rz or 1 to 6, got 3 u"
-    ):
+    with pytest.raises(ValueError, match=r"labels\[2\]: expected a node and one of x, .* rz or 1 to 6, got 3 u"):
         read_matrices(tmp_path / "name.npz")
     np.savez(tmp_path / "flat.npz", K=np.arange(3.0))
     with pytest.raises(ValueError, match=r"expected square arrays, or K_data with K_row and K_col, got K"):
@@ -360,9 +358,7 @@ def test_harwell_boeing_is_refused_in_words(tmp_path):
         with pytest.raises(ValueError, match=rf"bad.hb, line {number}: expected"):
             read_matrices(written(tmp_path, "bad.hb", damaged))
     written(tmp_path, "job.mapping", MAPPING.replace("ROTY", "TEMP"))
-    with pytest.raises(
-        ValueError, match=r"job.mapping, line 5: expected equation, node and one of UX, .*got '4 .*TEMP'"
-    ):
+    with pytest.raises(ValueError, match=r"job.mapping, line 5: expected .*, node and one of UX, .*got '4 .*TEMP'"):
         read_matrices(written(tmp_path, "job.matrix", harwell_boeing(K)))
     written(tmp_path, "job.mapping", "\n".join(MAPPING.splitlines()[:-1]))
     with pytest.raises(ValueError, match=r"expected equations 1 to 4, each once, got 3 of them up to 3"):
@@ -458,9 +454,7 @@ def test_structure_from_op4_and_a_bulk_file(tmp_path):
     np.testing.assert_allclose(body.nodes[10], [0.15, 0.0, 0.0])
     np.testing.assert_allclose(body.K[0, 1], 1e3 * stiff[0, 1])
     np.testing.assert_allclose(body.M[3, 3], 1e3 * 1e-6 * mass[3, 3])
-    with pytest.raises(
-        ValueError, match=r"its 12 dofs are not six of each of the 1 nodes; give labels=\[\(node, 'x'\), …\]"
-    ):
+    with pytest.raises(ValueError, match=r"12 dofs are not six of each of the 1 nodes; give labels=\[\(node, 'x'\),"):
         Structure.read(path, path, nodes={10: (0, 0, 0)})
 
 
@@ -548,9 +542,7 @@ def test_nodes(tmp_path):
     inp = "*HEADING\n** a comment\n*NODE, NSET=ALL\n1, 0.0, 1.0\n2, 2., 0., -1.5E+0\n*ELEMENT, TYPE=B31\n1, 1, 2\n"
     assert read_nodes(written(tmp_path, "a.inp", inp)) == {1: (0.0, 1.0, 0.0), 2: (2.0, 0.0, -1.5)}
     assert read_nodes(written(tmp_path, "a.txt", "# node x y z\n4 1 2 3\n")) == {4: (1.0, 2.0, 3.0)}
-    with pytest.raises(
-        ValueError, match=r"line 1: expected GRID 7 in the basic system .*, got systems 0 and 3: turn them"
-    ):
+    with pytest.raises(ValueError, match=r"line 1: expected GRID 7 in the basic system .*, got .* 0 and 3: turn them"):
         read_nodes(written(tmp_path, "a.bdf", "GRID,7,,1.,2.,3.,3\n"))
     usual = "GRID,7,,1.,2.,3.\nGRDSET,,,,,,4\n"  # of grids that name no systems, before it too
     with pytest.raises(ValueError, match=r"line 1: expected GRID 7 in the basic system .*, got systems 0 and 4"):

@@ -114,12 +114,8 @@ def test_table_text_and_figure(tmp_path):
     assert head == "spin [rad/s],mode 1 [rad/s],mode 2 [rad/s]"
     assert "critical speeds: 211.048 rad/s (backward), 221.961 rad/s (forward)" in str(found)
     axis = found.figure().axes[0]
-    assert [text.get_text() for text in axis.get_legend().get_texts()] == [
-        "forward",
-        "backward",
-        "ω = Ω",
-        "critical speeds",
-    ]
+    labels = [text.get_text() for text in axis.get_legend().get_texts()]
+    assert labels == ["forward", "backward", "ω = Ω", "critical speeds"]
     assert plot.campbell(found).axes[0].get_ylabel() == "frequency ω / rad s⁻¹"
 
 

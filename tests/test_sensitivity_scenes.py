@@ -139,10 +139,8 @@ def test_a_clearance_about_its_centre():
     shaft = fb.Frame.straight(0.3, fb.Section.circle(2.1e11, 7850.0, 0.02), bending_only=True)
     base = {"x": fb.Harmonic(1e-4, 300.0)}
     hole = fb.AnnularStop("B", KelvinVoigt(1e6, 10.0), clearance=2e-5)
-    scene, path = (
-        fb.Scene(shaft, [fb.Clamped("A")], stops=[hole], damping=fb.ModalDamping(0.02), base=base),
-        "centre[0]",
-    )
+    scene = fb.Scene(shaft, [fb.Clamped("A")], stops=[hole], damping=fb.ModalDamping(0.02), base=base)
+    path = "centre[0]"
     options = {"modes": 2, "duration": 0.02, "dt": 1e-3}
     found = simulated(scene, **options).sensitivity(path).displacement("B", "x")
     by_differences = differences(scene, path, 1e-9, lambda run: run.displacement("B", "x"), **options)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from differences import central, end_of, jacobian
-from problems import STEEL
+from problems import STEEL, free_mass
 
 import fembeam as fb
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, Viscoelastic
@@ -117,10 +117,7 @@ def test_peaks_of_a_linear_stop_are_those_of_the_half_wave(rtol):
     """m = 1, k: δ_max = v/√k, F = √k v, with its summit anywhere in a step."""
     speeds, k = np.geomspace(1e-3, 3.0, 40), 1e6
     for v in speeds:
-        log = integrate(
-            *(System([[1.0]], [[0.0]], [[0.0]], [Contact([1.0], PiecewiseLinear([k]))]), [0.0], [-v], 0.01),
-            method=Exponential(rtol),
-        ).contacts
+        log = integrate(free_mass(PiecewiseLinear([k])), [0.0], [-v], 0.01, method=Exponential(rtol)).contacts
         assert log.peak_indentation[0] == pytest.approx(v / math.sqrt(k), rel=2.0 * rtol + 1e-12)
         assert log.peak_force[0] == pytest.approx(v * math.sqrt(k), rel=2.0 * rtol + 1e-12)
         assert log.impulse[0] == pytest.approx(2.0 * v, rel=2.0 * rtol + 1e-12)
@@ -267,10 +264,8 @@ def test_motions_of_any_size_are_those_of_size_one(size):
     """A linear stop without gap: everything scales."""
 
     def run(a):
-        system = System.modal(
-            *([100.0, 400.0], 0.01, [Contact([1.0, 0.5], PiecewiseLinear([1e6]))]),
-            [([1.0, 1.0], fb.Harmonic(10.0 * a, 150.0))],
-        )
+        stop, load = Contact([1.0, 0.5], PiecewiseLinear([1e6])), ([1.0, 1.0], fb.Harmonic(10.0 * a, 150.0))
+        system = System.modal([100.0, 400.0], 0.01, [stop], [load])
         return integrate(system, [0.0, 0.0], [0.1 * a, 0.02 * a], 0.2, 0.001, Exponential(1e-8))
 
     one, other = run(1.0), run(size)

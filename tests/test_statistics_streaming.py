@@ -362,13 +362,8 @@ def test_hertz_stop_under_wide_band_noise_has_the_exact_density():
     """
     modes, theta, c, top, K = 2, 1e-3, 2.0, 8000.0, 1e7
     noise = fb.BandNoise(math.sqrt(2 * c * theta / math.pi * top), (0.0, top), seed=42)
-    model = cantilever(
-        modes,
-        damping=0.0,
-        dashpots=[fb.Dashpot(0.5, c)],
-        forces=[fb.PointForce(0.5, noise)],
-        stops=[fb.Stop(0.5, law=Hertz(K))],
-    )
+    parts = {"dashpots": [fb.Dashpot(0.5, c)], "forces": [fb.PointForce(0.5, noise)]}
+    model = cantilever(modes, damping=0.0, stops=[fb.Stop(0.5, law=Hertz(K))], **parts)
     found = stationary(model, 1000.0, 2e-3, solver=QUICK)
     phi = model.phi(0.5)
     sigma, rate = math.sqrt(theta * np.sum(phi**2 / model.omega**2)), math.sqrt(theta * np.sum(phi**2))

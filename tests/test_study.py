@@ -217,9 +217,7 @@ def test_studies_of_modes_go_on_where_they_were_interrupted(tmp_path, monkeypatc
         found = call(checkpoint=kept)
         one, other = ([{**row, "seconds": 0.0} for row in each.table()] for each in (whole, found))
         np.testing.assert_equal(one, other)
-        with pytest.raises(
-            ValueError, match=r"belongs to another study: study\.quantity is 'amplitude' there and 'rms' here"
-        ):
+        with pytest.raises(ValueError, match=r"another study: study.quantity is 'amplitude' there and 'rms' here"):
             study(quantity="rms", checkpoint=kept, **runs)
     rows = mode_count(SCENE, [1, 4], "amplitude", checkpoint=tmp_path / "mode_count.npz", **runs).rows
     assert [row.modes for row in rows] == [1, 4, 1, 4]
@@ -509,25 +507,25 @@ def test_a_response_without_damping_is_not_called_settled():
 # --- spectra as a quantity -------------------------------------------------------------------------------
 
 
+def sampled(t, u, v):
+    """What stands for a run of this motion at every place."""
+    shapes = SimpleNamespace(nodes=[0.0, 1.0])
+    return SimpleNamespace(t=t, stops=(), shapes=shapes, displacement=lambda z: u, velocity=lambda z: v)
+
+
 @pytest.mark.parametrize("band", [(0.0, 200.0), (50.0, 250.0), (3.0, 290.0)])
 def test_levels_of_white_noise_are_alike_in_all_parts(band):
     """Parts have four lines and a bit: counting whole ones made the first level from 0 on 11 % too high."""
     dt, rng = np.pi / 100 / 3.2, np.random.default_rng(3)
     u = rng.standard_normal(400_000)
-    white = SimpleNamespace(
-        t=dt * np.arange(u.size), stops=(), shapes=SimpleNamespace(nodes=[0.0, 1.0]),
-        displacement=lambda z: u, velocity=lambda z: u,
-    )  # fmt: skip
+    white = sampled(dt * np.arange(u.size), u, u)
     np.testing.assert_allclose(Psd(band, parts=4)(white), dt / np.pi, rtol=0.03)
 
 
 def test_a_peak_near_a_border_stays_in_its_part():
     """Of four lines in each part most of it lay in the part beside: the level there was 6.6 times too high."""
     t = 1e-3 * np.arange(30_001)
-    tone = SimpleNamespace(
-        t=t, stops=(), shapes=SimpleNamespace(nodes=[0.0, 1.0]),
-        displacement=lambda z: np.sqrt(2.0) * np.sin(109.0 * t), velocity=lambda z: 109.0 * np.cos(109.0 * t),
-    )  # fmt: skip
+    tone = sampled(t, np.sqrt(2.0) * np.sin(109.0 * t), 109.0 * np.cos(109.0 * t))
     power = Psd((1.0, 1201.0), parts=12)(tone) * 100.0
     np.testing.assert_allclose(power, np.arange(12) == 1, atol=1e-3)
 
