@@ -197,11 +197,6 @@ def test_failures_are_told_with_their_seed_and_the_rest_survives():
         ensemble(small_model(), [4], fails_for_some)
 
 
-def test_not_a_number_is_a_failure():
-    with pytest.raises(RuntimeError, match="the quantity 'x' is nan"):
-        ensemble(small_model(), 2, lambda model: {"x": np.nan})
-
-
 def test_resuming_computes_only_what_is_missing(tmp_path):
     path, calls = tmp_path / "kept.npz", tmp_path / "calls"
     quantity = partial(counted, path=str(calls))
@@ -463,6 +458,7 @@ test_bad_input = refused(
     (lambda: ensemble(small_model(), 2, base_at, until=0.0), "until must be"),
     (lambda: ensemble(small_model(), 2, base_at, checkpoint="nowhere/kept.npz"), r"folder .* does not exist"),
     (lambda: ensemble(small_model(), 2, partial(next, iter([np.ones(2), np.ones(3)]))), r"one form; .* gave .*\(3,\)"),
+    (lambda: ensemble(small_model(), 2, lambda model: {"x": np.nan}), "the quantity 'x' is nan", RuntimeError),
     (lambda: ensemble(small_model(), 2, lambda model: "much"), "number or an array of numbers, got str", RuntimeError),
 )
 

@@ -254,6 +254,7 @@ test_parts_are_refused = refused(
     (lambda: System.modal([[1.0, 2.0]], 0.1), r"omega must be a row of numbers"),
     (lambda: System.modal([1.0, 2.0], [0.1] * 3), r"zeta one number or as many"),
     (lambda: solvers.RK4("fast"), "dt must be a number, got 'fast'", TypeError),
+    (lambda: solvers.Exponentail, r"no attribute 'Exponentail'; it offers \[.*'DormandPrince'", AttributeError),
     (lambda: solvers.Friction(10**400, 1e5), "mu of Friction must be finite"),
 )  # fmt: skip
 
@@ -272,11 +273,6 @@ def test_soft_modes_behind_stiff_ones_are_those_of_high_precision():
     blocks = System(M, 0.0 * K, K).blocks
     np.testing.assert_allclose(blocks.k, exact, rtol=1e-11)
     np.testing.assert_allclose(blocks.T @ blocks.inverse, np.eye(10), atol=1e-12)
-
-
-def test_unknown_names_of_the_package_are_named_with_the_known_ones():
-    with pytest.raises(AttributeError, match=r"no attribute 'Exponentail'; it offers \[.*'DormandPrince'"):
-        _ = solvers.Exponentail
 
 
 def test_contacts_compare_without_a_fault():
