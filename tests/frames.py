@@ -1,6 +1,7 @@
 """What tests of frames share: held dofs, frequencies of a frame by itself, the structures of the reference values."""
 
 import numpy as np
+from problems import state_matrix
 from scipy import linalg, sparse
 
 import fembeam as fb
@@ -65,11 +66,9 @@ def whirl(made, *places):
     M, K = (A[free][:, free].toarray() for A in (made.M, made.K))
     G = np.zeros_like(M) if made.gyroscopic is None else made.gyroscopic[free][:, free].toarray()
     tip = made.rows("B")[:, free].toarray()
-    n = len(free)
-    blocks = [[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, G)]]
-    values, vectors = linalg.eig(np.block(blocks))
+    values, vectors = linalg.eig(state_matrix(M, G, K))
     upper = values.imag > 0
-    x, y = tip[:2] @ vectors[:n, upper]
+    x, y = tip[:2] @ vectors[: len(free), upper]
     sense = np.sign((np.conj(x) * y).imag)  # y = -i x in e^{iωt}: y is behind by a quarter, counterclockwise
     found = -sense * values.imag[upper]
     return found[np.argsort(np.abs(found))]

@@ -163,6 +163,12 @@ def two_sided_scene(gap=2e-4, law=None, mid_gap=None):
     return paper_scene(stops=stops)
 
 
+def state_matrix(M, C, K):
+    """A of x' = A x, x = [q, q_dot]."""
+    zero = np.zeros_like(M)
+    return np.block([[zero, np.eye(len(M))], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+
+
 def soft_behind_stiff():
     """M and K of a chain whose soft end stands behind stiff springs, and its ω², of the same K in 60 digits."""
     springs, order = [1e12, 1e9, 1e6, 1e2, 1e-2], np.ix_([4, 3, 0, 2, 1], [4, 3, 0, 2, 1])

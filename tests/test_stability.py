@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from problems import as_sparse, coupled_dashpot, paper_scene
+from problems import as_sparse, coupled_dashpot, paper_scene, state_matrix
 from scipy.integrate import quad
 
 import fembeam as fb
@@ -136,7 +136,7 @@ def one_step(method, M, C, K):
     """The matrix by which a step of the made method multiplies [q, q']."""
     n, h = M.shape[0], method.steps[0]
     if isinstance(method, (RK4, HenonRK2)):
-        A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+        A = state_matrix(M, C, K)
         order = 4 if isinstance(method, RK4) else 2
         return sum(np.linalg.matrix_power(h * A, j) / math.factorial(j) for j in range(order + 1))
     beta, gamma = method.constants[2:]

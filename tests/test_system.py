@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from problems import soft_behind_stiff
+from problems import soft_behind_stiff, state_matrix
 from refusals import refused, refused_by
 from scipy import sparse
 from scipy.linalg import expm
@@ -18,12 +18,6 @@ from contacts import Hertz
 from solvers import Contact, System
 
 LAW = Hertz(1e8)
-
-
-def state_matrix(M, C, K):
-    """A of x' = A x, x = [q, q_dot]."""
-    n = len(M)
-    return np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
 
 
 def block_matrix(blocks):
