@@ -123,19 +123,6 @@ def test_all_modes_are_the_residual_of_the_unreduced_equations():
     assert np.abs(pin.moment).max() == 0.0
 
 
-def test_more_modes_converge_at_an_inner_support():
-    """A slow load: what is left out follows statically, so even two modes are right to (ω/ω_3)²."""
-    found = []
-    for modes in (2, 12):
-        scene = fb.Scene(
-            fb.Beam(L, SQUARE), [fb.Clamped(0.0), fb.Pinned(0.3)], base=fb.Harmonic(1e-3, 150.0),
-            forces=[fb.PointForce(0.1, fb.Harmonic(10.0, 60.0))], damping=fb.ModalDamping(0.05))  # fmt: skip
-        found.append([one.force for one in scene.reduce(modes).simulate(0.5, 1e-3).reactions()])
-    few, many = np.array(found)
-    settled = slice(300, None)
-    assert np.abs(few - many)[:, settled].max() < 2e-3 * np.abs(many[:, settled]).max()
-
-
 @pytest.mark.parametrize("damping", [fb.ModalDamping(0.05), fb.Rayleigh(3.0, 1e-5)])
 def test_a_hinged_beam_on_a_stop(damping):
     """A rigid-body mode: hinge and stop carry the weight; in free fall the hinge carries a quarter of it."""

@@ -113,19 +113,6 @@ def test_reactions_are_those_of_the_beam(runs):
     assert "component" in str(body)
 
 
-def test_reactions_balance_inertia_and_loads(runs):
-    """Σ reactions + stops + force = Σ m (ü + ÿ + g) over all masses, on matrices of its own."""
-    run, t = runs[1], runs[1].t
-    body = beam_structure()
-    r = np.tile([1.0, 0.0], ELEMENTS + 1)
-    full = np.array([run.acceleration(node, c) for node, c in body.labels])
-    frame = drive().derivative(2)(t) + 9.81
-    inertia = r @ (body.M @ (full + r[:, None] * frame))
-    at_mass = run.acceleration("middle", "y") - 0.01 * run.acceleration("middle", "rx") + frame
-    pushed = run.force(1) - run.force(0) + 0.4 * np.cos(70.0 * t)
-    close(inertia + 0.1 * at_mass, run.reactions().force[:, 1] + pushed, 1e-6)
-
-
 def test_spectra_and_frequency_response_are_those_of_the_beam(runs):
     beam, body = runs
     omega = np.array([60.0, 180.0, 900.0])
