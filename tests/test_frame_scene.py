@@ -122,16 +122,6 @@ def test_section_forces_meet_the_reaction():
         assert np.allclose(found[name], values, rtol=0, atol=1e-6 * np.abs(values).max()), name
 
 
-def test_effective_masses():
-    """Those of all modes sum to the mass that the base moves, along each axis."""
-    model = replace(shaken(), stops=()).reduce(modes="all", elements=4)
-    for c in "xyz":
-        moved = model.participation_along(c)
-        free = model.matrices.along[c]
-        M = model.matrices.M
-        assert moved @ moved == pytest.approx(free @ np.linalg.solve(M.toarray(), free), rel=1e-9)
-
-
 def skew(e):
     """e × as a matrix."""
     return np.cross(np.eye(3), e)

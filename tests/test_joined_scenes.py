@@ -170,19 +170,6 @@ def test_turned_as_frame_or_structure():
     assert np.allclose(np.abs(one.M.toarray()), np.abs(two.M.toarray()), atol=1e-9)
 
 
-def test_hinge_between_bodies():
-    """A joint of displacements leaves the rotations free: a beam on a hinge swings, its tip mass on a rod."""
-    plane = fb.Section.rectangle(2.1e11, 7850.0, 0.02, 0.01)
-    post = fb.Frame({"A": (0, 0), "B": (0, 1)}, [fb.Member("A", "B", plane)])
-    arm = fb.Frame({"B": (0, 1), "C": (1, 1)}, [fb.Member("B", "C", plane)])
-    bodies = [fb.Scene(arm, [fb.Fixed("C", "y")])]
-    joined = fb.Scene(post, [fb.Clamped("A")], bodies=bodies, joints=[fb.Joint("B", to=(1, "B"), dofs="xy")])
-    nodes = {"A": (0, 0), "B": (0, 1), "C": (1, 1)}
-    members = [fb.Member("A", "B", plane), fb.Member("B", "C", plane, release="start rz")]
-    whole = fb.Scene(fb.Frame(nodes, members), [fb.Clamped("A"), fb.Fixed("C", "y")])
-    assert np.allclose(joined.reduce(3).omega, whole.reduce(3).omega, rtol=2e-6)
-
-
 def test_portal_in_three_pieces():
     """Joints in a chain, parts of the outer scene on any body: frequencies of the exact dynamic stiffness."""
     ends = [portal().members[i] for i in range(3)]

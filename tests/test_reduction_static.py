@@ -30,10 +30,6 @@ def tip(cantilever):
     return cantilever.interpolation(1.0).T
 
 
-def everything(matrices):
-    return matrices.M, matrices.K
-
-
 # --- static compliance -----------------------------------------------------------------------------------
 
 
@@ -46,17 +42,6 @@ def test_static_tip_compliance(cantilever, tip, count, share):
     assert extended.count == count + 1
     assert np.sum(extended.project(tip)[:, 0] ** 2 / extended.omega**2) == pytest.approx(1 / 3, rel=1e-10)
     np.testing.assert_array_equal(extended.vectors[:, :count], basis.vectors)
-
-
-def test_share_by_modes_is_their_formula(cantilever, tip):
-    # φ(1)² = 4, ω = β²: share of 1/3 is 12/β⁴
-    basis = reduction.modal_basis(cantilever.M, cantilever.K, 3, root=cantilever.root)
-    share = np.cumsum(12 / np.array([1.8751040687, 4.6940911330, 7.8547574382]) ** 4)
-    kept = [
-        reduction.static_share(reduction.Basis(basis.vectors[:, :n], basis.omega[:n]), *everything(cantilever), tip)[0]
-        for n in (1, 2, 3)
-    ]
-    np.testing.assert_allclose(kept, share, rtol=2e-7)
 
 
 @pytest.mark.parametrize("root", [True, False])
@@ -310,17 +295,6 @@ def test_all_modes_are_the_full_matrices():
     assert len(run.contacts) == len(direct.contacts) > 0
     np.testing.assert_allclose(run.contacts.peak_force, direct.contacts.peak_force, rtol=1e-6)
     np.testing.assert_allclose(model.basis.expand(run.q[-1]), direct.q[-1], atol=1e-6 * np.abs(direct.q[-1]).max())
-
-
-def test_full_model_against_a_reduced_one():
-    scene = struck()
-    full, few = scene.reduce("all", elements=60), scene.reduce(20, residual=True)
-    assert len(full.omega) == 120
-    forces = [
-        model.simulate(0.02, start=model.state(velocity=lambda z: -0.5 * (z / 0.2599) ** 2)).contacts.peak_force
-        for model in (full, few)
-    ]
-    np.testing.assert_allclose(*forces, rtol=1e-4)
 
 
 def test_interface_inside_an_element(cantilever):

@@ -14,7 +14,6 @@ from scipy.special import ellipj, ellipk
 
 from contacts import Hertz, Hysteretic, KelvinVoigt, PiecewiseLinear, law
 from solvers import Contact, DormandPrince, Exponential, HenonRK2, OrbitError, System, integrate, orbit
-from solvers.orbits import orbit_by_damping
 from solvers.orbits.open_times import latches, open_intervals
 from solvers.problem import ContactLog
 
@@ -227,14 +226,6 @@ def test_an_unstable_orbit_is_found_from_rest_where_motion_is_chaotic(omega):
     found = orbit(problem.system(), problem.period)
     assert found.phase == 0.0
     assert not found.stable
-    closes(problem, found)
-
-
-def test_an_orbit_with_more_damping_is_followed_until_this_is_gone():
-    problem = Bilinear(3.4, stiffness=100.0)
-    found = orbit_by_damping(problem.system(), problem.period, Exponential(1e-11), None)
-    assert not found.stable
-    assert pytest.approx(problem.system().C, rel=0.0) == found.system.C
     closes(problem, found)
 
 

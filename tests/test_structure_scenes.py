@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from refusals import refused
-from scipy import linalg
 from scipy.integrate import solve_ivp
 from structures import BEAM, ELEMENTS, LAW, LENGTH, beam_structure, space_truss
 
@@ -245,28 +244,6 @@ def test_effective_masses_sum_to_the_moved_mass_in_each_direction():
     assert "5 kg" in str(model)
     by_share = fb.Scene(space_truss(), springs=springs).reduce(mass_share=0.9)
     assert np.all(by_share.effective_mass.sum(axis=0) >= 0.9 * 5.0)
-
-
-def test_craig_bampton_of_two_halves():
-    """Clamped-clamped beam of two substructures, one interface node, k modes each with it held."""
-    L, count = 0.5, 24
-    half = fb.Scene(fb.Beam(L, fb.Section(E=1.0, rho=1.0, A=1.0, I=1.0)), [fb.Clamped(0.0)]).matrices(count)
-    K, M = half.K.toarray(), half.M.toarray()
-    for k, exact in ((0, (22.73594240235, 81.97560612768)), (2, (22.37595524830725, 61.67814371298982))):
-        reduced = []
-        for mirror in (1.0, -1.0):  # the second half seen from its own clamp turns the other way
-            S = np.diag([1.0, mirror] * count)
-            body = fb.Structure(S @ K @ S, S @ M @ S, labels=[(i, c) for i in range(count) for c in ("y", "rx")])
-            forces = [fb.PointForce(count - 1, drive(), "y"), fb.PointMoment(count - 1, drive(), "rx")]
-            model = fb.Scene(body, forces=forces).reduce(modes=k, interface=True)
-            reduced.append((model, np.array([model.phi((count - 1, c)) for c in ("y", "rx")])))
-        n = [len(model.omega) for model, _ in reduced]
-        equal = np.hstack([reduced[0][1], -reduced[1][1]])
-        T = linalg.null_space(equal)
-        big = linalg.block_diag(*(np.diag(model.omega**2) for model, _ in reduced))
-        omega = np.sqrt(linalg.eigvalsh(T.T @ big @ T, T.T @ T))
-        assert n == [2 + k, 2 + k]
-        np.testing.assert_allclose(omega[:2], exact, rtol=1e-6)  # the mesh: (γh)⁴/1440
 
 
 def test_bodies_of_both_kinds_meet():
