@@ -41,11 +41,6 @@ MASS, DIAMETRAL, POLAR, LENGTH = 12.0, 0.04, 0.075, 0.5
 TURN = np.array([[0.0, 1.0], [-1.0, 0.0]])
 
 
-def in_two_planes(one_plane):
-    """Matrices of both planes, x before y."""
-    return sparse.kron(sparse.eye(2), one_plane, format="csr")
-
-
 def skew(n, size, seed=0):
     G = size * np.random.default_rng(seed).normal(size=(n, n))
     return G - G.T

@@ -46,7 +46,13 @@ def test_equal_motions_are_a_base_motion():
     assert abs(two.energy.residual).max() < 1e-9 * abs(two.energy.input).max()
 
 
-@pytest.mark.parametrize("signal", [fb.BandNoise(1e-3, (0.0, 400.0), seed=3), fb.SineSweep(1e-3, 50.0, 200.0, 0.8)])
+TIMES = 0.01 * np.arange(100)
+RECORD = fb.Record(TIMES, np.cos(9.0 * TIMES) + 0.5 * np.sin(40.0 * TIMES), quantity="acceleration")
+
+
+@pytest.mark.parametrize("signal", [
+    fb.BandNoise(1e-3, (0.0, 400.0), seed=3), fb.SineSweep(1e-3, 50.0, 200.0, 0.8), RECORD,
+])  # fmt: skip
 def test_equal_sampled_motions_are_a_base_motion(signal, tmp_path):
     """At the default tolerance, to which the run takes such signals; also of a part of the run and of its file."""
     rod = fb.Section.circle(2.1e11, 7800.0, 0.02)

@@ -114,21 +114,6 @@ def test_the_value_of_an_acceleration_is_its_double_integral(band):
         assert column[inside] == pytest.approx(record.derivative(order)(at[inside]), abs=1e-6)
 
 
-def test_supports_that_move_all_together_move_the_structure_as_the_base_does():
-    acceleration = np.cos(9.0 * TIMES) + 0.5 * np.sin(40.0 * TIMES)
-    record = fb.Record(TIMES, acceleration, quantity="acceleration")
-    chain = fb.Structure([[4e3, -4e3], [-4e3, 4e3]], np.eye(2), labels=[(0, "x"), (1, "x")])
-    damping = fb.Rayleigh(0.0, 1e-3)
-    shaken = fb.Scene(chain, supports=[fb.Fixed(0, "x")], damping=damping, base={"x": record})
-    moved = fb.Scene(chain, supports=[fb.Fixed(0, "x", motion={"x": record})], damping=damping)
-    by_base, by_support = (scene.reduce(modes="all").simulate(3.9, 0.1) for scene in (shaken, moved))
-    relative = by_support.displacement(1, "x") - record(by_support.t)
-    size = np.abs(by_base.displacement(1, "x")).max()
-    assert relative == pytest.approx(by_base.displacement(1, "x"), abs=1e-6 * size)
-    absolute = by_base.displacement(1, "x", absolute=True)
-    assert by_support.displacement(1, "x") == pytest.approx(absolute, abs=1e-6 * size)
-
-
 @pytest.mark.parametrize("interpolation", ["linear", "spectral"])
 def test_padding_lets_a_run_outlast_its_record(interpolation):
     record = fb.Record(TIMES, QUAKE, quantity="acceleration", interpolation=interpolation, padding=2.003)

@@ -11,7 +11,7 @@ import reduction
 from contacts import Hertz, KelvinVoigt, PiecewiseLinear
 
 STEEL = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.01)
-EI, L = STEEL.bending_stiffness, 0.4
+L = 0.4
 CLAMPED = [fb.Clamped(0.0)]
 
 

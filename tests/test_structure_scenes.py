@@ -10,7 +10,6 @@ import fembeam as fb
 from contacts import Polynomial
 
 STEP = LENGTH / ELEMENTS
-ABOVE = {"side": "above"}
 
 
 def drive():
