@@ -169,31 +169,6 @@ def test_force_uses_the_floor_of_slow_entries():
     np.testing.assert_allclose(run.force()[during], expected, rtol=1e-13)
 
 
-def test_run_without_stops_has_no_forces():
-    run = replace(paper_scene(), stops=[]).reduce(2).simulate(PERIOD, PERIOD / 10)
-    assert len(run.contacts) == 0
-    with pytest.raises(ValueError, match=r"stop must be below 0, the number of stops"):
-        run.force()
-
-
-def test_noise_gets_a_period_for_the_run():
-    base = fb.BandNoise(std=1e-3, band=(0.0, 1226.6), seed=3)
-    run = paper_scene(base=base).reduce(2).simulate(0.5, 1e-2)
-    again = paper_scene(base=base).reduce(2).simulate(0.5, 1e-2)
-    assert len(run.contacts) > 3
-    np.testing.assert_array_equal(run.q, again.q)
-    other = paper_scene(base=replace(base, seed=4)).reduce(2).simulate(0.5, 1e-2)
-    assert not np.allclose(run.q[-1], other.q[-1])
-
-
-def test_record_shorter_than_the_run_is_refused():
-    t = np.linspace(0.0, 0.1, 501)
-    scene = paper_scene(base=fb.Record(t, 1e-3 * np.sin(195.0 * t)))
-    with pytest.raises(ValueError, match=r"0\.1.*0\.5"):
-        scene.reduce(2).simulate(0.5)
-    assert scene.reduce(2).simulate(0.09).complete
-
-
 def test_progress_bar_changes_nothing(model, run):
     with_bar = model.simulate(3 * PERIOD, PERIOD / 200, progress=True)
     np.testing.assert_array_equal(with_bar.q, run.q)
@@ -257,13 +232,6 @@ def test_saved_run_comes_back_exactly(run, tmp_path):
     np.testing.assert_array_equal(again.indentation(), run.indentation())
     np.testing.assert_array_equal(again.force(), run.force())
     np.testing.assert_array_equal(again.energy.residual, run.energy.residual)
-
-
-def test_final_state_only_can_be_saved(model, tmp_path):
-    run = model.simulate(PERIOD)
-    again = fb.load(run.save(tmp_path / "final.npz"))
-    assert again.t.tolist() == [PERIOD]
-    np.testing.assert_array_equal(again.contacts.t_in, run.contacts.t_in)
 
 
 HISTORIES = {

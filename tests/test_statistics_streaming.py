@@ -209,17 +209,6 @@ def test_what_estimates_have_in_common_is_no_scatter():
     assert ratio.standard_error < 0.1 * apart
 
 
-@pytest.mark.drawn
-def test_joint_intervals_cover_what_they_say():
-    hits = 0
-    for seed in range(300):
-        a, own = np.random.default_rng(seed).standard_normal((2, 16)) + 5.0
-        ratio = Estimate.joint(np.divide, Estimate.of_mean(2.0 * a + own), Estimate.of_mean(a))
-        lo, hi = ratio.interval(0.9)
-        hits += lo < 3.0 < hi
-    assert abs(hits / 300 - 0.9) < 4 * math.sqrt(0.09 / 300)
-
-
 def test_joint_estimates_need_the_same_parts():
     two, three, one = (Estimate.of_mean(np.arange(1.0, n + 1.0)) for n in (2, 3, 1))
     for pair in ((two, three), (one, one), (two, Estimate(1.0, 0.1, 2))):
