@@ -1,4 +1,4 @@
-"""Supports of a `Beam` with motions of their own: a frame's motion, a base motion, formulas, files, what is refused."""
+"""Supports of a `Beam` with motions of their own: a frame's motion, formulas, files, what is refused."""
 
 import numpy as np
 import pytest

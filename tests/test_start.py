@@ -1,4 +1,4 @@
-"""Starts: fields and what the kept modes miss of them, static equilibrium with contact, release from a pull."""
+"""Starts: fields and what the kept modes miss of them, static equilibrium with contact."""
 
 import math
 
