@@ -46,6 +46,23 @@ def test_borders_of_one_law_that_fall_together_are_passed_one_after_the_other(me
     assert set(run.transitions.event) <= {"contact", "unload", "reload", "open"}
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-11])
+@pytest.mark.parametrize("limit", [1e-5, 1e-6, 1e-7, 1e-8])
+def test_a_slider_that_hardly_holds_sticks_once_at_a_turn(limit, rtol):
+    """It slips from its first motion to the turn of v/ω sin ωt, sticks until δ has gone back by 2 f/k, and slips back.
+
+    Its knee f/k is down to 1e-12 of δ, the rounding of δ to 1e-4 of the knee.
+    """
+    K, k, v, omega = 1e3, 1e9, 1e-2, 1e3
+    system = System([[1e-3]], [[0.0]], [[K]], [Contact([-1.0], Jenkins(k, limit), gap=-1e-5, always=True)])
+    run = integrate(system, [0.0], [v], 4e-3, method=Exponential(rtol))
+    assert run.transitions.event.tolist() == ["slip", "stick", "slip"]
+    turn, back = run.transitions.t[1:]
+    assert turn == pytest.approx(0.5 * math.pi / omega, abs=1.1 * limit / (K * v))
+    assert back - turn == pytest.approx(math.sqrt(4.0 * limit / k / (v * omega)), rel=0.1)
+    assert run.q[-1, 0] == pytest.approx(v / omega * math.sin(4.0), abs=3.1 * limit / K)
+
+
 @pytest.mark.parametrize("rtol", [1e-6, 1e-10])
 @pytest.mark.parametrize("depth", [1e-2, 1e-3, 1e-4, 1e-5])
 def test_every_short_reversal_of_a_slip_is_found(depth, rtol):
