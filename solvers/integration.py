@@ -199,8 +199,7 @@ def prepared_run(
     latched = latched_at_start(system, memory)
     engine: Engine = method.engine(system, z, prepared, duration)
     for s, numbers in latched:
-        law: Any = system.contacts[s].law
-        engine.problem.parameters[s, list(law.memory)] = numbers
+        engine.problem.parameters[s, system.contacts[s].memory] = numbers
     return _Run(system, engine, times, tangent)
 
 
@@ -295,7 +294,7 @@ class _Run:
         if not self.system.latches:
             return (_NOTHING,) * len(self.system.contacts)
         rows = zip(self.system.contacts, self.engine.problem.parameters, strict=True)
-        found = tuple(row[list(getattr(contact.law, "memory", ()))] for contact, row in rows)
+        found = tuple(row[contact.memory] for contact, row in rows)
         for contact, latched in zip(self.system.contacts, found, strict=True):
             if contact.friction is not None:
                 # A slider is told as of a run that begins now; one that slips has no place.
@@ -448,5 +447,4 @@ def _overdrawn(record: Record) -> bool:
 def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any, memory: Any) -> Array:
     """Final [q, q̇] of a plain run."""
     with whole_runs():
-        solution = integrate(system, q0, q_dot0, duration, method=method, memory=memory)
-    return np.concatenate((solution.q[-1], solution.q_dot[-1]))
+        return integrate(system, q0, q_dot0, duration, method=method, memory=memory).end[: 2 * system.size]

@@ -105,11 +105,11 @@ def _renewed_at_once(contacts: Sequence[Contact], memory: Sequence[Array], passe
         number = int(passed.contact[row])
         if contacts[number].friction is not None:  # its slider is no part of the law
             continue
-        law: Any = contacts[number].law
+        law, places = contacts[number].law, contacts[number].memory
         parameters = np.array(law.parameters, dtype=float)
-        parameters[list(law.memory)] = found[number]
+        parameters[places] = found[number]
         renew(law, parameters, int(passed.border[row]), float(passed.delta[row]), float(passed.delta_dot[row]))
-        found[number] = parameters[list(law.memory)]
+        found[number] = parameters[places]
     return found
 
 
@@ -129,13 +129,12 @@ def _stored_by(contact: Contact, delta: float, latched: Array) -> float:
     law: Any = contact.law
     if delta <= 0.0 and not contact.always:
         return 0.0
-    places = list(getattr(law, "memory", ()))
-    if delta < 0.0 and getattr(law, "one_sided", True) and not places:  # of a law for stops that acts both ways
+    if delta < 0.0 and getattr(law, "one_sided", True) and not contact.memory:  # of a law for stops that acts both ways
         return float(law.work_at_rest(delta)) if hasattr(law, "work_at_rest") else math.nan
     if not hasattr(law, "stored"):
         return math.nan
     row = np.array(law.parameters, dtype=float)
-    row[places] = latched
+    row[contact.memory] = latched
     return float(law.stored(delta, row))
 
 

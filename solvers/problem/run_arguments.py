@@ -203,7 +203,7 @@ def latched_at_start(system: System, memory: Sequence[ArrayLike | None] | None) 
         raise ValueError(f"memory must have one entry per contact, {len(system.contacts)}, got {len(memory)}")
     given = [(s, np.array(numbers, dtype=float)) for s, numbers in enumerate(memory) if numbers is not None]
     for s, numbers in given:
-        count = len(getattr(system.contacts[s].law, "memory", ()))
+        count = len(system.contacts[s].memory)
         if numbers.shape != (count,) or not np.isfinite(numbers).all():
             raise ValueError(f"memory of contact {s} must be {count} finite numbers, got {memory[s]!r}")
         _check_codes(s, system.contacts[s].law, numbers)

@@ -134,17 +134,17 @@ class Contact:
         direction = np.array(self.direction, dtype=float, ndmin=1)
         if isinstance(self.law, Rubbing):  # of a contact that this one is made of
             object.__setattr__(self, "law", self.law.law)
-        object.__setattr__(self, "gap", number(self.gap, "gap of a Contact"))
-        self._check_map(direction)
-        if getattr(self.law, "memory", ()) and getattr(self.law, "one_sided", False):
-            object.__setattr__(self, "always", True)  # its law itself says where it is open
-        elif getattr(self.law, "memory", ()) and not self.always:
-            raise ValueError(f"{self.law!r} has a memory and acts at both signs of delta: give always=True")
-        if not math.isfinite(self.gap):
-            raise ValueError(f"gap must be finite, got {self.gap!r}; use no Contact at all for a stop out of reach")
         if not hasattr(self.law, "entry_rate_floor") or isinstance(self.law, type):
             hint = "decorate the function with @law and call it" if callable(self.law) else "use one of contacts"
             raise TypeError(f"law of a Contact must be a contact law, got {self.law!r}; {hint}")
+        object.__setattr__(self, "gap", number(self.gap, "gap of a Contact"))
+        self._check_map(direction)
+        if self.memory and getattr(self.law, "one_sided", False):
+            object.__setattr__(self, "always", True)  # its law itself says where it is open
+        elif self.memory and not self.always:
+            raise ValueError(f"{self.law!r} has a memory and acts at both signs of delta: give always=True")
+        if not math.isfinite(self.gap):
+            raise ValueError(f"gap must be finite, got {self.gap!r}; use no Contact at all for a stop out of reach")
         direction.setflags(write=False)
         object.__setattr__(self, "direction", direction)
         self._check_friction(direction)
@@ -170,8 +170,7 @@ class Contact:
                 f"gap of an annulus, its clearance, must be positive and finite (m), got {self.gap!r}; "
                 "without a clearance it is a spring in each direction"
             )
-        memory: Any = getattr(self.law, "memory", ())
-        if self.always or memory:
+        if self.always or self.memory:
             raise ValueError(f"an annulus takes laws without memory that act for delta > 0, got {self.law!r}")
         centre = np.array(self.centre, dtype=float)
         if centre.shape != (2,) or not np.all(np.isfinite(centre)):
@@ -205,12 +204,17 @@ class Contact:
             raise ValueError('map="oblique" needs tangent=, the way along the surface of the stop')
         if self.tangent is not None and np.linalg.matrix_rank(np.stack((direction, self.tangent))) < 2:
             raise ValueError(f"tangent of a Contact must not lie along its direction, got {self.tangent!r}")
-        if self.always or bool(getattr(self.law, "memory", ())):
+        if self.always or self.memory:
             raise ValueError(f"friction takes laws without memory that act for delta > 0, got {self.law!r}")
         if self.radius is None and (self.rotation is not None or self.spin != 0.0):
             raise ValueError("radius (m) of a Contact is missing: rotation and spin rub at a radius")
         arm = 0.0 if self.radius is None else -self.radius if self.outer else self.radius
         object.__setattr__(self, "law", Rubbing(self.law, self.friction, float(arm), float(self.spin)))
+
+    @property
+    def memory(self) -> list[int]:
+        """Places, among its law's parameters, of the numbers that the law latches; none without a memory."""
+        return list(getattr(self.law, "memory", ()))
 
     @property
     def rows(self) -> Array:
