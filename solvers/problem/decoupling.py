@@ -35,12 +35,10 @@ def decouple(M: Array, C: Array, K: Array, G: Array | None) -> Blocks:
         phi, k = np.diag(1.0 / np.sqrt(np.diag(M))), np.diag(K) / np.diag(M)
     else:
         phi, k = _modes(M, K)
-    damping = phi.T @ C @ phi
-    if G is not None and np.any(G):
-        turning = phi.T @ G @ phi
-        return _of_states(phi, k, damping, np.abs(C) + np.abs(G), 0.5 * (turning - turning.T))
+    G = np.zeros((n, n)) if G is None else G
+    damping, turning = phi.T @ C @ phi, phi.T @ G @ phi
     spread = damping - np.diag(np.diag(damping))
-    if np.abs(spread).max(initial=0.0) <= 1e-12 * np.abs(damping).max(initial=0.0):
+    if not np.any(G) and np.abs(spread).max(initial=0.0) <= 1e-12 * np.abs(damping).max(initial=0.0):
         zero = np.zeros((n, n))
         inverse = phi.T @ M
         terms = np.sqrt(np.abs(k)) + np.diag(_terms(phi, C))
@@ -51,7 +49,7 @@ def decouple(M: Array, C: Array, K: Array, G: Array | None) -> Blocks:
             np.block([[inverse, zero], [zero, inverse]]),
             np.empty((0, 0)),
         )
-    return _of_states(phi, k, damping, np.abs(C))
+    return _of_states(phi, k, damping, 0.5 * (turning - turning.T), np.abs(C) + np.abs(G))
 
 
 def _is_diagonal(matrix: Array) -> bool:
@@ -91,8 +89,7 @@ def _cleared(M: Array, K: Array, soft: Array, stiff: Array, k: Array) -> tuple[A
 
 def _terms(phi: Array, C: Array) -> Array:
     """Sums of the sizes of all terms of φᵀ C φ: eps times them is its rounding."""
-    sizes: Array = np.abs(phi).T @ np.abs(C) @ np.abs(phi)
-    return sizes
+    return np.abs(phi).T @ np.abs(C) @ np.abs(phi)
 
 
 def _without_rounding(c: Array, terms: Array) -> Array:
@@ -103,47 +100,43 @@ def _without_rounding(c: Array, terms: Array) -> Array:
     return np.where(np.abs(c) <= 4 * c.size * np.finfo(float).eps * terms, 0.0, c)
 
 
-def _of_states(phi: Array, k: Array, damping: Array, size: Array, turning: Array | None = None) -> Blocks:
+def _of_states(phi: Array, k: Array, damping: Array, turning: Array, size: Array) -> Blocks:
     """`_state_blocks`, found in a unit of time in which the highest frequency is about one.
 
     In seconds the conditions of T and of its inversion would grow with the square of the frequencies.
     """
-    fastest = max(math.sqrt(np.abs(k).max()), np.abs(damping).max(), 0.0 if turning is None else np.abs(turning).max())
+    fastest = max(math.sqrt(np.abs(k).max()), np.abs(damping).max(), np.abs(turning).max())
     unit = 2.0 ** round(math.log2(fastest))
-    turning = turning if turning is None else turning / unit
-    found = _state_blocks(phi, k / unit**2, damping / unit, size / unit, turning)
+    found = _state_blocks(phi, k / unit**2, damping / unit, turning / unit, size / unit)
     rates = np.repeat([1.0, unit], k.size)
     T, inverse = (rates[:, None] * matrix / rates for matrix in (found.T, found.inverse))
     return Blocks(unit**2 * found.k, unit * found.c, T, inverse, unit**3 * found.loss / np.outer(rates, rates))
 
 
-def _state_blocks(phi: Array, k: Array, damping: Array, size: Array, turning: Array | None) -> Blocks:
+def _state_blocks(phi: Array, k: Array, damping: Array, turning: Array, size: Array) -> Blocks:
     """Blocks of the state matrix [[0, I], [-diag(k), -damping - turning]], whose last part couples the modes.
 
-    ``turning`` is the skew one; ``size`` (n, n) are |C| + |G| in the system's own coordinates.
+    ``turning`` is the skew one, or zero; ``size`` (n, n) are |C| + |G| in the system's own coordinates.
     """
     order = np.argsort(k != 0.0, kind="stable")  # rigid-body modes first
-    phi, k, damping = phi[:, order], k[order], damping[np.ix_(order, order)]
-    turning = turning if turning is None else turning[np.ix_(order, order)]
+    phi, k, turns = phi[:, order], k[order], bool(np.any(turning))
+    damping, turning = (one[np.ix_(order, order)] for one in (damping, turning))
     rotation, free = _floating(k, damping, turning)
-    phi, damping = phi @ rotation, rotation.T @ damping @ rotation
-    k, n = k[free:], k.size - free
-    rigid, damping = phi[:, :free], damping[free:, free:]
-    phi, by_rate = phi[:, free:], damping
-    if turning is not None:
-        by_rate = damping + (rotation.T @ turning @ rotation)[free:, free:]
-    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(k), -by_rate]])
+    phi, k, n = phi @ rotation, k[free:], k.size - free
+    damping, turning = ((rotation.T @ one @ rotation)[free:, free:] for one in (damping, turning))
+    rigid, phi = phi[:, :free], phi[:, free:]
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(k), -(damping + turning)]])
     values, vectors = np.linalg.eig(A)
     order = np.argsort(np.abs(values))
     values, vectors = values[order], vectors[:, order]
     scale = np.abs(values).max()
-    if turning is not None:  # of rigid-body modes: two zeros are one mode that drifts, and not to be told apart
+    if turns:  # of rigid-body modes: two zeros are one mode that drifts, and not to be told apart
         values[np.abs(values) <= 10 * values.size * np.finfo(float).eps * scale] = 0.0
     complex_ones = np.flatnonzero(values.imag > 1e-12 * scale)
     real_ones = np.flatnonzero(np.abs(values.imag) <= 1e-12 * scale)
     half = real_ones.size // 2
     pairs = [_complex_pair(values[i], vectors[:, i], n) for i in complex_ones]
-    if turning is not None:
+    if turns:
         shares = [_dissipation(vectors[:, i], k, damping) for i in complex_ones]
         pairs = [(pair[0], share, *pair[2:]) for pair, share in zip(pairs, shares, strict=True)]
     pairs += [
@@ -152,7 +145,7 @@ def _state_blocks(phi: Array, k: Array, damping: Array, size: Array, turning: Ar
     ]
     columns = np.array([p[2] for p in pairs] + [p[3] for p in pairs]).T
     if len(pairs) != n or np.linalg.cond(columns) > 1e12:
-        raise ValueError(_INSEPARABLE if turning is None else _INSEPARABLE_TURNING)
+        raise ValueError(_INSEPARABLE_TURNING if turns else _INSEPARABLE)
     T: Any = _states_of_blocks(rigid, phi, columns)
     loss = np.zeros((2 * (free + n), 2 * (free + n)))
     places = np.concatenate((free + np.arange(n), 2 * free + n + np.arange(n)))
@@ -167,16 +160,9 @@ def _state_blocks(phi: Array, k: Array, damping: Array, size: Array, turning: Ar
 
 def _states_of_blocks(rigid: Array, phi: Array, columns: Array) -> Array:
     """[q, q̇] of the blocks' states [p, v], rigid-body modes first; ``columns`` are p, then v of the others."""
-    free, n, zero = rigid.shape[1], phi.shape[1], np.zeros_like(rigid)
-    T = np.hstack(
-        (
-            np.vstack((rigid, zero)),
-            np.vstack((zero, rigid)),
-            *(np.vstack((phi @ c[:n], phi @ c[n:])) for c in (columns[:, :n], columns[:, n:])),
-        )
-    )
-    order = np.concatenate((np.arange(free), 2 * free + np.arange(n)))
-    return T[:, np.concatenate((order, order + np.where(np.arange(free + n) < free, free, n)))]
+    n, zero = phi.shape[1], np.zeros_like(rigid)
+    p, v = columns[:n], columns[n:]
+    return np.block([[rigid, phi @ p[:, :n], zero, phi @ p[:, n:]], [zero, phi @ v[:, :n], rigid, phi @ v[:, n:]]])
 
 
 _OVERDAMPED = (
@@ -193,18 +179,17 @@ _INSEPARABLE_TURNING = (
 )
 
 
-def _floating(k: Array, damping: Array, turning: Array | None) -> tuple[Array, int]:
+def _floating(k: Array, damping: Array, turning: Array) -> tuple[Array, int]:
     """A rotation of the rigid-body modes after which those neither damped nor turned come first, and their number.
 
     They are blocks of their own.
     """
-    rigid, by_rate = int(np.sum(k == 0.0)), damping if turning is None else damping + turning
-    rotation = np.eye(k.size)
-    if turning is None:
-        values, turn = np.linalg.eigh(damping[:rigid, :rigid])
-    else:
+    rigid, by_rate, rotation = int(np.sum(k == 0.0)), damping + turning, np.eye(k.size)
+    if np.any(turning):
         _, values, rows = np.linalg.svd(by_rate[:, :rigid])
         values, turn = values[::-1].copy(), rows[::-1].T
+    else:
+        values, turn = np.linalg.eigh(damping[:rigid, :rigid])
     values[np.abs(values) < 1e-12 * np.abs(by_rate).max()] = 0.0
     rotation[:rigid, :rigid] = turn
     return rotation, int(np.sum(values == 0.0))
