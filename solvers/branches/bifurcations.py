@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -40,19 +39,13 @@ _NUDGES = 0.0, 1e-7, -1e-7, 1e-6, -1e-6  # of the arclength: for some guesses ro
 def indicators(orbit: Orbit, tangent: Array) -> dict[str, float]:
     """Test functions of an orbit; each changes its sign at a special point of its name."""
     mu = orbit.transverse
-    first, second = _pairs(len(mu))
+    first, second = np.triu_indices(len(mu), 1)  # of all pairs
     return {
         "fold": float(tangent[-1]),
         "flip": _product(mu),
         "neimark-sacker": _product(-mu[first] * mu[second]),
         "branch point": _product(-mu),
     }
-
-
-@lru_cache(maxsize=16)
-def _pairs(count: int) -> Any:
-    """Indices (2, pairs) of all pairs of multipliers."""
-    return np.triu_indices(count, 1)
 
 
 def indicators_at(point: Point) -> dict[str, float]:
@@ -101,7 +94,7 @@ class Arc:
                 places, off = [place for place, _ in self.known], np.array([rest for _, rest in self.known])
                 guess += bend * np.array([np.interp(s, places, column) for column in off.T])
             chain = corrected(self.a, guess, self.straight, not self.straight)
-            rest = np.append(chain.x.ravel(), chain.parameter) - cubic(self.a, self.b, self.length, s)
+            rest = chain.unknowns - cubic(self.a, self.b, self.length, s)
             if bend > 0.0:
                 self.known = sorted([*self.known, (s, rest / bend)], key=lambda pair: pair[0])
             self.trials[s] = chain, orbit_of(self.a.problem, chain)

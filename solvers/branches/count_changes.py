@@ -40,33 +40,26 @@ def zero(arc: Arc, begin: float, end: float, value: Callable[[float], float]) ->
 
 def nonsmooth_points(arc: Arc) -> Iterator[tuple[float, Orbit]]:
     """(arclength, orbit) where the number of contacts changes, and where an entry rate passes its law's floor."""
-    begin, first = 0.0, arc.a.orbit
-    for _ in range(_MOST_GRAZINGS):
-        if len(first.contacts) == len(arc.b.orbit.contacts):
-            break
-        found = _grazing(arc, begin, first)
-        if found is None:
-            return
-        near, place, grazed, behind, last = found
+    begin = 0.0
+    for near, place, grazed, behind in _changes(arc, "contacts"):
         yield from _floors(arc, begin, near)
         yield place, replace(grazed, mark="grazing")
-        begin, first = behind, last
+        begin = behind
     yield from _floors(arc, begin, arc.length)
     if len(arc.a.orbit.contacts) == len(arc.b.orbit.contacts):
-        yield from _sticks(arc)
+        for _, place, at, _ in _changes(arc, "transitions"):
+            yield place, replace(at, mark="stick")
 
 
-def _sticks(arc: Arc) -> Iterator[tuple[float, Orbit]]:
-    """(arclength, orbit) where the number of transitions changes."""
+def _changes(arc: Arc, log: str) -> Iterator[tuple[float, float, Orbit, float]]:
+    """(place before, place, orbit there, place behind) of each change of the number of contacts or transitions."""
     begin, first = 0.0, arc.a.orbit
     for _ in range(_MOST_GRAZINGS):
-        if len(first.transitions) == len(arc.b.orbit.transitions):
-            return
-        found = _grazing(arc, begin, first, "transitions")
+        found = None if _count(first, log) == _count(arc.b.orbit, log) else _first_change(arc, begin, first, log)
         if found is None:
             return
-        _, place, at, begin, first = found
-        yield place, replace(at, mark="stick")
+        near, place, at, begin, first = found
+        yield near, place, at, begin
 
 
 def _floors(arc: Arc, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
@@ -88,14 +81,11 @@ def _over_floor(orbit: Orbit) -> Array:
     for stop in latching_stops(orbit.system):
         mine, floor = log.stop == stop, orbit.system.contacts[stop].law.entry_rate_floor
         over[mine] = log.speed_in[mine] / floor - 1.0 if floor else 1.0
-    ordered: Array = over[np.lexsort((log.t_in, log.stop))]
-    return ordered
+    return over[np.lexsort((log.t_in, log.stop))]
 
 
-def _grazing(
-    arc: Arc, begin: float, first: Orbit, log: str = "contacts"
-) -> tuple[float, float, Orbit, float, Orbit] | None:
-    """First change of the number of contacts after a place: (place before, place, orbit, place and orbit behind).
+def _first_change(arc: Arc, begin: float, first: Orbit, log: str) -> tuple[float, float, Orbit, float, Orbit] | None:
+    """The first change after a place: (place before, place, orbit there, place and orbit behind).
 
     The distance that vanishes there is the shallowest contact's indentation, or the flight between two contacts that
     become one; of "transitions" the time between two.
@@ -160,18 +150,19 @@ def _shallowest(orbit: Orbit) -> float:
 
 def _shortest_phase(orbit: Orbit) -> float:
     """Square of the shortest time between two transitions of a contact, s²: the time vanishes like a square root."""
-    log, shortest = orbit.transitions, orbit.period
-    for contact in np.unique(log.contact):
-        times = np.unique(log.t[log.contact == contact])
-        shortest = min(shortest, float(np.diff(times, append=times[0] + orbit.period).min()))
-    return shortest**2
+    log = orbit.transitions
+    times = [np.unique(log.t[log.contact == contact]) for contact in np.unique(log.contact)]
+    return _shortest(orbit.period, [(one, one) for one in times])
 
 
 def _shortest_flight(orbit: Orbit) -> float:
     """Square of the shortest time between two contacts of one stop, s²: the time vanishes like a square root."""
-    log, shortest = orbit.contacts, orbit.period
-    for stop in np.unique(log.stop):
-        mine = log.stop == stop
-        begins, ends = np.sort(log.t_in[mine]), np.sort(log.t_out[mine])
-        shortest = min(shortest, float((np.append(begins[1:], begins[0] + orbit.period) - ends).min()))
-    return shortest**2
+    log = orbit.contacts
+    mine = [log.stop == stop for stop in np.unique(log.stop)]
+    return _shortest(orbit.period, [(np.sort(log.t_in[one]), np.sort(log.t_out[one])) for one in mine])
+
+
+def _shortest(period: float, pairs: list[tuple[Array, Array]]) -> float:
+    """Square of the shortest time from ends to the next begins, both in order and periodic, s²."""
+    spans = ((np.append(begins[1:], begins[0] + period) - ends).min() for begins, ends in pairs)
+    return float(min([period, *spans])) ** 2

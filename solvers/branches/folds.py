@@ -92,7 +92,7 @@ class _Equations:
         x = (self.back @ y[:-2]).reshape(self.shape)
         along, across = self._problems(first, second)
         chain = along.evaluate(x, first)
-        if is_cut(chain, along.make(first)[0]):
+        if is_cut(chain, along.system(first)):
             raise OrbitError("a contact whose law knows its entry rate is under way where a period begins")
         ways = [chain.by_parameter, across.evaluate(x, second).by_parameter]
         columns = [self.lift @ (width * way.ravel()) for width, way in zip(self.widths, ways, strict=True)]
@@ -122,7 +122,7 @@ class _Equations:
                 tangent = np.linalg.solve(matrix, np.append(np.zeros(len(y) - 1), 1.0))
                 return _Point(y, chain, problem, _unit(tangent), borders)
             missed = np.concatenate((residual, [g, float(row @ (y - guess))]))
-            y = np.asarray(y - np.linalg.solve(matrix, missed), dtype=float)
+            y = y - np.linalg.solve(matrix, missed)
         raise OrbitError(f"a fold was not found: residual {np.abs(residual).max():.3g}, |g| = {abs(g):.3g}")
 
 
@@ -247,4 +247,4 @@ def _cusp(equations: _Equations, a: _Point, b: _Point) -> _Point:
 
 def _unit(vector: Array) -> Array:
     """In the Euclidean norm."""
-    return np.asarray(vector / np.linalg.norm(vector))
+    return vector / np.linalg.norm(vector)

@@ -55,6 +55,6 @@ def _point_at(a: Point, parameter: float) -> tuple[Point, float]:
         x = state_after(shots[number % len(shots)][0], x, shots[number % len(shots)][1], a.problem.method)
     guess = np.append(np.concatenate(states[-len(shots) :]), parameter)
     chain = corrected(a, guess, True, True)
-    off = np.append(chain.x.ravel(), parameter) - a.unknowns
+    off = chain.unknowns - a.unknowns
     ahead = np.append(np.zeros(len(off) - 1), off[-1])  # latched numbers must not reverse the branch
     return point_of(a.problem, chain, a.metric, ahead), a.length(off)

@@ -48,5 +48,4 @@ def _ahead(known: list[Grazing], rate: float) -> Array:
     """Guess of the unknowns at a rate: Lagrange's polynomial in its logarithm through the known ones."""
     places = np.log([grazing.meeting.floor for grazing in known])
     weights = [np.prod([(math.log(rate) - b) / (a - b) for b in places if b != a]) for a in places]
-    guess: Array = sum(w * grazing.unknowns for w, grazing in zip(weights, known, strict=True))
-    return guess
+    return sum(w * grazing.unknowns for w, grazing in zip(weights, known, strict=True))

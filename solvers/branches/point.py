@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -34,10 +33,10 @@ class Point:
     metric: Array
     tests: dict[str, float] = field(default_factory=dict, init=False, repr=False)  # test functions, once computed
 
-    @cached_property
+    @property
     def unknowns(self) -> Array:
         """[states, parameter]."""
-        return np.append(self.chain.x.ravel(), self.chain.parameter)
+        return self.chain.unknowns
 
     @property
     def share(self) -> float:
@@ -81,8 +80,7 @@ def tangent_of(chain: Chain, metric: Array, along: Array) -> Array:
     right = np.zeros(size + 1)
     right[-1] = 1.0
     tangent = np.linalg.solve(matrix, right)
-    unit: Array = tangent / math.sqrt(tangent @ metric @ tangent)
-    return unit
+    return tangent / math.sqrt(tangent @ metric @ tangent)
 
 
 def point_of(problem: PeriodicProblem, chain: Chain, metric: Array, along: Array) -> Point:

@@ -318,5 +318,5 @@ def _is_passed(known: Point, a: Point, b: Point) -> bool:
         chain = corrected(a, guess, True)
     except (OrbitError, np.linalg.LinAlgError):
         return False
-    off = np.append(chain.x.ravel(), chain.parameter) - known.unknowns
+    off = chain.unknowns - known.unknowns
     return bool(off @ a.metric @ off < 1e-12)

@@ -30,8 +30,7 @@ def weights(system: System, period: float) -> Array:
     """
     blocks = system.blocks
     scale = np.sqrt(blocks.k + (2.0 * math.pi / period) ** 2)
-    matrix: Array = np.concatenate((scale, np.ones_like(scale)))[:, None] * blocks.inverse
-    return matrix
+    return np.concatenate((scale, np.ones_like(scale)))[:, None] * blocks.inverse
 
 
 def newton(
@@ -62,11 +61,11 @@ def newton(
                 break
         else:
             break
-        unknowns, chain, error = np.append(trial.x.ravel(), unknowns[-1] + 0.5**halving * step[-1]), trial, trial_error
+        unknowns, chain, error = trial.unknowns, trial, trial_error
         history.append(error)
     if error <= TOLERANCE:
         chain, error = _with_exact_zeros(problem, chain, error, measure)
-        unknowns = np.append(chain.x.ravel(), unknowns[-1])
+        unknowns = chain.unknowns
     enough = _ROUGH if chain is not None and chain.coordinates < x.shape[1] else TOLERANCE
     if error <= enough and slope and not chain.has_slope:
         chain, error = _fire(problem, unknowns, measure, True)
@@ -113,10 +112,9 @@ class _Measure:
 
     def _held(self, x: Array, parameter: float) -> float:
         """Largest force times indentation of the stops, J."""
-        system, _ = self.problem.make(parameter)
-        most = 0.0
+        system, most = self.problem.system(parameter), 0.0
         for contact in system.contacts:
-            if getattr(contact.law, "memory", ()):
+            if contact.memory:
                 continue
             delta = float(contact.indentation(x[:, : system.size]).max())
             most = max(most, abs(float(contact.law.force(delta, 0.0, 1.0))) * delta if delta > 0.0 else 0.0)
@@ -155,9 +153,8 @@ def _with_zeros(problem: PeriodicProblem, chain: Chain, unknowns: Array) -> Arra
 
 def _with_exact_zeros(problem: PeriodicProblem, chain: Chain, error: float, measure: _Measure) -> tuple[Any, float]:
     """A chain that has converged, run again with such numbers 0 where they are not, and its relative residual."""
-    unknowns = np.append(chain.x.ravel(), chain.parameter)
-    exact = _with_zeros(problem, chain, unknowns)
-    if np.array_equal(exact, unknowns):
+    exact = _with_zeros(problem, chain, chain.unknowns)
+    if np.array_equal(exact, chain.unknowns):
         return chain, error
     again, its_error = _fire(problem, exact, measure, chain.has_slope)
     return (again, its_error) if its_error <= TOLERANCE else (chain, error)

@@ -20,8 +20,7 @@ def latches(contact: Contact) -> bool:
 def latching_stops(system: System) -> list[int]:
     """The stops whose law depends on the entry rate."""
     contacts = enumerate(system.contacts)
-    known: list[int] = system.about_laws.get("latching", lambda: [s for s, one in contacts if latches(one)])
-    return known
+    return system.about_laws.get("latching", lambda: [s for s, one in contacts if latches(one)])
 
 
 def open_intervals(

@@ -97,16 +97,19 @@ class PeriodicProblem:
             solutions.append(solution)
         return Chain(x, parameter, residual, np.array(tangents), by_parameter, solutions, slope or self.step == 0.0)
 
+    def system(self, parameter: float) -> System:
+        """The system from the first shot's start on, which is kept."""
+        return self.shots(parameter)[0][0]
+
     def units(self, chain: Chain) -> Array:
         """Sizes of the latched numbers over the period."""
         systems = [system for system, _ in self.shots(chain.parameter)]
         rows = zip(systems, chain.x, chain.solutions, strict=True)
-        found: Array = np.max([units(system, x, solution.transitions) for system, x, solution in rows], axis=0)
-        return found
+        return np.max([units(system, x, solution.transitions) for system, x, solution in rows], axis=0)
 
     def codes(self, chain: Chain) -> Any:
         """Which entries of a state are codes of segments."""
-        return codes(self.make(chain.parameter)[0])
+        return codes(self.system(chain.parameter))
 
 
 def constant(system: System, period: float, method: Any) -> PeriodicProblem:
@@ -142,6 +145,11 @@ class Chain:
             matrix[-1, self.frozen] = 0.0
             matrix[-1, self.frozen, 0, self.frozen] = -1.0
         return matrix.reshape(m * size, m * size)
+
+    @cached_property
+    def unknowns(self) -> Array:
+        """(m N + 1,) [states, parameter]."""
+        return np.append(self.x.ravel(), self.parameter)
 
     @property
     def coordinates(self) -> int:

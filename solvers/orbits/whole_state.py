@@ -21,12 +21,7 @@ _OF_SLIDER = np.array([False, True])  # which numbers of friction are no codes: 
 
 def counts(system: System) -> list[int]:
     """Number of latched numbers of each contact."""
-
-    def found() -> list[int]:
-        return [len(getattr(contact.law, "memory", ())) for contact in system.contacts]
-
-    known: list[int] = system.about_laws.get("counts", found)
-    return known
+    return system.about_laws.get("counts", lambda: [len(contact.memory) for contact in system.contacts])
 
 
 def codes(system: System) -> Any:
@@ -46,7 +41,7 @@ def _remembering(system: System) -> list[Any]:
 
 def with_initial_memory(system: System, x: Array) -> Array:
     """A state [q, q̇] with the numbers that laws begin with."""
-    latched = [np.asarray(one.law.parameters)[list(one.law.memory)] for one in _remembering(system)]
+    latched = [np.asarray(one.law.parameters)[one.memory] for one in _remembering(system)]
     return np.concatenate((x, *latched)) if latched else x
 
 
@@ -97,7 +92,7 @@ def units(system: System, x: Array, log: Transitions) -> Array:
     sizes: list[Array] = []
     for number, latched in enumerate(memory_of(system, x)):
         law: Any = system.contacts[number].law
-        row, places, size = np.array(law.parameters, dtype=float), list(getattr(law, "memory", ())), np.abs(latched)
+        row, places, size = np.array(law.parameters, dtype=float), system.contacts[number].memory, np.abs(latched)
         row[places] = latched
         mine = np.flatnonzero(log.contact == number)
         if system.contacts[number].friction is not None:
@@ -114,7 +109,7 @@ def units(system: System, x: Array, log: Transitions) -> Array:
 
 def _reals(law: Any) -> Array:
     """Which latched numbers of a law are no codes."""
-    return np.asarray(np.diag(renewal_slopes(law, np.array(law.parameters))[:, 2:]) != 0.0)
+    return np.diag(renewal_slopes(law, np.array(law.parameters))[:, 2:]) != 0.0
 
 
 def transitions_of(solutions: Sequence[Solution], starts: Sequence[float]) -> Transitions:
