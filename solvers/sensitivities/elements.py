@@ -53,11 +53,9 @@ def motion_of(contact: Any, q: Array, q_dot: Array, t: Any = 0.0) -> ElementMoti
     m, k = y.shape
     none, slopes, bends = np.zeros(k), np.zeros((m, k)), np.zeros((m, m, k))
     if contact.map != "annulus":
-        delta_slopes, xi_slopes = np.eye(m)[0][:, None] + slopes, slopes
-        if m == 1:
-            return ElementMotion(y[0], y_dot[0], delta_slopes, bends, slopes, none, none, xi_slopes, bends, none)
-        xi_slopes = -np.eye(m)[1][:, None] + slopes
-        return ElementMotion(y[0], y_dot[0], delta_slopes, bends, slopes, -y[1], -y_dot[1], xi_slopes, bends, none)
+        delta_slopes, xi_slopes = slopes + np.eye(2, m)[0][:, None], slopes - np.eye(2, m)[1][:, None]
+        xi, xi_rate = (none, none) if m == 1 else (-y[1], -y_dot[1])
+        return ElementMotion(y[0], y_dot[0], delta_slopes, bends, slopes, xi, xi_rate, xi_slopes, bends, none)
     sign, c = math.copysign(1.0, contact.circle), contact.gap
     r = np.maximum(np.hypot(y[0], y[1]), _CENTRE * c)
     e, across = y[:2] / r, np.stack((-y[1], y[0])) / r
@@ -76,7 +74,7 @@ def motion_of(contact: Any, q: Array, q_dot: Array, t: Any = 0.0) -> ElementMoti
 
 def acceleration_of(motion: ElementMotion, y_dot: Array, y_twice: Array) -> Array:
     """δ̈ (k,) from ẏ and ÿ (m, k)."""
-    return np.asarray((motion.delta_slopes * y_twice + motion.rate_slopes * y_dot).sum(axis=0))
+    return (motion.delta_slopes * y_twice + motion.rate_slopes * y_dot).sum(axis=0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +155,7 @@ class Slider:
     def _latched(self, row: Array, code: float, place: float) -> Array:
         """Parameters with other latched numbers: code of the segment and place of the slider."""
         row = row.copy()
-        row[list(self.contact.law.memory)] = code, place
+        row[self.contact.memory] = code, place
         return row
 
 

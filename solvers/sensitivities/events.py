@@ -132,7 +132,7 @@ def _friction_jump(flow: Flow, t: float, s: int, acting: Acting, following: Acti
     """Jumps of the forces (m,) on the rows where a slider begins another segment: none, unless N has jumped down."""
     motion, normal = flow.motion_of(t, s), flow.force(np.array([t]), s, acting)
     before, then = (forces_of(motion, flow.slider(s, one), normal)[:, 0] for one in (acting, following))
-    return np.asarray(then - before)
+    return then - before
 
 
 def knot_shift(flow: Flow, t: float, row: Array, acting: Acting, span: float) -> Array:
@@ -161,7 +161,7 @@ def _at_knot(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[Any
 def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[Any, ...], last: Array | None) -> Array:
     """dt* at a border of a law with memory, whose renewal also changes the derivatives of what is latched."""
     s, border, (d_delta, d_rate, rate, acceleration) = int(row[at.ELEMENT]), int(row[at.GUARD]), motion
-    law: Any = flow.system.contacts[s].law
+    law, places = flow.system.contacts[s].law, flow.system.contacts[s].memory
     place = border, float(row[at.DELTA]), float(row[at.RATE])
     sizes = np.abs(flow.motion.at(t)) @ np.abs(flow.system.contacts[s].rows[0])
     by = laws.margin_slopes(law, acting.rows[s], *place, acting.entry_rate[s], sizes)
@@ -171,7 +171,7 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
         s, acting, lambda one, own: laws.margin(one, own, *place, acting.entry_rate[s])
     )
     margin_rate = by[0] * rate + by[1] * acceleration
-    size = np.abs(by * np.concatenate((place[1:], acting.rows[s][list(law.memory)]))).sum()
+    size = np.abs(by * np.concatenate((place[1:], acting.rows[s][places]))).sum()
     margin = laws.margin(law, acting.rows[s], *place, acting.entry_rate[s])
     left_behind = margin < -_LEFT_BEHIND * size
     if left_behind and last is not None:
@@ -181,7 +181,6 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
     maps = renewal_slopes(law, acting.rows[s], *place, acting.entry_rate[s])
     latched = np.outer(maps[:, 0], d_delta + rate * shift) + np.outer(maps[:, 1], d_rate + acceleration * shift)
     latched += maps[:, 2:] @ known
-    places = list(law.memory)
 
     def followed(one: Any, own: Array) -> Array:
         """Numbers latched by a nearby law where it meets the border itself: they may have a corner there."""
@@ -190,7 +189,7 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
             beyond = laws.margin(one, own, border, delta, place[2], acting.entry_rate[s]) - margin
             delta -= beyond / by[0]
         after = laws.renewed(one, own, border, delta, place[2])[places]
-        return np.asarray(after - maps[:, 0] * (delta - place[1]))
+        return after - maps[:, 0] * (delta - place[1])
 
     latched[:, flow.own] += flow.over_laws(s, acting, followed)
     flow.latched[s] = latched

@@ -52,12 +52,12 @@ class Flow:
     @property
     def state(self) -> Array:
         """(2n, m) derivatives of [q, q̇]."""
-        return np.asarray(self.T @ self.y)
+        return self.T @ self.y
 
     @property
     def by_parameters(self) -> Array:
         """(d, 2n) derivatives of [q, q̇] by the parameters."""
-        return np.asarray((self.T @ self.y[:, self.own]).T)
+        return (self.T @ self.y[:, self.own]).T
 
     def motion_of(self, t: Any, s: int) -> ElementMotion:
         """`ElementMotion` of an element at times."""
@@ -131,7 +131,7 @@ class Flow:
         if turn and told is not None:
             angle += 2.0 * math.pi * round((told - motion.xi[0]) / turn)
         found[self.own] += one.clearance * angle + one.surface * t
-        return np.asarray(found)
+        return found
 
     def _rows_change(self, t: float, s: int) -> tuple[Array, Array]:
         """Changes dy and dẏ (m, columns) of an element's rows at fixed time."""
@@ -148,8 +148,7 @@ class Flow:
 
     def over_laws(self, s: int, acting: Acting, read: Callable[[Any, Array], Any]) -> Any:
         """Derivatives (..., d) by the parameters of what is read off a law, at fixed latched numbers."""
-        places = list(getattr(self.system.contacts[s].law, "memory", ()))
-        width = len(acting.rows[s])
+        places, width = self.system.contacts[s].memory, len(acting.rows[s])
 
         def of(law: Any) -> Any:
             row = np.zeros(width)
@@ -168,9 +167,9 @@ class Flow:
         law, rate = self.system.contacts[s].law, acting.entry_rate[s]
         inside = self._inside(s, acting, motion, self.by.laws_of(s))
         if getattr(law, "bend", None) != "force":
-            return np.asarray(self.over_laws(s, acting, lambda one, own: laws.force(one, own, inside, rate)))
+            return self.over_laws(s, acting, lambda one, own: laws.force(one, own, inside, rate))
         pushes: Any = laws.bend(law, inside, rate)
-        uncut = np.asarray(self.by.over_laws(s, lambda one: laws.uncut_force(one, inside, rate)))
+        uncut = self.by.over_laws(s, lambda one: laws.uncut_force(one, inside, rate))
         return uncut * (pushes > 0.0)[:, None]
 
     def force_change(self, t: Array, s: int, acting: Acting) -> Linear:
@@ -327,7 +326,7 @@ class Flow:
             first += m
         left = left.reshape(count, total * S, total * S) + np.eye(total * S)
         right = np.concatenate((by_state, other), axis=3).reshape(count, total * S, -1)
-        solved = np.asarray(np.linalg.solve(left, right), dtype=float)
+        solved = np.linalg.solve(left, right)
         found = solved[..., :size], solved[..., size:]
         return found, [None if one[0].slopes.shape[1] == 1 else self._normal(count, *one, found) for one in known]
 
@@ -361,7 +360,7 @@ class Flow:
                     push[j] += np.outer(np.asarray(vector), slope(times))
         for s in acting.elements if by.turned else ():
             push += by.elements[s].rows.transpose(0, 2, 1) @ self.forces(times, s, acting)
-        return np.asarray(np.moveaxis(system.push @ push, 0, -1)).reshape(-1, *t.shape, len(by))
+        return np.moveaxis(system.push @ push, 0, -1).reshape(-1, *t.shape, len(by))
 
 
 def _begun(places: list[int], law: Any) -> Array:
@@ -371,22 +370,23 @@ def _begun(places: list[int], law: Any) -> Array:
 
 def begun_numbers(system: System, given: Sequence[Any] | None) -> list[Array]:
     """The latched numbers at the start: given ones, or those that laws begin with."""
-    begin = [_begun(list(getattr(one.law, "memory", ())), one.law) for one in system.contacts]
+    begin = [_begun(one.memory, one.law) for one in system.contacts]
     return begin if given is None else [one if own is None else own for one, own in zip(begin, given, strict=True)]
 
 
-def latched_columns(system: System, by: Change, columns: int, given: Sequence[Any] | None) -> list[Array]:
-    """(l, m) derivatives of the latched numbers of every element at the start.
+def latched_columns(system: System, by: Change, starts: Array, given: Sequence[Any] | None) -> list[Array]:
+    """(l, m) derivatives of the latched numbers of every element at the start, those by the parameters from ``starts``.
 
     Given numbers are unknowns of the start; numbers that laws begin with depend on the parameters.
     """
-    found, place = [], 2 * system.size
+    found, place, whole = [], 2 * system.size, len(starts)
     for s, contact in enumerate(system.contacts):
-        places = list(getattr(contact.law, "memory", ()))
-        own = np.zeros((len(places), columns))
-        own[:, place : place + len(places)] = np.eye(len(places))
-        place += len(places)
+        places = contact.memory
+        mine = slice(place, place + len(places))
+        own = np.eye(whole, whole + len(by))[mine]
+        own[:, whole:] = starts[mine]
         if places and (given is None or given[s] is None):
-            own[:, columns - len(by) :] = by.over_laws(s, partial(_begun, places))
+            own[:, whole:] += by.over_laws(s, partial(_begun, places))
         found.append(own)
+        place = mine.stop
     return found

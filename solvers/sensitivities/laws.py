@@ -16,15 +16,10 @@ _SHARE, _SMALL = 1e-7, 1e-8  # steps of differences, relative to the number, and
 _UNKNOWN, _TRIALS = 1e-10, 4  # step from which that of a latched number, of unknown size, is found in so many trials
 
 
-def _pointers(*arrays: Array) -> list[int]:
-    """Addresses of arrays."""
-    return [array.ctypes.data for array in arrays]
-
-
 def _call(function: Any, row: Array, motion: tuple[Array, Array], entry_rate: float, *out: Array) -> None:
     """Call a law at δ and δ̇ (k,)."""
     delta, rate = (np.array(one, dtype=float, ndmin=1) for one in motion)
-    d, v, p, *results = _pointers(delta, rate, row, *out)
+    d, v, p, *results = (array.ctypes.data for array in (delta, rate, row, *out))
     function(delta.size, d, v, entry_rate, p, *results)
 
 
@@ -44,9 +39,8 @@ def slopes(law: Any, row: Array, motion: tuple[Any, Any], entry_rate: float) -> 
 
 def by_latched(law: Any, row: Array, motion: tuple[Any, Any], entry_rate: float) -> Array:
     """∂F/∂(latched numbers), (l, k)."""
-    out = np.zeros((len(getattr(law, "memory", ())), np.size(motion[0])))
-    if len(out):
-        _call(_ONE(law.memory_gradient_address), row, motion, entry_rate, out)
+    out = np.zeros((len(law.memory), np.size(motion[0])))
+    _call(_ONE(law.memory_gradient_address), row, motion, entry_rate, out)
     return out
 
 
@@ -57,7 +51,7 @@ def bend(law: Any, motion: tuple[Any, Any], entry_rate: float) -> Array | None:
     """
     kind = getattr(law, "bend", None)
     if kind == "rate":
-        return np.asarray(motion[1])
+        return motion[1]
     if kind == "force":
         return uncut_force(law, motion, entry_rate)
     parts = getattr(law, "parts", ())

@@ -102,12 +102,11 @@ class ElementChange:
     def of(cls, nearby: Sequence[Nearby], s: int, shape: tuple[int, ...]) -> ElementChange:
         """Of element s, whose rows have the shape (m, n)."""
 
-        def of(read: Callable[[Any], Any], shape: tuple[int, ...] = ()) -> Array:
+        def of(read: Callable[[Any], Any], shape: tuple[int, ...]) -> Array:
             found = [one.derivative(lambda system: read(system.contacts[s])) for one in nearby]
             return np.array(found).reshape(len(nearby), *shape)
 
-        numbers = (of(read) for read in (_clearance, _mu, _stiffness, lambda one: one.surface))
-        return cls(of(lambda one: one.rows, shape), of(lambda one: one.row_gaps, shape[:1]), *numbers)
+        return cls(of(lambda one: one.rows, shape), of(lambda one: one.row_gaps, shape[:1]), *of(_numbers, (4,)).T)
 
 
 def indentation_change(
@@ -125,16 +124,10 @@ def indentation_change(
     return (element.delta_slopes * moved).sum(axis=0) - clearance, rate
 
 
-def _clearance(contact: Any) -> float:
-    return contact.gap if contact.map == "annulus" else 0.0
-
-
-def _mu(contact: Any) -> float:
-    return contact.friction.mu if contact.friction else 0.0
-
-
-def _stiffness(contact: Any) -> float:
-    return contact.friction.stiffness if contact.friction else 0.0
+def _numbers(contact: Any) -> tuple[float, ...]:
+    """|c|, μ, k_t and R Ω of an element, 0 where there is none."""
+    friction = (contact.friction.mu, contact.friction.stiffness) if contact.friction else (0.0, 0.0)
+    return contact.gap if contact.map == "annulus" else 0.0, *friction, contact.surface
 
 
 class Change:
@@ -211,7 +204,9 @@ def _signal(nearby: Nearby, system: System, i: int, duration: float) -> Callable
     if all(hasattr(signal, "tones") for signal in signals):
         slope = _of_tones(nearby, own.tones(), [signal.tones() for signal in signals])
         return slope if np.any(slope(duration * _PROBES)) else None
-    return None if _same_tables(signals, duration) else partial(_of_values, nearby, signals)
+    if _same_tables(signals, duration):
+        return None
+    return lambda t: combined(nearby.weights, [np.asarray(signal(t), dtype=float) for signal in signals])
 
 
 def _same_tables(signals: list[Any], duration: float) -> bool:
@@ -220,11 +215,6 @@ def _same_tables(signals: list[Any], duration: float) -> bool:
         return False
     (dt, rows), *others = [signal.nodes(duration, _COARSE) for signal in signals]
     return all(h == dt and np.array_equal(table, rows) for h, table in others)
-
-
-def _of_values(nearby: Nearby, signals: list[Any], t: Array) -> Array:
-    """By differences of the signals' values."""
-    return np.asarray(combined(nearby.weights, [np.asarray(signal(t), dtype=float) for signal in signals]))
 
 
 def _of_tones(nearby: Nearby, here: Any, tones: list[Any]) -> Callable[[Array], Array]:
@@ -236,7 +226,7 @@ def _of_tones(nearby: Nearby, here: Any, tones: list[Any]) -> Callable[[Array], 
     def slope(t: Array) -> Array:
         t = np.asarray(t, dtype=float)[..., None]
         waves = (change + 1j * t * turn * amplitude) * np.exp(1j * omega * t)
-        return np.asarray(waves.real.sum(axis=-1))
+        return waves.real.sum(axis=-1)
 
     return slope
 

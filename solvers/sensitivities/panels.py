@@ -30,7 +30,7 @@ _LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(_X, S - 1))  # values
 
 def lagrange(at: Array) -> Array:
     """Values (..., S) at points of [0, 1] of the polynomials that are 1 at one node and 0 at the others."""
-    return np.asarray(np.polynomial.legendre.legvander(2.0 * at - 1.0, S - 1) @ _LEGENDRE)
+    return np.polynomial.legendre.legvander(2.0 * at - 1.0, S - 1) @ _LEGENDRE
 
 
 _WITHIN = lagrange(X[:, None] * X)  # (i, q, j): ℓ_j at node q of the interval before node i
@@ -50,19 +50,19 @@ class Clock:
     def time(self, sigma: Array) -> Array:
         """Times, s."""
         m = self.power
-        return np.asarray(self.start + (self.end - self.start) * (sigma if m == 1 else betainc(m, m, sigma)))
+        return self.start + (self.end - self.start) * (sigma if m == 1 else betainc(m, m, sigma))
 
     def pace(self, sigma: Array) -> Array:
         """dt/dσ, s."""
         m, length = self.power, self.end - self.start
         if m == 1:
             return np.full(np.shape(sigma), length)
-        return np.asarray(length * (sigma * (1.0 - sigma)) ** (m - 1) / beta_function(m, m))
+        return length * (sigma * (1.0 - sigma)) ** (m - 1) / beta_function(m, m)
 
     def place(self, t: Array) -> Array:
         """σ of times t."""
         share = np.clip((np.asarray(t) - self.start) / (self.end - self.start), 0.0, 1.0)
-        return share if self.power == 1 else np.asarray(betaincinv(self.power, self.power, share))
+        return share if self.power == 1 else betaincinv(self.power, self.power, share)
 
 
 def propagator(k: Array, c: Array, t: Array) -> tuple[Array, Array]:
@@ -151,7 +151,7 @@ class Panels:
     @cached_property
     def _sigma(self) -> Array:
         """(P, S) of the nodes."""
-        return np.asarray(self.edges[:-1, None] + self.widths[:, None] * X)
+        return self.edges[:-1, None] + self.widths[:, None] * X
 
     @cached_property
     def times(self) -> Array:
@@ -161,7 +161,7 @@ class Panels:
     @cached_property
     def weights(self) -> Array:
         """(P, S) Σ w f = ∫ f dt."""
-        return np.asarray(self.widths[:, None] * W * self.clock.pace(self._sigma))
+        return self.widths[:, None] * W * self.clock.pace(self._sigma)
 
     @cached_property
     def ends(self) -> Array:
@@ -222,7 +222,7 @@ class Panels:
         (rp, rv), (bp, bv) = read.reshape(2, -1), push.reshape(2, -1)
         by_alpha, by_beta = rp * bp + rv * bv, rp * bv - rv * (self.k * bp + self.c * bv)
         alpha, beta = self.kernels
-        return np.asarray(np.tensordot(by_alpha, alpha, 1) + np.tensordot(by_beta, beta, 1))
+        return np.tensordot(by_alpha, alpha, 1) + np.tensordot(by_beta, beta, 1)
 
     def reach(self, push: Array) -> Array:
         """Of a force at the nodes that pushes (2n,): states at the ends, (P, 2n, S)."""
@@ -230,7 +230,7 @@ class Panels:
 
     def at_ends(self, rates: Array) -> Array:
         """States (2n, P, m) at the ends due to rates (2n, P, S, m) at the nodes."""
-        return np.asarray(moved(self.k, self.c, self._to_end, rates).sum(axis=2))
+        return moved(self.k, self.c, self._to_end, rates).sum(axis=2)
 
     def within(self, states: Array, t: Array) -> Array:
         """States (q, 2n, m) at times t (q,) of the polynomials through states (2n, P, S, m) at the nodes."""
@@ -242,7 +242,7 @@ class Panels:
 
 def coefficients(values: Array) -> Array:
     """Legendre coefficients (S, ...) of the polynomial through values (S, ...) at the nodes."""
-    return np.asarray(np.tensordot(_LEGENDRE, values, axes=1))
+    return np.tensordot(_LEGENDRE, values, axes=1)
 
 
 def largest(values: Array, ends: tuple[bool, bool]) -> tuple[int, float, float]:

@@ -75,7 +75,7 @@ def acting_at_start(system: System, x: Array, rows: Array, memory: Sequence[Any]
         segment.append(1 + above if contact.always else int(known))
         entry_rate.append(max(abs(motion.rate[0]), law.entry_rate_floor))
         if memory is not None and memory[s] is not None:
-            parameters[s][list(law.memory)] = memory[s]
+            parameters[s][contact.memory] = memory[s]
     return Acting(tuple(segment), tuple(entry_rate), tuple(parameters))
 
 
@@ -101,9 +101,9 @@ def after(system: System, acting: Acting, row: Array) -> Acting:
     return acting.changed(s, rows=laws.renewed(law, acting.rows[s], int(guard), row[at.DELTA], rate))
 
 
-def grouped(rows: Array) -> list[tuple[float, list[Array]]]:
+def grouped(rows: Array) -> dict[float, list[Array]]:
     """Events by their times."""
-    return [(float(t), list(group)) for t, group in groupby(rows, key=lambda row: row[at.TIME])]
+    return {float(t): list(group) for t, group in groupby(rows, key=lambda row: row[at.TIME])}
 
 
 @dataclass(frozen=True)
@@ -154,10 +154,9 @@ class Division:
     def stretches(self, acting: Acting, rows: Array, duration: float, refinement: int) -> Iterator[Stretch]:
         """All stretches in the order of time; events at one time are applied together."""
         events = grouped(rows)
-        marks = [0.0, *(t for t, _ in events if t > 0.0), duration]
-        passed = dict(events)
+        marks = [0.0, *(t for t in events if t > 0.0), duration]
         for start, end in pairwise(marks):
-            for row in passed.get(start, ()):
+            for row in events.get(start, ()):
                 acting = after(self.system, acting, row)
             if end > start:
                 yield self._stretch(start, end, acting, refinement)

@@ -155,14 +155,14 @@ def sensitivities(
     checked_start(system, q0, q_dot0, method)
     asked = _Request(
         system,
-        _state(q0, q_dot0),
+        np.concatenate([np.atleast_1d(np.asarray(one, dtype=float)) for one in (q0, q_dot0)]),
         duration,
         _checked_times(times, duration),
         replace(method, ledger=False) if isinstance(method, Exponential) else method,
         memory,
         Change(system, [unchanged(system) if one is None else one for one, _ in parameters], duration),
-        [_checked_direction(system, one) for _, one in parameters],
-        progress,
+        _checked_directions(system, [one for _, one in parameters]),
+        progress or (lambda t: None),
     )
     rows = asked.measure()
     best, bends = None, np.zeros(0)
@@ -190,16 +190,17 @@ def _checked_times(times: ArrayLike, duration: float) -> Array:
     return found.clip(max=duration)  # k dt may round to more
 
 
-def _checked_direction(system: System, start: ArrayLike | None) -> Array:
-    """Derivative of the start, (2n,) or with what is latched (2n + l,)."""
+def _checked_directions(system: System, starts: Sequence[ArrayLike | None]) -> Array:
+    """(2n + l, d) derivatives of the start, each given as (2n,), with what is latched as (2n + l,), or as None."""
     n2 = 2 * system.size
-    if start is None:
-        return np.zeros(n2)
-    found = np.asarray(start, dtype=float)
-    whole = n2 + sum(len(getattr(one.law, "memory", ())) for one in system.contacts)
-    if found.shape not in ((n2,), (whole,)) or not np.isfinite(found).all():
-        more = f", or {whole} with what is latched" if whole > n2 else ""
-        raise ValueError(f"start must be {n2} finite numbers, those of [q0, q_dot0]{more}, got {start!r}")
+    whole = n2 + sum(len(one.memory) for one in system.contacts)
+    found = np.zeros((whole, len(starts)))
+    for i, start in enumerate(starts):
+        given = np.zeros(n2) if start is None else np.asarray(start, dtype=float)
+        if given.shape not in ((n2,), (whole,)) or not np.isfinite(given).all():
+            more = f", or {whole} with what is latched" if whole > n2 else ""
+            raise ValueError(f"start must be {n2} finite numbers, those of [q0, q_dot0]{more}, got {start!r}")
+        found[: given.size, i] = given
     return found
 
 
@@ -207,17 +208,6 @@ def _without_repeats(times: list[float], distance: float) -> Array:
     """Times in order, without those nearer to the one before than a distance."""
     ordered = np.sort(np.array(times))
     return ordered[np.diff(ordered, prepend=-np.inf) > distance]
-
-
-def _parts(values: Array, counts: list[int]) -> list[Array]:
-    """Values in parts of given lengths; zeros if there are none."""
-    values = values if values.size else np.zeros(sum(counts))
-    return np.split(values, np.cumsum(counts)[:-1]) if counts else []
-
-
-def _state(q0: ArrayLike, q_dot0: ArrayLike) -> Array:
-    """[q, q̇]."""
-    return np.concatenate([np.atleast_1d(np.asarray(one, dtype=float)) for one in (q0, q_dot0)])
 
 
 @dataclass(eq=False)
@@ -231,8 +221,8 @@ class _Request:
     method: Any
     memory: Any
     by: Change
-    starts: list[Array]  # of [q, q̇], or of what is latched too
-    progress: Callable[[float], None] | None = None
+    starts: Array  # (2n + l, d) derivatives of the start
+    progress: Callable[[float], None]
     span: Array = field(default_factory=lambda: np.zeros(0))  # (E,) size of each element's displacement
     depths: list[Depths] = field(default_factory=list)  # of each element
 
@@ -286,7 +276,8 @@ class _Request:
 
     def _check_touching(self, seen: _Seen) -> None:
         """NoDerivativeError if a stop is touched, by fine samples where it comes near."""
-        near = [(s, t, h) for s in self._stops() for t, h, top in seen.maxima(s) if abs(top) < _NEAR * self.span[s]]
+        stops = [s for s, contact in enumerate(self.system.contacts) if not contact.always]
+        near = [(s, t, h) for s in stops for t, h, top in seen.maxima(s) if abs(top) < _NEAR * self.span[s]]
         if not near:
             return
         times = np.unique(np.concatenate([t + h * _FINE_OFFSETS for _, t, h in near]))
@@ -299,10 +290,6 @@ class _Request:
                         f"no derivative: {called(self.system, s)} is touched but not entered at t = {t:.6g} s, "
                         f"to {abs(top):.2g} m; change the parameter a little"
                     )
-
-    def _stops(self) -> list[int]:
-        """Elements whose contacts begin and end."""
-        return [s for s, contact in enumerate(self.system.contacts) if not contact.always]
 
 
 @dataclass(frozen=True, eq=False)
@@ -367,7 +354,7 @@ class _Walk:
 
     def __init__(self, asked: _Request, rows: Array, refinement: int, bends: Array) -> None:
         system, by = asked.system, asked.by
-        self.asked, self.rows, self.events = asked, rows, dict(grouped(rows))
+        self.asked, self.rows, self.events = asked, rows, grouped(rows)
         self.acting = acting_at_start(system, asked.x, rows, asked.memory)
         division = Division(system, by.forced, asked.depths, bends, asked.sampled)
         self.stretches = list(division.stretches(self.acting, rows, asked.duration, refinement))
@@ -375,16 +362,10 @@ class _Walk:
         times = np.unique(np.clip(np.concatenate(wanted), 0.0, asked.duration))
         self.solution = self._replayed(np.union1d(wanted[0], asked.times))  # that is kept
         self.motion = Motion(self._replayed, times, system.size)
-        n2, own = 2 * system.size, sum(len(getattr(one.law, "memory", ())) for one in system.contacts)
-        columns = n2 + own + len(by)
-        start = np.zeros((n2, columns))
-        start[:, :n2] = np.eye(n2)
-        latched = latched_columns(system, by, columns, asked.memory)
-        for i, given in enumerate(asked.starts, n2 + own):
-            start[:, i] = given[:n2]
-            for known, added in zip(latched, _parts(given[n2:], [len(one) for one in latched]), strict=True):
-                known[:, i] += added
-        self.flow = Flow(system, self.motion, by, start, latched)
+        n2, (whole, own) = 2 * system.size, asked.starts.shape
+        start = np.eye(n2, whole + own)
+        start[:, whole:] = asked.starts[:n2]
+        self.flow = Flow(system, self.motion, by, start, latched_columns(system, by, asked.starts, asked.memory))
         self.states = np.zeros((len(asked.times), len(by), n2))
         self.contacts: list[_Contact] = []
         self.bends: list[float] = []  # times at which laws have kinks that are no knots
@@ -494,14 +475,9 @@ class _Walk:
                 found = flow.pass_flight(panels, stretch.acting, times[low:middle])
             self._sampled(low, found)
             low = middle
-            self._tell(float(panels.ends[-1]))
+            self.asked.progress(float(panels.ends[-1]))
         self._store_at(stretch.end)
-        self._tell(stretch.end)
-
-    def _tell(self, t: float) -> None:
-        """Tell that a time has been reached."""
-        if self.asked.progress:
-            self.asked.progress(t)
+        self.asked.progress(stretch.end)
 
     def _sampled(self, first: int, found: Array) -> None:
         """Store derivatives (q, 2n, d) of the blocks at samples."""
