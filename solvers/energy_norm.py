@@ -19,4 +19,4 @@ def _root(matrix: Array) -> Array:
     """Square root of a symmetric matrix, with the absolute values of its eigenvalues."""
     values, vectors = np.linalg.eigh(matrix)
     values = np.abs(values)
-    return np.asarray((vectors * np.sqrt(np.maximum(values, 1e-12 * values.max()))) @ vectors.T)
+    return (vectors * np.sqrt(np.maximum(values, 1e-12 * values.max()))) @ vectors.T

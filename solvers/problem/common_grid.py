@@ -151,7 +151,7 @@ def _moved(derivatives: Array, span: Any, orders: range) -> Array:
 def _jumps(rows: Array, dt: float, most: int = 5) -> Array:
     """(5, nodes within) jumps of the first to fifth derivative of a node table; of fewer if ``most`` are wanted."""
     pieces = _derivatives(rows, dt)
-    return np.asarray(pieces[1 : most + 1, 1:] - _moved(pieces[:, :-1], dt, range(1, most + 1)))
+    return pieces[1 : most + 1, 1:] - _moved(pieces[:, :-1], dt, range(1, most + 1))
 
 
 def _moments_kept(x: Array, jumps: Array) -> Array:
@@ -185,8 +185,7 @@ def _changes(x: Array, jumps: Array) -> Array:
     values = sum(jump[:, None] * _power(later, p) for p, jump in enumerate(jumps.T, 1))
     wanted = np.einsum("nu,nuk->nk", values * rest * weights, about)
     ends = [sum(jumps[:, [p - 1]] * _power(rest, p - k) for p in range(max(k, 1), 6)) for k in range(3)]
-    changes: Array = np.linalg.solve(basis.T, (wanted - np.hstack(ends) @ rising @ within).T).T
-    return changes
+    return np.linalg.solve(basis.T, (wanted - np.hstack(ends) @ rising @ within).T).T
 
 
 def _power(x: Array, p: int) -> Array:

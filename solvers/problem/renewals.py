@@ -15,8 +15,7 @@ _RENEW, _SLOPES = ctypes.CFUNCTYPE(ctypes.c_int64, *_AT), ctypes.CFUNCTYPE(None,
 
 def renew(law: Any, row: Array, border: int, delta: float, rate: float) -> str:
     """Renew what a law has latched in a row of its parameters, as when a border is met; returns the event."""
-    event: str = law.events[_RENEW(law.renew_address)(border, delta, rate, 1.0, row.ctypes.data)]
-    return event
+    return law.events[_RENEW(law.renew_address)(border, delta, rate, 1.0, row.ctypes.data)]
 
 
 def renewal_slopes(

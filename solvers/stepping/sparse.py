@@ -122,5 +122,4 @@ def _factorised(matrix: Any, symmetric: bool) -> Callable[[Array], Array]:
     options: dict[str, Any] = {}
     if symmetric:
         options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-    solve: Callable[[Array], Array] = splu(matrix, **options).solve
-    return solve
+    return splu(matrix, **options).solve
