@@ -15,7 +15,6 @@ import numpy as np
 from solvers.compiled.kernels import (
     acceleration_of,
     copy,
-    dot,
     indentation_and_rate,
     inner,
     kernel,
@@ -23,8 +22,19 @@ from solvers.compiled.kernels import (
     slider_of,
     surface_tolerance,
 )
-from solvers.compiled.renewals import margins, margins_after, margins_in, renew
-from solvers.compiled.sliding import POINT, XI, XI_RATE, move_point, point_of, slider_margins, xi_tolerances
+from solvers.compiled.renewals import margins, renew
+from solvers.compiled.sliding import (
+    ACCELERATION,
+    DELTA,
+    POINT,
+    RATE,
+    XI,
+    XI_RATE,
+    move_point,
+    point_of,
+    slider_margins,
+    xi_tolerances,
+)
 from solvers.compiled.state import LAST_EVENT, T, count_event, rate_tolerance
 from solvers.problem.friction import CODE, STICK
 from solvers.stepping.events import NONE, bisection, golden_section, motion_of, point_at, polynomial
@@ -35,89 +45,97 @@ _NODES = np.array([0.0, *(2.0**i for i in (-20, -15, -11, -8, -7, -6, -5, -4, -3
 NODES = _NODES.size
 _TOGETHER = 1e-12  # margin, relative to its value at the start, at which a border counts as reached along with another
 _SHORTLY = 1e-3  # part of a step before its end at which margins are extrapolated
+_ROUNDED = np.array([DELTA, RATE, XI, XI_RATE])  # numbers of a point that rounding moves
 _RATE_STEP = 1e-4  # part of a step over which the rate of a margin is differenced
 
 
 @inner
-def _slider_margins_now(problem, state, space, s, t, x, rate):
-    """`_margins_now` of friction, in the state x with its rate, without moving it."""
-    point, moved, scale = space.point[0], space.point[1], space.scale[s]
-    point_of(problem, s, t, x, rate, point)
-    scale[0] = max(scale[0], 4.0 * surface_tolerance(problem, s, x))
-    scale[1] = max(scale[1], rate_tolerance(problem, s, x))
-    xi, xi_rate = xi_tolerances(problem, s, t, x)
-    scale[2], scale[3] = max(scale[2], 4.0 * xi), max(scale[3], xi_rate)
-    segment, entry, present, count = state.segment[s], state.entry_rate[s], space.present[s], problem.border_count[s]
-    slider_margins(problem, s, segment, entry, point, present)
-    for j in range(count):
-        space.rounding[s, j] = 1e-15 * abs(present[j])
-    for i in range(4):
-        copy(point, moved, POINT)
-        moved[i if i < 2 else XI if i == 2 else XI_RATE] += scale[i]
-        slider_margins(problem, s, segment, entry, moved, space.one)
-        for j in range(count):
-            space.rounding[s, j] += abs(space.one[j] - present[j])
+def _point_in(problem, s, t, x, rate, point):
+    """Write the point of an element in a state x with the rate x', see `sliding`; without friction δ, δ̇ and δ̈ alone."""
+    if rubs(problem, s):
+        point_of(problem, s, t, x, rate, point)
+    else:
+        point[DELTA], point[RATE] = indentation_and_rate(problem, s, x)
+        point[ACCELERATION] = acceleration_of(problem, s, x, rate)
+
+
+@inner
+def _margins_of(problem, state, s, point, out):
+    """Margins of element s at a point."""
+    if rubs(problem, s):
+        slider_margins(problem, s, state.segment[s], state.entry_rate[s], point, out)
+    else:
+        margins(problem, state, s, 1, point[DELTA : DELTA + 1], point[RATE : RATE + 1], out)
 
 
 @inner
 def _margins_now(problem, state, space, s, t, x, rate_of_x):
     """Margins of element s in the state x, into ``space.present``, and their rounding; returns δ and δ̇.
 
-    δ is moved by its rounding in the direction of the motion: before its first motion a law may depend on the sign of
-    δ.
+    Its point is left in ``space.point``. Without friction δ is moved there by its rounding in the direction of the
+    motion: before its first motion a law may depend on the sign of δ.
     """
-    if rubs(problem, s):
-        _slider_margins_now(problem, state, space, s, t, x, rate_of_x)
-        return space.point[0, 0], space.point[0, 1]
-    delta, rate = indentation_and_rate(problem, s, x)
-    scale, count = space.scale[s], problem.border_count[s]
+    point, moved, scale, count = space.point[0], space.point[1], space.scale[s], problem.border_count[s]
+    _point_in(problem, s, t, x, rate_of_x, point)
+    delta, direction, moves = point[DELTA], 1.0, 4 if rubs(problem, s) else 2
     scale[0] = max(scale[0], 4.0 * surface_tolerance(problem, s, x))
     scale[1] = max(scale[1], rate_tolerance(problem, s, x))
-    direction = math.copysign(1.0, rate)
-    for i in range(3):  # δ moved, δ moved further, δ̇ moved, too
-        space.trial[0] = delta + direction * scale[0] * (3.0 if i == 1 else 1.0)
-        space.trial[1] = rate + direction * scale[1] * (1.0 if i == 2 else 0.0)
-        margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.margin)
+    if rubs(problem, s):
+        xi, xi_rate = xi_tolerances(problem, s, t, x)
+        scale[2], scale[3] = max(scale[2], 4.0 * xi), max(scale[3], xi_rate)
+    else:
+        direction = math.copysign(1.0, point[RATE])
+        point[DELTA] += direction * scale[0]
+    _margins_of(problem, state, s, point, space.present[s])
+    for j in range(count):
+        space.rounding[s, j] = 1e-15 * abs(space.present[s, j])
+    for i in range(moves):
+        copy(point, moved, POINT)
+        moved[_ROUNDED[i]] += direction * scale[i] * (2.0 if moves == 2 and i == 0 else 1.0)
+        _margins_of(problem, state, s, moved, space.one)
         for j in range(count):
-            if i == 0:
-                space.present[s, j], space.rounding[s, j] = space.margin[j], 1e-15 * abs(space.margin[j])
-            space.rounding[s, j] += abs(space.margin[j] - space.present[s, j])
-    return delta, rate
+            space.rounding[s, j] += abs(space.one[j] - space.present[s, j])
+    return delta, point[RATE]
 
 
 @inner
 def _margins_on_step(problem, state, space, h, s):
     """Margins of element s at the nodes of the step of duration h just tried, into ``space.margin``."""
     motion_of(problem, s, state.x, space.dense, space.coefficients)
-    if rubs(problem, s):
-        for i in range(_NODES.size):
-            _slider_margins_at(problem, state, space, h, s, _NODES[i])
+    for i in range(_NODES.size):
+        _point_on_step(problem, state, space, h, s, _NODES[i])
+        space.points[0, i], space.points[1, i] = space.point[1, DELTA], space.point[1, RATE]
+        if rubs(problem, s):
+            _margins_of(problem, state, s, space.point[1], space.one)
             for j in range(problem.border_count[s]):
                 space.margin[_NODES.size * j + i] = space.one[j]
-        return
-    for i in range(_NODES.size):
-        space.points[0, i] = polynomial(space.coefficients[0], _NODES[i])
-        space.points[1, i] = polynomial(space.coefficients[1], _NODES[i])
-    margins(problem, state, s, _NODES.size, space.points[0], space.points[1], space.margin)
+    if not rubs(problem, s):  # all at once, which is quicker
+        margins(problem, state, s, _NODES.size, space.points[0], space.points[1], space.margin)
 
 
 @inner
-def _slider_margins_at(problem, state, space, h, s, theta):
-    """Margins of friction at θ of the step, into ``space.one``."""
-    point_at(problem, s, state.now[T], h, theta, space.coefficients, space.point[1])
-    slider_margins(problem, s, state.segment[s], state.entry_rate[s], space.point[1], space.one)
+def _point_on_step(problem, state, space, h, s, theta):
+    """Write the point of element s at θ of the step, as `_point_in` does, to ``space.point[1]``."""
+    point, coefficients = space.point[1], space.coefficients
+    if rubs(problem, s):
+        point_at(problem, s, state.now[T], h, theta, coefficients, point)
+    else:
+        point[DELTA], point[RATE] = polynomial(coefficients[0], theta), polynomial(coefficients[1], theta)
+
+
+@inner
+def _margins_later(problem, state, space, s, time):
+    """Margins of element s a time after its point, before it if negative, by extrapolation, into ``space.one``."""
+    move_point(space.point[0], time, space.point[1])
+    _margins_of(problem, state, s, space.point[1], space.one)
 
 
 @inner
 def _margin_at(known, theta):
     """A margin at θ of the step."""
     problem, state, space, h, s, j = known
-    if rubs(problem, s):
-        _slider_margins_at(problem, state, space, h, s, theta)
-    else:
-        delta, rate = polynomial(space.coefficients[0], theta), polynomial(space.coefficients[1], theta)
-        space.trial[0], space.trial[1] = delta, rate
-        margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.one)
+    _point_on_step(problem, state, space, h, s, theta)
+    _margins_of(problem, state, s, space.point[1], space.one)
     return space.one[j]
 
 
@@ -137,13 +155,8 @@ def _zero_between(known, a, b):
 def _extrapolated(known, time):
     """A margin at a time after the start of the step, before it if negative, extrapolated from there."""
     problem, state, space, _, s, j = known
-    if rubs(problem, s):
-        point_of(problem, s, state.now[T], state.x, state.rate, space.point[0])
-        move_point(space.point[0], time, space.point[1])
-        slider_margins(problem, s, state.segment[s], state.entry_rate[s], space.point[1], space.one)
-    else:
-        delta, rate = indentation_and_rate(problem, s, state.x)
-        margins_after(problem, state, s, delta, rate, time, space.trial, space.one)
+    _point_in(problem, s, state.now[T], state.x, state.rate, space.point[0])
+    _margins_later(problem, state, space, s, time)
     return space.one[j]
 
 
@@ -229,25 +242,16 @@ def border_ahead(problem, state, space, h):
 @inner
 def border_distance(problem, state, space, h, s, j):
     """(minus a margin, its rate, its rounding) at the end of the step of duration h just tried."""
-    delta, rate = _margins_now(problem, state, space, s, state.now[T] + h, space.x_new, space.rate_new)
-    time, present = _RATE_STEP * h, space.present[s, j]
-    if rubs(problem, s):
-        move_point(space.point[0], time, space.point[1])
-        slider_margins(problem, s, state.segment[s], state.entry_rate[s], space.point[1], space.one)
-        return -present, (present - space.one[j]) / time, space.rounding[s, j]
-    space.trial[0] = delta + time * dot(problem.read[problem.first[s]], space.rate_new, 2 * problem.k.size)
-    space.trial[1] = rate + time * acceleration_of(problem, s, space.x_new, space.rate_new)
-    margins(problem, state, s, 1, space.trial[0:1], space.trial[1:2], space.one)
-    return -present, (present - space.one[j]) / time, space.rounding[s, j]
+    _margins_now(problem, state, space, s, state.now[T] + h, space.x_new, space.rate_new)
+    _margins_later(problem, state, space, s, _RATE_STEP * h)
+    present = space.present[s, j]
+    return -present, (present - space.one[j]) / (_RATE_STEP * h), space.rounding[s, j]
 
 
 @inner
 def renew_border(problem, state, space, s, j):
     """Renew one border in the present state."""
-    if rubs(problem, s):
-        delta, rate = 0.0, 0.0  # not used by friction
-    else:
-        delta, rate = margins_in(problem, state, s, state.x, space.trial, space.margin)
+    delta, rate = indentation_and_rate(problem, s, state.x)
     renew(problem, state, s, j, delta, rate)
     count_event(state)
 
@@ -264,11 +268,7 @@ def renew_together(problem, state, space, h, element, border):
         if _has_no_borders(problem, state, s):
             continue
         delta, rate = _margins_now(problem, state, space, s, state.now[T], state.x, state.rate)
-        if rubs(problem, s):
-            move_point(space.point[0], -_SHORTLY * h, space.point[1])
-            slider_margins(problem, s, state.segment[s], state.entry_rate[s], space.point[1], space.one)
-        else:
-            margins_after(problem, state, s, delta, rate, -_SHORTLY * h, space.trial, space.one)
+        _margins_later(problem, state, space, s, -_SHORTLY * h)
         limit = space.at_start[s]
         for j in range(problem.border_count[s]):
             before, rounding, present = max(limit[j], space.one[j]), space.rounding[s, j], space.present[s, j]

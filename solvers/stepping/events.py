@@ -222,22 +222,20 @@ def nearer(h, distance, rate, before, beyond, longest):
     return middle if beyond < longest and before < middle < beyond else -1.0
 
 
-@inner
-def first_event(problem, x, dense, segment, coefficients):
-    """(θ, stop, direction ±1) of the earliest crossing of the step by any stop."""
-    theta, stop, direction = NONE, -1, 0
+@kernel
+def first_crossing(problem, state, space):
+    """(θ, stop, direction ±1, level) of the first border of a segment that the step crosses; θ as of `crossing`."""
+    theta, stop, direction, level = NONE, -1, 0, 0.0
     for s in range(problem.law.size):
-        motion_of(problem, s, x, dense, coefficients)
-        tolerance = surface_tolerance(problem, s, x)
-        radius = radius_of(problem, s)
-        found = crossing(coefficients, radius, problem.knots[s, segment[s]], 1.0, tolerance)
-        if found < theta:
-            theta, stop, direction = found, s, 1
-        if segment[s] > 0:
-            found = crossing(coefficients, radius, problem.knots[s, segment[s] - 1], -1.0, tolerance)
+        motion_of(problem, s, state.x, space.dense, space.coefficients)
+        tolerance, radius = surface_tolerance(problem, s, state.x), radius_of(problem, s)
+        above = state.segment[s]
+        for border in range(above, max(above - 2, -1), -1):  # the one above, and the one below if there is any
+            way, knot = 1 if border == above else -1, problem.knots[s, border]
+            found = crossing(space.coefficients, radius, knot, float(way), tolerance)
             if found < theta:
-                theta, stop, direction = found, s, -1
-    return theta, stop, direction
+                theta, stop, direction, level = found, s, way, knot
+    return theta, stop, direction, level
 
 
 @inner

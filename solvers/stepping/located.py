@@ -53,7 +53,6 @@ from solvers.stepping.events import (
     MOST_LANDINGS,
     NONE,
     delta_at,
-    first_event,
     golden_section,
     motion_of,
     nearer,
@@ -252,16 +251,6 @@ def before_step(problem, state, space, events):
     else:
         switched = switch_on_surface(problem, state, events == LOCATED)
     return SWITCHED if renew_crossed(problem, state, space) or switched else RUNNING
-
-
-@kernel
-def first_crossing(problem, state, space):
-    """(θ, stop, direction, level) of the first border of a segment that the step crosses; θ as of `first_event`."""
-    theta, stop, direction = first_event(problem, state.x, space.dense, state.segment, space.coefficients)
-    level = 0.0
-    if 0.0 <= theta < NONE:
-        level = problem.knots[stop, state.segment[stop] - (1 if direction < 0 else 0)]
-    return theta, stop, direction, level
 
 
 @kernel

@@ -43,10 +43,11 @@ from solvers.stepping.events import (
     Move,
     count_in_contact,
     entry_by_sign,
+    first_crossing,
 )
 from solvers.stepping.henon import hermite
 from solvers.stepping.henon import land as henon_landing
-from solvers.stepping.located import NEAR_END, SWITCHED, accept, before_step, first_crossing, first_kink, land
+from solvers.stepping.located import NEAR_END, SWITCHED, accept, before_step, first_kink, land
 from solvers.stepping.shared import shared
 
 _LEAST_STEP = 1e-290  # s: at t = 0 any step changes the time
@@ -67,13 +68,12 @@ class Space(NamedTuple):
     kinks: Annotated[Any, "int E"]  # of the laws inside a segment, see `stability.kinks_of`; used under error control
     margin: Annotated[Any, "nodes*B"]  # of an element's borders, row by row, B the most of any; see `borders`
     points: Annotated[Any, "2, nodes"]  # its δ and δ̇
-    trial: Annotated[Any, "2"]  # δ and δ̇ at one point
     one: Annotated[Any, "B"]  # margins of one element at one point
     scale: Annotated[Any, "E, 4"]  # rounding of δ and δ̇, ξ and ξ̇, m and m/s
     at_start: Annotated[Any, "E, B"]  # margins at the start of the step
     present: Annotated[Any, "E, B"]  # margins in the state evaluated last
     rounding: Annotated[Any, "E, B"]  # their rounding
-    point: Annotated[Any, "2, point"]  # motion of an element with friction, see `compiled.sliding`
+    point: Annotated[Any, "2, point"]  # motion of an element, see `compiled.sliding`, and the same moved
 
 
 SPACE = packed_type(Space)
