@@ -18,7 +18,7 @@ from solvers.problem import Array, Forcing, System, require_step
 from solvers.problem.run_arguments import check_maps
 from solvers.stepping.critical_step import eigen_oscillators
 from solvers.stepping.events import IGNORED, LOCATED
-from solvers.stepping.stability import Limit, Radius, largest_steps, with_tangents
+from solvers.stepping.stability import Limit, Radius, half_periods, largest_steps, with_tangents
 
 
 class ConstantStep(ABC):
@@ -77,11 +77,11 @@ class ConstantStep(ABC):
         flight, mode = self._shortest(system, *self.oscillators(system), duration)
         if not system.contacts:
             return Limit(flight, math.inf, mode, -1)
-        C, K, half_period = with_tangents(system, indentation)
-        if any(contact.always or contact.gap < 0.0 for contact in system.contacts) or duration == math.inf:
-            half_period = duration  # a preloaded contact may last for ever
-        decisive = self.critical(system.M, C, K, system.gyroscopic)
-        contact, contact_mode = self._shortest(system, *decisive, min(duration, half_period))
+        decisive = self.critical(system.M, *with_tangents(system, indentation), system.gyroscopic)
+        longest = duration  # of a contact: a preloaded one may last for ever
+        if not any(contact.always or contact.gap < 0.0 for contact in system.contacts) and duration < math.inf:
+            longest = min(duration, max(half_periods(system, indentation), default=0.0))
+        contact, contact_mode = self._shortest(system, *decisive, longest)
         return Limit(flight, contact, mode, contact_mode)
 
     def _shortest(self, system: System, k: Array, c: Array, duration: float) -> tuple[float, int]:

@@ -31,7 +31,7 @@ from solvers.problem.run_arguments import output_arrays
 from solvers.stepping.energy_gain import IN_A_ROW, NOW, STEPS_OF_GAIN, gains, largest_loads, negligible_energy, watched
 from solvers.stepping.events import HENON
 from solvers.stepping.loop import march_of, new_space
-from solvers.stepping.stability import kinks_of, shortest_contact
+from solvers.stepping.stability import half_periods, kinks_of
 
 
 def absolute_tolerance(method: Any, problem: Any, z: Array, fastest: float) -> float:
@@ -136,6 +136,6 @@ def explanation(method: Any, system: System, q: Array, q_dot: Array, duration: f
     if modal:
         where = f"mode {worst + 1} of {system.size} (ω = {math.sqrt(abs(system.K[worst, worst])):.6g} rad/s)"
     limit = method.stable_dt(system, duration=duration)
-    step = min(limit.flight, limit.contact, *method.steps, 0.1 * shortest_contact(system))
+    step = min(limit.flight, limit.contact, *method.steps, *(0.1 * half for half in half_periods(system, None)))
     grown = f"; it grew in {where}, steps {method.steps[0]:g} s in flight and {method.steps[1]:g} s in contact"
     return f"{grown}, predicted limits {limit.flight:.3g} s and {limit.contact:.3g} s: try {0.5 * step:.2g} s"

@@ -116,38 +116,29 @@ def _first_border(stable: Callable[[Array, Any], Any], modes: Any, fastest: Arra
     return border
 
 
-def with_tangents(system: System, indentation: float | None) -> tuple[Any, Any, float]:
-    """C and K with every stop's tangent, and the half period of the slowest contact, s."""
-    C, K, longest = system.C, system.K, 0.0
-    for contact, (stiffness, damping, mass) in zip(system.contacts, tangents(system, indentation), strict=True):
-        if system.sparse:
-            from scipy.sparse import csc_array
+def with_tangents(system: System, indentation: float | None) -> tuple[Any, Any]:
+    """C and K with every stop's tangent."""
+    from scipy.sparse import csc_array
 
-            column = csc_array(contact.direction[:, None])
-            outer: Any = column @ column.T
-        else:
-            outer = np.outer(contact.direction, contact.direction)
+    C, K = system.C, system.K
+    for contact, (stiffness, damping, _) in zip(system.contacts, tangents(system, indentation), strict=True):
+        column = contact.direction[:, None]
+        column = csc_array(column) if system.sparse else column
+        outer = column @ column.T
         C, K = C + damping * outer, K + stiffness * outer
-        if stiffness > 0.0:
-            longest = max(longest, math.pi * math.sqrt(mass / stiffness))
-    return C, K, longest
+    return C, K
 
 
-def shortest_contact(system: System) -> float:
-    """Half a period on the stiffest stop's tangent, hit at 1 m/s; inf without stops."""
-    found = tangents(system, None)
-    return min(
-        (math.pi * math.sqrt(mass / stiffness) for stiffness, _, mass in found if stiffness > 0.0), default=math.inf
-    )
+def half_periods(system: System, indentation: float | None) -> list[float]:
+    """Half a period, s, on the tangent of every stop that has a stiffness."""
+    found = tangents(system, indentation)
+    return [math.pi * math.sqrt(mass / stiffness) for stiffness, _, mass in found if stiffness > 0.0]
 
 
 def tangents(system: System, indentation: float | None) -> list[tuple[float, float, float]]:
     """The `tangent` of every stop; computed once per system."""
     key = "tangents", indentation
-    found: list[tuple[float, float, float]] = system.kept.get(
-        key, lambda: [tangent(system, contact, indentation) for contact in system.contacts]
-    )
-    return found
+    return system.kept.get(key, lambda: [tangent(system, contact, indentation) for contact in system.contacts])
 
 
 def tangent(system: System, contact: Contact, indentation: float | None) -> tuple[float, float, float]:
@@ -201,8 +192,7 @@ def is_dissipative(law: Any) -> bool:
 
 def kinks_of(system: System) -> list[int]:
     """Per stop: 1 where the law is cut at zero while δ > 0, plus 2 where it bends at δ̇ = 0."""
-    found: list[int] = system.about_laws.get("kinks", lambda: [_kinks(contact.law) for contact in system.contacts])
-    return found
+    return system.about_laws.get("kinks", lambda: [_kinks(contact.law) for contact in system.contacts])
 
 
 def _kinks(law: Any) -> int:
