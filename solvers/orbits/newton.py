@@ -47,28 +47,28 @@ def newton(
     parameter] move at right angles to it from the guess. ``slope`` asks for derivatives by the parameter; ``most`` is
     the number of iterations allowed. Raises OrbitError.
     """
-    unknowns = guess = np.append(x.ravel(), parameter)
-    measure = _Measure(problem)
-    chain, error = _fire(problem, unknowns, measure, row is not None)
+    guess, measure = np.append(x.ravel(), parameter), _Measure(problem)
+    chain, error = _fire(problem, guess, measure, row is not None)
+    if chain is None:
+        raise OrbitError("the motion from the start cannot be integrated over one period")
     history = [error]
     while not error <= TOLERANCE and len(history) <= most:
-        step = _step(chain, unknowns - guess, row)
+        step = _step(chain, chain.unknowns - guess, row)
         for halving in range(_MOST_HALVINGS if most > 10 else 2):
             wanted = row is not None or (slope and error < _NEARLY)
-            moved = _with_zeros(problem, chain, unknowns + 0.5**halving * step)
+            moved = _with_zeros(problem, chain, chain.unknowns + 0.5**halving * step)
             trial, trial_error = _fire(problem, moved, measure, wanted)
             if trial_error < error:
                 break
         else:
             break
-        unknowns, chain, error = trial.unknowns, trial, trial_error
+        chain, error = trial, trial_error
         history.append(error)
     if error <= TOLERANCE:
         chain, error = _with_exact_zeros(problem, chain, error, measure)
-        unknowns = chain.unknowns
-    enough = _ROUGH if chain is not None and chain.coordinates < x.shape[1] else TOLERANCE
+    enough = _ROUGH if chain.coordinates < x.shape[1] else TOLERANCE
     if error <= enough and slope and not chain.has_slope:
-        chain, error = _fire(problem, unknowns, measure, True)
+        chain, error = _fire(problem, chain.unknowns, measure, True)
     if not error <= enough:
         raise OrbitError(
             f"{len(history)} iterations of Newton's method reduced the residual from {history[0]:.3g} to {error:.3g} "
@@ -167,10 +167,8 @@ def _with_ends(chain: Chain) -> Array:
     return x
 
 
-def _step(chain: Chain | None, moved: Array, row: Array | None) -> Array:
+def _step(chain: Chain, moved: Array, row: Array | None) -> Array:
     """Newton's step of all unknowns."""
-    if chain is None:
-        raise OrbitError("the motion from the start cannot be integrated over one period")
     matrix: Any = chain.jacobian()
     right = -chain.residual.ravel()
     try:
