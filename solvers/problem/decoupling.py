@@ -36,7 +36,7 @@ def decouple(M: Array, C: Array, K: Array, G: Array | None) -> Blocks:
     else:
         phi, k = _modes(M, K)
     G = np.zeros((n, n)) if G is None else G
-    damping, turning = phi.T @ C @ phi, phi.T @ G @ phi
+    damping, turning = phi.T @ C @ phi, phi.T @ G @ phi if np.any(G) else G
     spread = damping - np.diag(np.diag(damping))
     if not np.any(G) and np.abs(spread).max(initial=0.0) <= 1e-12 * np.abs(damping).max(initial=0.0):
         zero = np.zeros((n, n))
