@@ -87,6 +87,11 @@ class Rayleigh:
     ------
     ValueError : negative or not finite.
 
+    Notes
+    -----
+    Ratios ζ₁ at ω₁ and ζ₂ at ω₂ ask for β = 2 (ζ₂ω₂ - ζ₁ω₁)/(ω₂² - ω₁²) and α = 2 ζ₁ω₁ - β ω₁². Between the two ζ is
+    smaller, above ω₂ it grows with ω: static shapes, which are modes of high frequency, are damped strongly.
+
     Examples
     --------
     >>> Rayleigh(alpha=1.0, beta=0.25).ratios([2.0])
