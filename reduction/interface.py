@@ -198,6 +198,23 @@ def static_shapes(M: Matrix, K: Matrix, B: Vector, rigid: Vector, root: Matrix |
     """Elastic shapes ψ (N, m) under unit loads B, balanced by inertia on the rigid-body modes (N, r).
 
     K ψ = B - M R RᵀB,    RᵀM ψ = 0        (solved with its constraint, refined through the root)
+
+    Parameters
+    ----------
+    M, K : (N, N) as for `modal_basis`.
+    B : (N, m) unit loads, a column each.
+    rigid : R (N, r), all rigid-body modes, RᵀM R = 1; r = 0 for a structure that is held.
+    root : (k, N) with rootᵀ root = K, optional: full accuracy on fine meshes.
+
+    Raises
+    ------
+    ValueError : a motion that nothing resists is not among the rigid-body modes.
+
+    Examples
+    --------
+    >>> K = np.array([[2.0, -1.0], [-1.0, 1.0]])
+    >>> static_shapes(np.eye(2), K, np.array([[0.0], [1.0]]), np.zeros((2, 0))).round(12).tolist()
+    [[1.0], [2.0]]
     """
     r, inertia = rigid.shape[1], M @ rigid
     try:

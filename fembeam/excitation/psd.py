@@ -21,8 +21,12 @@ class RollOff:
 
     Parameters
     ----------
-    level : density at ω = 0, units² per rad/s.
-    corner : rad/s, where half of the power is left.
+    level : density at ω = 0, units² per rad/s, ≥ 0.
+    corner : rad/s, > 0, where half of the density is left.
+
+    Raises
+    ------
+    ValueError : a number that is not finite or out of range.
 
     Examples
     --------
