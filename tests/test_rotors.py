@@ -206,6 +206,18 @@ def test_a_response_is_linear_in_its_unbalance():
         np.testing.assert_allclose(found.displacement("B", way), expected, atol=1e-6 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("path", ["forces[0].phase", "forces[2].direction[0]"])
+def test_a_derivative_by_a_phase_or_direction_of_a_load_that_is_zero(path):
+    """Steps from 0 went by the modes, which these leave alone, up to 1e6 rad: of the phase 1e-6 of it was found."""
+    beside = fb.PointForce("B", fb.Harmonic(3.0, 170.0), direction=(0.0, 1.0, 0.0))
+    scene = rotor(200.0, forces=[fb.Unbalance("B", 1e-3), beside])
+    found = scene.reduce(2).simulate(0.1, 1e-3).sensitivity(path)
+    near = [with_value(scene, path, h).reduce(2).simulate(0.1, 1e-3) for h in (1e-4, -1e-4)]
+    for way in "xy":
+        expected = (near[0].displacement("B", way) - near[1].displacement("B", way)) / 2e-4
+        np.testing.assert_allclose(found.displacement("B", way), expected, atol=1e-5 * np.abs(expected).max() + 1e-14)
+
+
 def test_the_static_share_of_an_unbalance_is_that_of_a_force_along_each_axis():
     beside = [fb.PointForce("B", fb.Harmonic(1.0, 9.0), direction=way) for way in ("x", "y")]
     shares = rotor(forces=[fb.Unbalance("B", 1e-3), *beside]).reduce(4).static_share

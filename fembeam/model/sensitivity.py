@@ -288,12 +288,13 @@ class _Varied:
         return 0.1 * step if step > FIRST else step
 
     def _change(self, there: Model, step: float) -> float:
-        """Largest relative change of frequencies, shapes or damping by a step from zero."""
+        """Largest relative change of frequencies, shapes, damping or places of loads by a step from zero."""
         here = self.model
         require(len(there.system.loads) == len(here.system.loads), "it must not bring a load that is not there yet",
                 step, self.called, "begin from a small value, such as gravity=1e-6")  # fmt: skip
         self._check_size(there)
-        pairs = (here.omega**2, there.omega**2), (here.directions, there.directions), (here.zeta, there.zeta)
+        vectors = [np.array([vector for vector, _ in one.system.loads]) for one in (here, there)]
+        pairs = [(here.omega**2, there.omega**2), (here.directions, there.directions), (here.zeta, there.zeta), vectors]
         sizes = [(np.abs(b - a).max(initial=0.0), np.abs(a).max(initial=0.0)) for a, b in pairs]
         return max(0.0 if change == 0.0 else change / size if size > 0.0 else np.inf for change, size in sizes)
 

@@ -18,7 +18,7 @@ PLACES = {"forces": "signal", "springs": "foot"}  # lists of a scene whose entri
 _PATH = re.compile(
     r"(bodies\[\d+\]\.)*(base|supports\[\d+\]\.motion|"
     + "|".join(rf"{n}\[\d+\]\.{key}" for n, key in PLACES.items())
-    + r")\b"
+    + r"|forces\[\d+\]\.(moment|phase))\b"  # of an unbalance, which makes its signal of them
 )
 
 
@@ -100,7 +100,7 @@ def for_duration(signal: Any, duration: float) -> Any:
 
 
 def is_of_signal(path: str) -> bool:
-    """Whether the path of a parameter leads into a signal.
+    """Whether the path of a parameter leads into a signal, or to what an unbalance makes its signal of.
 
     Examples
     --------
