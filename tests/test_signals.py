@@ -28,7 +28,7 @@ from fembeam.study.realisations import realisation
 from fembeam.study.segments import Segments
 
 PLAIN = {  # annotations of what is no signal
-    *("float", "str", "str | None", "float | tuple[float, float, float]", "tuple[str, ...]"),
+    *("float", "str", "str | None", "float | tuple[float, ...]", "tuple[str, ...]"),
     *("Of", "Place", "Second | None", "Direction | None", "float | Sequence[float]", "bool", "float | None"),
     *("tuple[float, float]", "tuple[Direction, Direction] | None"),
     "float | tuple[float, float, float] | tuple[tuple[float, ...], ...]",
