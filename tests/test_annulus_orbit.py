@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 
 import fembeam as fb
 from contacts import KelvinVoigt
-from solvers import Contact, DormandPrince, System, branch, integrate, orbit
+from solvers import Contact, DormandPrince, OrbitError, System, branch, integrate, orbit
 
 MASS, DAMPING, STIFFNESS, WALL, CLEARANCE, ECCENTRICITY = 2.0, 60.0, 8e4, 3e5, 2e-4, 1e-4
 PLANE = np.eye(2)
@@ -115,6 +115,9 @@ def test_random_starts_whose_runs_are_refused_are_left_out():
     drive = [fb.PointForce("D", fb.Harmonic(60.0, 150.0), direction="x"),
              fb.PointForce("D", fb.Harmonic(24.0, 150.0, 1.0), direction="y")]  # fmt: skip
     model = fb.Scene(body, stops=[hole], forces=drive).reduce(modes=2)
-    with pytest.warns(UserWarning, match="1 of 3 starts are left out, whose runs are refused: .* half a turn"):
+    with pytest.warns(UserWarning, match="1 of 3 starts are left out, whose runs are refused: .* half a turn") as told:
         (found,) = model.attractors(starts=3)
     assert (found.name, found.count) == ("period 1 with 2 impacts", 2)
+    assert told[0].filename == __file__
+    with pytest.raises(OrbitError, match=r"^\d+ starts settled to period 1 with 2 impacts, none to period 3"):
+        model.orbit(period=3)  # that warned, of a line inside the package

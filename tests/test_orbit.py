@@ -43,7 +43,7 @@ def test_subharmonics_from_nothing_and_their_names(model, monkeypatch):
     bars = []
 
     def counting(wanted, *items, **options):
-        bars.append((wanted, *map(len, items)))
+        bars.append((wanted, options["total"]))
         return tqdm(*items, disable=True, **options)
 
     monkeypatch.setattr("fembeam.model.orbit.counting", counting)
@@ -61,6 +61,14 @@ def test_subharmonics_from_nothing_and_their_names(model, monkeypatch):
     assert "3 shot(s)" in str(error.value.__cause__)
     with pytest.raises(solvers.OrbitError, match="Newton's method went to one of period 1"):
         model.orbit(period=2, start=model.orbit())
+
+
+def test_bad_numbers_of_a_search_for_attractors_are_refused(model):
+    """With longest=0 all motion was "not periodic"; 3.0 starts failed inside."""
+    for name in ("longest", "starts"):
+        for value in (0, -1, 3.0, True, None):
+            with pytest.raises(ValueError, match=rf"{name} must be a .*, got {value} in Model.attractors; ask for"):
+                model.attractors(**{"starts": 1, name: value})
 
 
 def test_a_search_from_nothing_tells_how_far_it_is(monkeypatch):

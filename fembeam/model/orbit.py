@@ -23,7 +23,7 @@ from fembeam.model.equations import load_period
 from fembeam.model.extremes import extremes_of
 from fembeam.response import PlacedLog
 from fembeam.scene import signals_of, with_signals
-from fembeam.support import Part, Printed, counting, is_whole, require
+from fembeam.support import Part, Printed, counting, is_whole, numbers, require
 from solvers import orbits
 from solvers.problem import counted
 from solvers.problem.whole_runs import whole_runs
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 SAME = 1e-6  # relative distance below which two states are one
+LONGEST = 8  # periods of the load of an attractor that is looked for
+WHERE = "Model.attractors"
 STARTS = 12  # settled where shooting from rest finds nothing
 LONGEST_REASON = 120  # characters of why shooting failed; the rest is in the error this one came from
 
@@ -224,7 +226,7 @@ def _from_rest(model: Model, count: int, T: float, shots: int | None, tried: Cal
     except solvers.OrbitError as error:
         refused = error
     tried()
-    found = attractors(model, starts=STARTS, tried=tried)
+    found, left_out = _settled(model, _drawn(model, STARTS, 0), LONGEST, 1, tried)
     for attractor in found:
         if attractor.orbit is not None and attractor.period == count:
             return attractor.orbit
@@ -235,7 +237,7 @@ def _from_rest(model: Model, count: int, T: float, shots: int | None, tried: Cal
             )
     names = ", ".join(sorted({a.name for a in found}))
     raise solvers.OrbitError(
-        f"{STARTS} starts settled to {names}, none to period {count}; shooting after a run from rest: "
+        f"{STARTS - len(left_out)} starts settled to {names}, none to period {count}; shooting after a run from rest: "
         + shorten(str(refused), LONGEST_REASON, placeholder=" …")
     ) from refused
 
@@ -269,54 +271,74 @@ class Attractor:
 def attractors(
     model: Model,
     starts: int | Sequence[ArrayLike] = 12,
-    longest: int = 8,
+    longest: int = LONGEST,
     seed: int = 0,
-    tried: Callable[[], Any] = lambda: None,
     progress: bool = False,
 ) -> list[Attractor]:
-    """See `Model.attractors`; ``tried`` is called after each start."""
-    T = load_period(model.scene)
-    method = solvers.Exponential(1e-8, ledger=False)
-    found: list[Attractor] = []
-    refused: list[str] = []
-    for number, start in enumerate(counting(progress, _starts(model, T, starts, seed), unit=" starts")):
-        try:
-            state, orbit = _settle(model, T, start, longest, method)
-        except solvers.SolverError as error:
-            if number == 0 or not is_whole(starts):  # rest, or asked for
-                raise
-            refused.append(str(error))
-            tried()
-            continue
-        for i, known in enumerate(found):
-            if _same(known.orbit, orbit, T):
-                found[i] = replace(known, count=known.count + 1)
-                break
-        else:
-            found.append(Attractor(orbit, 1, state))
-        tried()
+    """See `Model.attractors`."""
+    require(is_whole(longest) and longest > 0, "longest must be a whole number of periods above 0", longest, WHERE,
+            "ask for 8")  # fmt: skip
+    states = _drawn(model, starts, seed) if is_whole(starts) else _given(model, starts)
+    with counting(progress, total=len(states), unit=" starts") as bar:
+        found, refused = _settled(model, states, longest, 1 if is_whole(starts) else len(states), bar.update)
     if refused:
         warnings.warn(f"{len(refused)} of {starts} starts are left out, whose runs are refused: {refused[0]}",
                       UserWarning, stacklevel=3)  # fmt: skip
-    return sorted(found, key=lambda a: -a.count)
+    return found
 
 
-def _starts(model: Model, T: float, starts: int | Sequence[ArrayLike], seed: int) -> list[Vector]:
-    """Rest and random states of the size the motion from rest has, or the given ones, checked."""
-    n = len(model.omega)
-    if not isinstance(starts, (int, np.integer)):
-        states = [np.asarray(state, dtype=float) for state in starts]
-        for state in states:
-            require(state.shape == (2 * n,), f"each start must have shape ({2 * n},)", state.shape, "attractors",
-                    "use model.state(displacement, velocity)")  # fmt: skip
-        return states
-    require(starts >= 1, "starts must be a count above 0 or a list of states", starts, "attractors", "ask for 12")
+def _settled(
+    model: Model, states: Sequence[Vector], longest: int, asked: int, tried: Callable[[], Any]
+) -> tuple[list[Attractor], list[str]]:
+    """What starts come to, and why the runs of others than the first ``asked`` are refused; those raise.
+
+    ``tried`` is called after each start.
+    """
+    T, method = load_period(model.scene), solvers.Exponential(1e-8, ledger=False)
+    found: list[Attractor] = []
+    refused: list[str] = []
+    for number, start in enumerate(states):
+        try:
+            state, orbit = _settle(model, T, start, longest, method)
+        except solvers.SolverError as error:
+            if number < asked:
+                raise
+            refused.append(str(error))
+        else:
+            _add(found, Attractor(orbit, 1, state), T)
+        tried()
+    return sorted(found, key=lambda a: -a.count), refused
+
+
+def _add(found: list[Attractor], one: Attractor, T: float) -> None:
+    """Count an attractor as one of those known, else know it."""
+    for i, known in enumerate(found):
+        if _same(known.orbit, one.orbit, T):
+            found[i] = replace(known, count=known.count + 1)
+            return
+    found.append(one)
+
+
+def _given(model: Model, starts: Any) -> list[Vector]:
+    """Given starts, checked."""
+    shape, advice = (2 * len(model.omega),), "use model.state(displacement, velocity)"
+    require(np.iterable(starts), "starts must be a count above 0 or a list of states", starts, WHERE, "ask for 12")
+    states = [numbers("starts", state, WHERE, advice) for state in starts]
+    for state in states:
+        require(state.shape == shape, f"each start must have shape {shape}", state.shape, WHERE, advice)
+    return states
+
+
+def _drawn(model: Model, count: int, seed: int) -> list[Vector]:
+    """Rest, and random states of the size that the motion from rest has."""
+    require(count >= 1, "starts must be a count above 0 or a list of states", count, WHERE, "ask for 12")
+    n, T = len(model.omega), load_period(model.scene)
     method = solvers.Exponential(1e-6, ledger=False)
     with whole_runs():
         run = solvers.integrate(model.system, np.zeros(n), np.zeros(n), 20.0 * T, T / 16.0, method)
     size = np.concatenate((np.abs(run.q).max(axis=0), np.abs(run.q_dot).max(axis=0)))
     rng = np.random.default_rng(seed)
-    return [np.zeros(2 * n), *(2.0 * size * rng.normal(size=2 * n) for _ in range(starts - 1))]
+    return [np.zeros(2 * n), *(2.0 * size * rng.normal(size=2 * n) for _ in range(count - 1))]
 
 
 def _settle(model: Model, T: float, start: Vector, longest: int, method: Any) -> tuple[Vector, Orbit | None]:
