@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fembeam.support import Block, Card, abaqus_blocks, check_abaqus, nastran_cards, real, require
+from fembeam.support import Block, Card, abaqus_blocks, check_abaqus, nastran_cards, real, require, warn
 
 Key = tuple[bool, int]  # whether of the assembly itself, and the number
 
@@ -70,8 +69,8 @@ def _warn_of_passed(names: list[str], path: Path) -> None:
     """Warn of what joins nodes or has mass, but is no line: how many of each there are."""
     if names:
         said = ", ".join(f"{count} {name}" for name, count in sorted(Counter(names).items()))
-        warnings.warn(f"{said} in {path} are passed over: what they hold, join or weigh is not in the mesh; say it in "
-                      "the scene", UserWarning, stacklevel=6)  # fmt: skip
+        warn(f"{said} in {path} are passed over: what they hold, join or weigh is not in the mesh; say it in "
+             "the scene")  # fmt: skip
 
 
 def _warn_of_pinned(kinds: list[str], path: Path) -> None:
@@ -79,8 +78,8 @@ def _warn_of_pinned(kinds: list[str], path: Path) -> None:
     names = [name for name in kinds if name.startswith(PINNED)]
     if names:
         said = ", ".join(f"{count} {name}" for name, count in sorted(Counter(names).items()))
-        warnings.warn(f"{said} in {path}, pinned at their ends, are read as rigidly joined beams; a Member has "
-                      "release= for what an end does not carry", UserWarning, stacklevel=6)  # fmt: skip
+        warn(f"{said} in {path}, pinned at their ends, are read as rigidly joined beams; a Member has "
+             "release= for what an end does not carry")  # fmt: skip
 
 
 def abaqus_mesh(path: Path) -> Any:

@@ -7,7 +7,6 @@ are made anew, as few as the modes need, so that a file's element size changes n
 from __future__ import annotations
 
 import os
-import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout
@@ -24,7 +23,7 @@ from fembeam.beams.beam import Beam
 from fembeam.beams.mesh import SHORTEST, divided
 from fembeam.beams.mesh_cards import abaqus_mesh, nastran_mesh
 from fembeam.beams.section import Section, Taper
-from fembeam.support import is_whole, require, written_beside
+from fembeam.support import is_whole, require, warn, written_beside
 
 Vector = NDArray[np.float64]
 Names = list[set[str]]
@@ -256,9 +255,8 @@ def _warn_of_size(chain: Vector, where: str) -> None:
     if lengths.min() < SHORTEST * total:
         place = chain[int(np.argmin(lengths))] - chain[0]
         size = f"{lengths.min():.3g} m at z = {place:.6g} m"
-        warnings.warn(f"elements of {where} are far too fine: {size}, below "
-                      f"{SHORTEST:g} of the length; a section that changes there is refused",
-                      UserWarning, stacklevel=4)  # fmt: skip
+        warn(f"elements of {where} are far too fine: {size}, below "
+             f"{SHORTEST:g} of the length; a section that changes there is refused")  # fmt: skip
 
 
 def named_nodes(mesh: Any) -> Iterator[tuple[str, int]]:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-import warnings
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.support import frozen, is_pair, is_whole, numbers
+from fembeam.support import frozen, is_pair, is_whole, numbers, warn
 
 Vector = NDArray[np.float64]
 FEWEST_SAMPLES = 8
@@ -102,9 +101,8 @@ def read_rows(path: Path, columns: tuple[int, int]) -> Vector:
 def padded(y: Vector, more: int) -> Vector:
     """The samples with zeros behind them."""
     if more and abs(y[-1]) > JUMP * np.abs(y).max():
-        warnings.warn(f"Record ends at {y[-1]:.3g}, its largest value is {np.abs(y).max():.3g}: padding with zeros "
-                      "lets it jump; let it end at zero, or remove its offset (detrend)",
-                      UserWarning, stacklevel=5)  # fmt: skip
+        warn(f"Record ends at {y[-1]:.3g}, its largest value is {np.abs(y).max():.3g}: padding with zeros "
+             "lets it jump; let it end at zero, or remove its offset (detrend)")  # fmt: skip
     return np.concatenate((y, np.zeros(more)))
 
 

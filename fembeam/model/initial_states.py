@@ -5,7 +5,6 @@ q = Φᵀ M u,    K q = f + Σ w_s F_s(-w_s·q - gap_s)
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -27,7 +26,7 @@ from fembeam.scene import (
     tangent,
 )
 from fembeam.scene.signal_checks import require_array_function
-from fembeam.support import numbers, require, require_finite
+from fembeam.support import numbers, require, require_finite, warn
 
 if TYPE_CHECKING:
     from fembeam.model.equations import ModalEquations
@@ -67,8 +66,8 @@ def state(model: Model, displacement: Field | Sequence[Field], velocity: Field |
         start[part] += model.basis.project(model.matrices.M @ full)
         lost = _missed(model, full)
         if lost > MISSED:
-            warnings.warn(f"{lost:.1%} of the {name} (mass norm) in Model.state is not represented by the kept modes; "
-                          "keep more modes", UserWarning, stacklevel=3)  # fmt: skip
+            warn(f"{lost:.1%} of the {name} (mass norm) in Model.state is not represented by the kept modes; "
+                 "keep more modes")  # fmt: skip
     _check_impactors(model, start[:n])
     return start
 
@@ -93,12 +92,10 @@ def warn_of_entries(model: Model, start: ArrayLike) -> None:
         with np.errstate(divide="ignore", invalid="ignore"):  # at the centre of a post, which is refused
             rate = abs(model.system.contacts[s].motion(q, q_dot)[1])
         if rate > 0.0:
-            warnings.warn(
+            warn(
                 f"{model.contact_rows[s].name} is in contact at the start, and its law goes by the rate at which the "
                 f"contact was entered, which a start does not hold: it is taken as that of now, {rate:.3g} m/s; of a "
-                "run that goes on from another one, end that one where this stop is open",
-                UserWarning,
-                stacklevel=3,
+                "run that goes on from another one, end that one where this stop is open"
             )
 
 

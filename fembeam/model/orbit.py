@@ -7,7 +7,6 @@ k = 2 is a 1/2 subharmonic.
 from __future__ import annotations
 
 import math
-import warnings
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -23,7 +22,7 @@ from fembeam.model.equations import load_period
 from fembeam.model.extremes import extremes_of
 from fembeam.response import PlacedLog
 from fembeam.scene import signals_of, with_signals
-from fembeam.support import Part, Printed, counting, is_whole, numbers, require
+from fembeam.support import Part, Printed, counting, is_whole, numbers, require, warn
 from solvers import orbits
 from solvers.problem import counted
 from solvers.problem.whole_runs import whole_runs
@@ -282,8 +281,7 @@ def attractors(
     with counting(progress, total=len(states), unit=" starts") as bar:
         found, refused = _settled(model, states, longest, 1 if is_whole(starts) else len(states), bar.update)
     if refused:
-        warnings.warn(f"{len(refused)} of {starts} starts are left out, whose runs are refused: {refused[0]}",
-                      UserWarning, stacklevel=3)  # fmt: skip
+        warn(f"{len(refused)} of {starts} starts are left out, whose runs are refused: {refused[0]}")
     return found
 
 

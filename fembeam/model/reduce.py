@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -29,7 +28,7 @@ from fembeam.scene import (
 )
 from fembeam.scene.rigid_motions import carried_away
 from fembeam.structures import COMPONENTS
-from fembeam.support import is_finite, is_whole, require
+from fembeam.support import is_finite, is_whole, require, warn
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -246,7 +245,7 @@ def _warn_of_drift(scene: Scene, bodies: list[_Reduced]) -> None:
         acting = [*part.stops, *(one for one in scene.acting if number and (one.coordinate.to or (0,))[0] == number)]
         free = body.matrices.named and not part.elements and sum(len(one.coordinates) for one in acting) < 2
         if free and count and loads:
-            warnings.warn(carried_away(count, number, "structure"), UserWarning, stacklevel=4)
+            warn(carried_away(count, number, "structure"))
 
 
 def _warn_of_still_places(model: Model) -> None:
@@ -256,7 +255,7 @@ def _warn_of_still_places(model: Model) -> None:
     if still:
         named = ", ".join(repr(name) for name in still)
         said = f"no mode kept moves the place of {named}: nothing happens there; keep more modes, or residual=True"
-        warnings.warn(said, UserWarning, stacklevel=4)
+        warn(said)
 
 
 def _warn_of_cut_pairs(beam: Matrices, omega: Vector, chosen: tuple[int, ...], of: str) -> None:
@@ -271,7 +270,7 @@ def _warn_of_cut_pairs(beam: Matrices, omega: Vector, chosen: tuple[int, ...], o
         what = "which whirl together" if beam.gyroscopic is not None else "that move across each other"
         cut = f"{counted(len(chosen), 'mode')}{of} cut{'s' * (len(chosen) == 1)} a pair of one frequency"
         said = f"{cut}, {omega[i]:.6g} rad/s, {what}; ask for one more"
-        warnings.warn(said, UserWarning, stacklevel=6)
+        warn(said)
         return
 
 
@@ -286,7 +285,7 @@ def _warn_of_the_mesh(matrices: Matrices, omega: float) -> None:
     for found, trouble in troubles:
         if found:
             advice = "leave them out: as few as the modes need are made"
-            warnings.warn(f"elements are {trouble}; {advice}", UserWarning, stacklevel=4)
+            warn(f"elements are {trouble}; {advice}")
 
 
 def _chosen(

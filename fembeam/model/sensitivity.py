@@ -10,7 +10,6 @@ formulas of the parameter; the motion is not: its derivative solves the variatio
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -25,7 +24,7 @@ from fembeam.model.extremes import of_top, time_of_top
 from fembeam.response import PlacedLog, directed
 from fembeam.scene import called, changes_structure, path_of, replaced, value_of
 from fembeam.scene.signals import is_of_signal
-from fembeam.support import Part, Printed, bar, by_rows, numbers, require
+from fembeam.support import Part, Printed, bar, by_rows, numbers, require, warn
 from solvers.orbits import codes, counts, delayed
 from solvers.problem import counted, dataframe
 from solvers.problem.friction import told_rates
@@ -399,11 +398,9 @@ def _direction(model: Model, start: Any) -> Vector:
 def _warned(found: Sensitivity) -> Sensitivity:
     """With a warning where the motion forgets its start too fast."""
     if found.growth > CHAOS:
-        warnings.warn(
+        warn(
             f"small changes of the start grow by {found.growth:.3g} to the end of the run: errors grow so too, and the "
-            "derivative holds for changes of the parameter so much smaller; shorten the run, or ask for statistics",
-            UserWarning,
-            stacklevel=4,
+            "derivative holds for changes of the parameter so much smaller; shorten the run, or ask for statistics"
         )
     return found
 

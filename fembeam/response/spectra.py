@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.scene import turns_at
-from fembeam.support import numbers, require, vector
+from fembeam.support import numbers, require, vector, warn
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -138,11 +138,8 @@ def floor_spectrum(
     lengths = run.contacts.t_out - run.contacts.t_in
     shortest, step = float(np.nanmin(lengths, initial=np.inf)), float(run.t[1] - run.t[0])
     if shortest < FEW * step:
-        import warnings
-
-        warnings.warn(f"contacts of {shortest:.2g} s are not resolved by samples {step:.2g} s apart: their "
-                      f"acceleration is missed or counted too long; simulate with dt below {shortest / FEW:.2g}",
-                      UserWarning, stacklevel=3)  # fmt: skip
+        warn(f"contacts of {shortest:.2g} s are not resolved by samples {step:.2g} s apart: their "
+             f"acceleration is missed or counted too long; simulate with dt below {shortest / FEW:.2g}")  # fmt: skip
     found = response_spectrum(run.t, run.acceleration(z, body, absolute=True), omega, zeta, **options)
     return replace(found, unit="rad") if turns_at(z) else found
 

@@ -6,7 +6,6 @@ u_all = S u: zero where supports hold, static (Guyan) where there is no mass.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -34,7 +33,7 @@ from fembeam.structures import (
     rows_along,
     translations_of,
 )
-from fembeam.support import require
+from fembeam.support import require, warn
 
 if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
@@ -176,8 +175,8 @@ def _warn_of_massless(scene: Scene, matrices: BodyMatrices) -> None:
             rows = [rows_along(scene.beam, matrices.assembled, part.z, place.along) for place in part.coordinates]
             if hit := bare & {dof for row in rows for dof in row.indices.tolist()}:
                 label = matrices.assembled.labels[min(hit)]
-                warnings.warn(f"{name}[{index}] acts on {label}, a dof without mass that follows the others: its own "
-                              "compliance is left out; give the place a mass", UserWarning, stacklevel=5)  # fmt: skip
+                warn(f"{name}[{index}] acts on {label}, a dof without mass that follows the others: its own "
+                     "compliance is left out; give the place a mass")  # fmt: skip
 
 
 def _made(scene: Scene, elements: int | None, modes: int | None, places: tuple[Any, ...]) -> Assembled:

@@ -27,7 +27,7 @@ from fembeam.scene.rotors import Disk, Unbalance, driven
 from fembeam.scene.signal_checks import require_motion
 from fembeam.scene.signals import support_motion
 from fembeam.structures import COMPONENTS, Joint, translations_of
-from fembeam.support import in_mm, is_finite, require, require_finite, require_non_negative, require_positive
+from fembeam.support import in_mm, is_finite, require, require_finite, require_non_negative, require_positive, warn
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -151,7 +151,7 @@ class Scene:
             self._check_conflicts()
             self._check_places_of_acting()
         for said in self.doubts:
-            warnings.warn(said, UserWarning, stacklevel=3)
+            warn(said)
 
     def matrices(self, elements: int | None = None, modes: int | None = None, probes: Sequence[float] = ()) -> Matrices:
         """Sparse M, C, K on the free dofs of a Hermite mesh with a node on every feature and probe.

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
@@ -25,7 +24,7 @@ from fembeam.study.execution.checkpoint import Checkpoint, Values, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.realisations import Seed, child, noises, realisation, seed_key
 from fembeam.study.result import Result
-from fembeam.support import Part, is_whole, note, number, require
+from fembeam.support import Part, is_whole, note, number, require, warn
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -191,7 +190,7 @@ def ensemble(
     if found.failures:
         first = found.failures[0]
         message = f"{len(found.failures)} of {count} realisations failed; seed {seed_key(first.seed)}: {first.reason}"
-        warnings.warn(message, UserWarning, stacklevel=2)
+        warn(message)
     return found
 
 

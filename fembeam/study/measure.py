@@ -12,7 +12,6 @@ Three kinds of run give them:
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, replace
@@ -33,7 +32,7 @@ from fembeam.study.execution.checkpoint import Checkpoint, digested, scene_ident
 from fembeam.study.execution.executors import spread
 from fembeam.study.quantities import Quantity, label
 from fembeam.study.realisations import child, renewed, seed_key
-from fembeam.support import is_whole, require, require_non_negative, require_positive
+from fembeam.support import is_whole, require, require_non_negative, require_positive, warn
 from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
@@ -229,12 +228,12 @@ def settling_periods(model: Model, period: float, discard: float) -> int:
         lasts = math.ceil(SETTLED * correlation_time(model) / period)
     except ValueError:  # no damping, or that of friction alone
         if not discard:
-            warnings.warn(f"a mode decays by friction alone, or not at all: {SETTLING} periods of the load may not "
-                          "settle it; give discard=, or duration=", UserWarning, stacklevel=2)  # fmt: skip
+            warn(f"a mode decays by friction alone, or not at all: {SETTLING} periods of the load may not "
+                 "settle it; give discard=, or duration=")  # fmt: skip
         return asked
     if lasts > LONGEST > asked:
-        warnings.warn(f"the response takes {lasts} periods of the load to settle, {LONGEST} are run; give discard=, "
-                      "or duration=", UserWarning, stacklevel=2)  # fmt: skip
+        warn(f"the response takes {lasts} periods of the load to settle, {LONGEST} are run; give discard=, "
+             "or duration=")  # fmt: skip
     return max(asked, min(lasts, LONGEST))
 
 

@@ -13,7 +13,6 @@ above the resulting change may be due to rounding, as in chaotic motion, and the
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -30,7 +29,7 @@ from fembeam.study.execution.checkpoint import Checkpoint
 from fembeam.study.measure import Case, Measured, Plan, Start, identity_of, measured
 from fembeam.study.quantities import Quantity, label, named
 from fembeam.study.result import Result
-from fembeam.support import Part, is_whole, require
+from fembeam.support import Part, is_whole, require, warn
 from solvers.problem import counted
 
 LOOSER = 10.0  # times the tolerance, in the second run of the reference
@@ -257,7 +256,7 @@ def mode_count(
     rows = _rows(arguments, [first for first, *_ in found], exact)
     study = ModeCount(label(kept), rows, _change(loose[0], exact) if loose else None)
     if study.doubt:
-        warnings.warn(study.doubt, UserWarning, stacklevel=2)
+        warn(study.doubt)
     return study
 
 

@@ -8,7 +8,6 @@ looked at is δ of a stop, or u at `z`, or u of the tip in a scene without stops
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -21,7 +20,7 @@ from fembeam.model.extremes import of_top
 from fembeam.plot.axis_names import TURNED
 from fembeam.scene import Place, Scene, turns_at
 from fembeam.statistics import psd
-from fembeam.support import is_finite, is_pair, is_whole, require
+from fembeam.support import is_finite, is_pair, is_whole, require, warn
 
 if TYPE_CHECKING:
     from fembeam.study.gradients import Change
@@ -369,8 +368,8 @@ def _warn_of_short_contacts(run: Run) -> None:
     lasted = lasted[np.isfinite(lasted)]
     if len(lasted) and len(run.t) > 1 and np.median(lasted) < FEWEST_IN_CONTACT * (step := float(run.t[1] - run.t[0])):
         share = lasted.sum() / (run.t[-1] - run.t[0])
-        warnings.warn(f"contacts last {np.median(lasted) / step:.2g} samples, {share:.2g} of the time: the mean energy "
-                      "is as uncertain as that; give a smaller dt", UserWarning, stacklevel=2)  # fmt: skip
+        warn(f"contacts last {np.median(lasted) / step:.2g} samples, {share:.2g} of the time: the mean energy "
+             "is as uncertain as that; give a smaller dt")  # fmt: skip
 
 
 def _mean(values: Vector) -> float:

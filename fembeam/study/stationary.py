@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 import os
-import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -36,7 +35,7 @@ from fembeam.study.decay import correlation_time
 from fembeam.study.execution.checkpoint import Checkpoint, model_identity
 from fembeam.study.result import Result
 from fembeam.study.segments import FEWEST_SAMPLES, SHORTEST, Segment, Segments, check_duration
-from fembeam.support import Part, bar, is_whole, note, number, numbers, require
+from fembeam.support import Part, bar, is_whole, note, number, numbers, require, warn
 from fembeam.support.fingerprint import fingerprint
 
 if TYPE_CHECKING:
@@ -347,12 +346,12 @@ def _settled(signals: list[Vector], piece: Segment, plan: Segments) -> Settling:
 def _warn_of_a_short_run(plan: Segments, settled: Settling | None) -> None:
     """Warn of a transient that goes on, and of a single realisation; the caller's caller is shown."""
     if settled is not None and not settled.died_out:
-        warnings.warn(f"the transient has not died out: its halves differ by {settled.drift:.1f} standard errors; "
-                      "simulate longer, or give discard=", UserWarning, stacklevel=3)  # fmt: skip
+        warn(f"the transient has not died out: its halves differ by {settled.drift:.1f} standard errors; "
+             "simulate longer, or give discard=")  # fmt: skip
     if plan.taken < 2:
         finer = ", or give a shorter segment= of the spectrum" * (plan.shortest > SHORTEST * plan.correlation_time)
-        warnings.warn(f"{plan.kept:.4g} s hold one realisation of the noise, which tells no standard error; "
-                      f"simulate at least {2 * plan.shortest:.3g} s{finer}", UserWarning, stacklevel=3)  # fmt: skip
+        warn(f"{plan.kept:.4g} s hold one realisation of the noise, which tells no standard error; "
+             f"simulate at least {2 * plan.shortest:.3g} s{finer}")  # fmt: skip
 
 
 def _looked(name: str, look: Watch, run: Run) -> tuple[Vector, Vector | None]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ from fembeam.study.execution.executors import spread
 from fembeam.study.measure import Plan, Start
 from fembeam.study.result import Result, with_units
 from fembeam.study.trial import Asked, Maker, Refused, Trial
-from fembeam.support import Part, is_whole, require
+from fembeam.support import Part, is_whole, require, warn
 from solvers.problem import counted
 
 Vector = NDArray[np.float64]
@@ -207,7 +206,7 @@ def vary(
     if failures:
         i, reason = failures[0]
         message = f"{len(failures)} of {len(points)} points failed; {trial.words(points[i])}: {reason}"
-        warnings.warn(message, UserWarning, stacklevel=2)
+        warn(message)
     return collected(trial, points, kept, axes, failures)
 
 

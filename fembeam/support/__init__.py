@@ -25,7 +25,7 @@ from fembeam.support.checks import (
     vector,
 )
 from fembeam.support.files import DRAFT, read_with, write_rows, written_beside, written_whole
-from fembeam.support.notes import note
+from fembeam.support.notes import note, warn
 from fembeam.support.printed import Part, Printed, html_table
 from fembeam.support.progress import bar, counting
 from fembeam.support.text_tables import aligned, by_rows
