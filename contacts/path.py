@@ -59,16 +59,19 @@ def work(law: Law, delta: ArrayLike) -> float:
     return total
 
 
-def walk(law: Law, path: Vector) -> Iterator[Piece]:
-    """The pieces of a path, one after the other; their parameters are not kept by the next."""
-    row = law.parameters
+def walk(law: Law, path: Vector, start: Vector | None = None) -> Iterator[Piece]:
+    """The pieces of a path, one after the other; their parameters are not kept by the next.
+
+    ``start`` : parameters with what is latched at the first point; None: those of a law at its start.
+    """
+    row = law.parameters if start is None else start.copy()
     tiny = ROUNDING * float(np.spacing(np.abs(path).max()))
     for first, last in monotone_runs(path):
-        start, end = float(path[first]), float(path[last])
-        rate = math.copysign(SLOW, end - start)
-        goal = end if end != start else start + ROUNDING * tiny  # a path that rests is one about to rise
-        for a, b in _pieces(law, row, start, goal, rate, tiny):
-            yield Piece(a, b if end != start else start, first, last, rate, row.copy())
+        begin, end = float(path[first]), float(path[last])
+        rate = math.copysign(SLOW, end - begin)
+        goal = end if end != begin else begin + ROUNDING * tiny  # a path that rests is one about to rise
+        for a, b in _pieces(law, row, begin, goal, rate, tiny):
+            yield Piece(a, b if end != begin else begin, first, last, rate, row.copy())
 
 
 def name_of(law: Law) -> str:

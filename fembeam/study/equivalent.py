@@ -28,7 +28,8 @@ Vector = NDArray[np.float64]
 WHERE = "study.equivalent"
 GAUSS = np.polynomial.legendre.leggauss(24)  # on each piece of a cycle
 SAME = 1e-9  # of the force's size: two cycles that differ by less are one
-CYCLES = (4, 32, 256)  # tried one after the other until the last two are the same
+CYCLES, ROUNDS = 3, 64  # of a round; rounds until cycles are the same
+SLOWEST = 1.0 - 1e-6  # ratio of two changes from cycle to cycle, above which they are no series that ends
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -179,20 +180,37 @@ def _without(law: Law, X: float, mean: float, omega: float | None, stop: bool) -
 
 
 def _with_memory(law: Law, X: float, mean: float) -> Vector:
-    """From border to border of a cycle, after as many as it takes until two are the same."""
-    for count in CYCLES:
-        last = np.zeros((count, 2))
-        size = 0.0
-        for piece in walk(law, np.array([0.0, *[mean + X, mean - X] * count, mean + X])):
-            if piece.first:
-                last[(piece.first - 1) // 2] += (found := _over(law, piece, X, mean))[:2]
-                size = max(size, found[2])
-        if np.all(np.abs(last[-1] - last[-2]) <= SAME * size * np.array([1.0, X])):
-            return last[-1]
+    """From border to border of a cycle, of the first that is that of the round before, too."""
+    row, before = _round(law, np.array([0.0, mean + X]), X, mean, law.parameters)[2][-1], np.full(2, math.inf)
+    for _ in range(ROUNDS):
+        sums, size, rows = _round(law, np.array([mean + X, *[mean - X, mean + X] * CYCLES]), X, mean, row)
+        if np.all(np.abs(np.array([sums[-2], before]) - sums[-1]) <= SAME * size * np.array([1.0, X])):
+            return sums[-1]
+        row, before = _settled(rows, list(law.memory)), sums[-1]
     raise ValueError(
-        f"cycles of {type(law).__name__} between {mean - X:g} and {mean + X:g} m are not the same after {CYCLES[-1]}: "
-        "it has no steady loop there; give another amplitude or mean"
+        f"cycles of {type(law).__name__} between {mean - X:g} and {mean + X:g} m are not the same after "
+        f"{ROUNDS * CYCLES}: it has no steady loop there; give another amplitude or mean"
     )
+
+
+def _round(law: Law, path: Vector, X: float, mean: float, row: Vector) -> tuple[Vector, float, Vector]:
+    """Sums (c, 2) over the cycles of a path, largest |F|, parameters (c, …) at the end of each."""
+    count = max(1, len(path) // 2)
+    sums, rows, size = np.zeros((count, 2)), np.tile(row, (count, 1)), 0.0
+    for piece in walk(law, path, row):
+        found, rows[piece.first // 2] = _over(law, piece, X, mean), piece.parameters
+        sums[piece.first // 2] += found[:2]
+        size = max(size, found[2])
+    return sums, size, rows
+
+
+def _settled(rows: Vector, memory: list[int]) -> Vector:
+    """Parameters with what is latched where it leads to: of three that settle as a geometric series, the limit."""
+    row, (first, second) = rows[-1].copy(), np.diff(rows[-3:, memory], axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = second / first
+        row[memory] += np.where((ratio > 0.0) & (ratio < SLOWEST), second * ratio / (1.0 - ratio), 0.0)
+    return row
 
 
 def _over(law: Law, piece: Any, X: float, mean: float) -> Vector:
