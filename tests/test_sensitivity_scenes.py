@@ -192,6 +192,16 @@ def test_a_static_shape_that_two_stops_share():
     np.testing.assert_allclose(run.sensitivity(path).q[-1], expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
+def test_a_place_that_a_shorter_beam_does_not_have():
+    """Of the tip it said that 0.25 m is not on the beam, as if the place asked for were wrong."""
+    beam = fb.Beam(0.25, fb.Section.circle(2.0e11, 7800.0, 0.01))
+    scene = fb.Scene(beam, [fb.Clamped(0.0)], base=fb.Harmonic(1e-3, 100.0), damping=fb.ModalDamping(0.02))
+    found = scene.reduce(modes=1).simulate(0.01, 1e-3).sensitivity("beam.length")
+    assert found.displacement(0.2).any()
+    with pytest.raises(ValueError, match=r"no derivative by beam.length of what is at 0.25, which is not there at"):
+        found.displacement(0.25)
+
+
 def test_what_is_no_number_is_refused_by_name():
     """Text, complex numbers, ragged rows and lists of paths ended in the words of NumPy or of Python."""
     run, law = simulated(rig(), duration=0.01, dt=1e-3), Polynomial([2e4])

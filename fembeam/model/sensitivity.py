@@ -170,8 +170,18 @@ class Sensitivity(Printed):
         at = z if direction is None else directed(z, direction)
         found = changed @ np.asarray(model.phi(at, 0, body)).T
         if self.models is not None:
-            found = found + self._at_samples(motion) @ self.models.derivative(lambda one: one.phi(at, 0, body)).T
+            found = found + self._at_samples(motion) @ self._of_shapes(self.models, at, body).T
         return np.asarray(found)
+
+    def _of_shapes(self, models: Nearby, at: Any, body: int) -> Vector:
+        """Of φ at a place; ValueError for one that the parameter takes away, such as the tip of a shorter beam."""
+        try:
+            return models.derivative(lambda one: one.phi(at, 0, body))
+        except ValueError as error:
+            raise ValueError(
+                f"no derivative by {self.parameter} of what is at {at}, which is not there at values near "
+                f"{self.value:.6g}: {error}"
+            ) from None
 
     def table(self) -> list[dict[str, Any]]:
         """One contact a row: its name and times, and its derivatives."""
