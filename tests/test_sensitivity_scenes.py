@@ -192,6 +192,39 @@ def test_a_static_shape_that_two_stops_share():
     np.testing.assert_allclose(run.sensitivity(path).q[-1], expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
+@pytest.mark.parametrize("path", ["beam.nodes.A[1]", "beam.nodes.B[1]", "beam.nodes.C[1]"])
+def test_a_node_that_leaves_the_plane_of_a_frame(path):
+    """Modes of that plane got either sign: they were refused, "modes must change smoothly"."""
+    tube = fb.Section.tube(2e11, 7900.0, 0.05, 0.04)
+    frame = fb.Frame.polyline({"A": (0.0, 0.0, 0.0), "B": (0.0, 0.0, 1.0), "C": (0.8, 0.0, 1.0)}, tube)
+    hole = fb.AnnularStop("C", KelvinVoigt(1e5, 50.0), 1e-3, directions=("y", "z"))
+    push = [fb.PointForce("C", fb.Harmonic(200.0, 60.0), direction=one) for one in ("y", "z")]
+    scene = fb.Scene(frame, [fb.Clamped("A")], masses=[fb.LumpedMass("C", 5.0)], stops=[hole], forces=push,
+                     damping=fb.ModalDamping(0.02))  # fmt: skip
+    found, step = simulated(scene, 3).sensitivity(path).displacement("C", "y"), 1e-5
+    near = [simulated(with_value(scene, path, h), 3).displacement("C", "y") for h in (step, -step)]
+    expected = (near[0] - near[1]) / (2.0 * step)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+
+
+def test_a_foundation_of_zero_beside_a_far_stiffer_body():
+    """Steps from 0 went by the highest frequency of all bodies, to 1e6 N/m², and were refused as not smooth."""
+    slow = fb.Scene(fb.Beam(0.2, BAR), [fb.Clamped(0.0)], damping=fb.ModalDamping(0.03))
+    scene = fb.Scene(
+        fb.Beam(0.25, BAR),
+        [fb.Clamped(0.0, motion={"y": fb.Harmonic(1e-3, 130.0)})],
+        elements=[fb.Element(0.1, KelvinVoigt(1e3, 1.0), to=(1, 0.1))],
+        damping=fb.ModalDamping(0.02),
+        bodies=[slow],
+    )
+    path, runs = "bodies[0].beam.foundation", {}
+    for h in (0.0, 10.0, 20.0):
+        runs[h] = simulated(with_value(scene, path, h)).displacement(0.25)
+    expected = (4.0 * runs[10.0] - 3.0 * runs[0.0] - runs[20.0]) / 20.0
+    found = simulated(scene).sensitivity(path).displacement(0.25)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-3 * np.abs(expected).max())
+
+
 def test_a_place_that_a_shorter_beam_does_not_have():
     """Of the tip it said that 0.25 m is not on the beam, as if the place asked for were wrong."""
     beam = fb.Beam(0.25, fb.Section.circle(2.0e11, 7800.0, 0.01))

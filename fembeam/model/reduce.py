@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -80,6 +80,17 @@ def reduced(
     model = Model(scene, matrices, basis, numbers, shapes, counts, tuple(others), options)
     _warn_of_still_places(model)
     return model
+
+
+def signed_like(model: Model, near: Model) -> Model:
+    """The same model with the signs of shapes that one near it has, where both have the same mesh."""
+    vectors = model.basis.vectors
+    if vectors.shape != near.basis.vectors.shape or np.all(np.sum(vectors * near.basis.vectors, axis=0) >= 0.0):
+        return model
+    signs = np.where(np.sum(vectors * near.basis.vectors, axis=0) < 0.0, -1.0, 1.0)
+    basis = reduction.Basis(vectors * signs, model.omega)
+    shapes, *others = _shapes_of_each(model.scene, model.matrices, basis)
+    return replace(model, basis=basis, shapes=shapes, others=tuple(others))
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.model.equations import load_period
 from fembeam.model.extremes import of_top, time_of_top
+from fembeam.model.reduce import signed_like
 from fembeam.response import PlacedLog, directed
 from fembeam.scene import called, changes_structure, path_of, replaced, value_of
 from fembeam.scene.signals import is_of_signal
@@ -239,7 +240,7 @@ class _Varied:
             return None
         with self._rewording_refusals():
             step = STRUCTURE * abs(self.value) or self._felt()
-        found = self._near(lambda value: self.model.again(self._scene(value)), step)
+        found = self._near(self._model, step)
         for one in found.systems:
             self._check_size(one)
         _check_smooth(found, self.called)
@@ -258,6 +259,10 @@ class _Varied:
             if self.value:
                 raise
         return self._near(self._system, SMALL * step)  # such as the centre of a narrow hole
+
+    def _model(self, value: float) -> Model:
+        """At a value near the present one: a mode at rest where the scene's watched place is may have either sign."""
+        return signed_like(self.model.again(self._scene(value)), self.model)
 
     def _system(self, value: float) -> Any:
         return self.model.system_like(self._scene(value))
@@ -282,7 +287,7 @@ class _Varied:
         step = FIRST
         while LEAST < step <= MOST:
             try:
-                there = self.model.again(self._scene(step))
+                there = self._model(step)
             except ValueError:
                 if step <= FIRST:
                     raise
@@ -303,8 +308,10 @@ class _Varied:
                 step, self.called, "begin from a small value, such as gravity=1e-6")  # fmt: skip
         self._check_size(there)
         vectors = [np.array([vector for vector, _ in one.system.loads]) for one in (here, there)]
-        pairs = [(here.omega**2, there.omega**2), (here.directions, there.directions), (here.zeta, there.zeta), vectors]
+        pairs = (here.directions, there.directions), (here.zeta, there.zeta), vectors
         sizes = [(np.abs(b - a).max(initial=0.0), np.abs(a).max(initial=0.0)) for a, b in pairs]
+        own, changed = here.omega**2, np.abs(there.omega**2 - here.omega**2)
+        sizes += zip(changed, np.where(own > 0.0, own, own.max()), strict=True)  # each: others may be far stiffer
         return max(0.0 if change == 0.0 else change / size if size > 0.0 else np.inf for change, size in sizes)
 
     def _check_size(self, there: Model) -> None:
