@@ -608,6 +608,10 @@ def test_the_mean_energy_of_samples_that_miss_contacts_is_told():
     with pytest.warns(UserWarning, match="contacts last .* samples, .* of the time: the mean energy is") as told:
         fb.study.vary(scene, {"base.amplitude": [1e-3]}, "energy", modes=2)
     assert {one.filename for one in told} == {__file__}  # they named lines inside the package
+    box = {"base.amplitude": (9e-4, 1e-3)}
+    with pytest.warns(UserWarning, match="contacts last") as told:
+        fb.study.minimise(scene, box, "energy", gradients=False, modes=2, tolerance=0.05)
+    assert {one.filename for one in told} == {__file__}  # also where SciPy calls back
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         fb.study.vary(scene, {"base.amplitude": [1e-3]}, "energy", modes=2, dt=1e-5, discard=0.1, duration=0.3)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 import warnings
 
-WITHIN = {"fembeam", "contacts", "reduction", "solvers", "contextlib", "dataclasses", "functools"}  # no line of a user
+OURS = {"fembeam", "contacts", "reduction", "solvers"}
+WITHIN = OURS | {"contextlib", "dataclasses", "functools", "scipy"}  # and what calls back: no lines of a user
 
 
 def note(message: str, *values: object) -> None:
