@@ -137,6 +137,15 @@ def test_paper_scene_needs_more_than_two_modes_for_its_peak():
     assert len(study.figure().axes) == 2
 
 
+def test_values_of_a_mode_count_have_their_unit(tmp_path):
+    scene = fb.Scene(fb.Beam(1.0, STEEL), [fb.Clamped(0.0)], damping=fb.ModalDamping(0.1), base=fb.Harmonic(1.0, 1.0))
+    for quantity, head in (("amplitude", "value / m"), (lambda run: float(run.q[-1, 0]), "value  ")):
+        study = mode_count(scene, [1, 2], quantity, duration=0.1, dt=1e-2)
+        assert head in str(study)
+        study.save(tmp_path / "modes.csv")
+        assert f",{head.strip().replace('/ m', '[m]')}," in (tmp_path / "modes.csv").read_text().splitlines()[0]
+
+
 def test_fast_strike_on_a_stiff_stop():
     study = mode_count(STIFF, [1, 2, 12], "peak_force", duration=0.05, start=swing, reference=24)
     assert study.row(2).error > 0.1

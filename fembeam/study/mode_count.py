@@ -27,8 +27,8 @@ from fembeam.model import check_mode_count
 from fembeam.scene import Scene
 from fembeam.study.execution.checkpoint import Checkpoint
 from fembeam.study.measure import Case, Measured, Plan, Start, identity_of, measured
-from fembeam.study.quantities import Quantity, label, named
-from fembeam.study.result import Result
+from fembeam.study.quantities import Quantity, label, named, unit_of
+from fembeam.study.result import Result, with_units
 from fembeam.support import Part, is_whole, require, warn
 from solvers.problem import counted
 
@@ -36,7 +36,7 @@ LOOSER = 10.0  # times the tolerance, in the second run of the reference
 LOOSEST = 1e-2  # the largest tolerance that methods take
 NEGLIGIBLE = 1e-5  # relative change by it that only a sensitive motion exceeds: others, some 1e-7
 MARGIN = 10.0  # one change is one draw of chance, and another may be larger
-HEAD = "modes", "static", "coordinates", "value", "error", "± (95 %)", "static share", "periods", "seconds", ""
+HEAD = "modes", "static", "coordinates", "{}", "error", "± (95 %)", "static share", "periods", "seconds", ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +98,13 @@ class ModeCount(Result):
     sensitivity : relative change of the reference at ten times the tolerance; None where scatter tells (several
         realisations, or a periodic response), or the solver's step is fixed.
     doubt : a sentence where errors are below ten times the sensitivity, else "".
+    unit : of the values, SI, empty where it is not known.
     """
 
     quantity: str
     rows: tuple[Row, ...]
     sensitivity: float | None = None
+    unit: str = ""
 
     @property
     def rate(self) -> float:
@@ -149,7 +151,9 @@ class ModeCount(Result):
     def _parts(self) -> list[Part]:
         rates = f"observed rate: {self.rate:.2f} modes alone, {self.rate_residual:.2f} with static shapes"
         doubt: list[Part] = [f"IN DOUBT: {self.doubt}"] if self.doubt else []
-        return [self.quantity, (HEAD, [row.cells() for row in self.rows]), rates, *doubt]
+        value = with_units(["value"], [self.unit])[0]
+        head = tuple(name.format(value) for name in HEAD)
+        return [self.quantity, (head, [row.cells() for row in self.rows]), rates, *doubt]
 
     def table(self) -> list[dict[str, Any]]:
         """The rows."""
@@ -159,6 +163,9 @@ class ModeCount(Result):
             {name: getattr(row, name) for name in names} | {name: getattr(row.measured, name) for name in measured}
             for row in self.rows
         ]
+
+    def _units(self) -> dict[str, str]:
+        return {"value": self.unit}
 
     figure = plot.mode_count
 
@@ -254,7 +261,7 @@ def mode_count(
     found = measured(items, executor, f"modes for {label(kept)}", finished)
     exact, *loose = found[arguments.index(finest)]
     rows = _rows(arguments, [first for first, *_ in found], exact)
-    study = ModeCount(label(kept), rows, _change(loose[0], exact) if loose else None)
+    study = ModeCount(label(kept), rows, _change(loose[0], exact) if loose else None, unit_of(kept, scene))
     if study.doubt:
         warn(study.doubt)
     return study
