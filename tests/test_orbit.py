@@ -131,7 +131,9 @@ def test_branch_marks_the_flip_and_its_copy_from_a_file_is_the_same(model, tmp_p
     with pytest.raises(ValueError, match="belongs to another scene"):
         paper_scene(fb.Harmonic(2e-3, 195.0)).reduce(1).resume(tmp_path / "b.npz")
     whole = (tmp_path / "b.npz").read_bytes()
-    for content in (b"", b"no archive" * 9, whole[: len(whole) // 2]):
+    listed = whole.index(b"PK\x01\x02")  # the list of the archive: flags, compression; where it lies
+    flipped = [whole[:i] + bytes([whole[i] ^ 65]) + whole[i + 1 :] for i in (listed + 8, listed + 10, len(whole) - 3)]
+    for content in (b"", b"no archive" * 9, whole[: len(whole) // 2], *flipped):
         (tmp_path / "damaged.npz").write_bytes(content)
         with pytest.raises(ValueError, match=r"damaged\.npz is not a saved branch, or is damaged"):
             model.resume(tmp_path / "damaged.npz")
