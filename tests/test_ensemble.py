@@ -437,6 +437,20 @@ def test_a_damaged_checkpoint(tmp_path):
         ensemble(small_model(), 1, base_at, checkpoint=path)
 
 
+def first_and_last(model):
+    return {"first": base_at(model), "last": -base_at(model)}
+
+
+def test_a_checkpoint_that_has_lost_values(tmp_path):
+    """One changed byte in the list of an npz hides a member: the ensemble had one value less and said nothing."""
+    path = tmp_path / "kept.npz"
+    ensemble(small_model(), 1, first_and_last, checkpoint=path)
+    with np.load(path) as data:
+        np.savez(path, **{name: data[name] for name in data.files if name != "value last"})
+    with pytest.raises(ValueError, match="is damaged: it has lost last; delete it"):
+        ensemble(small_model(), 1, first_and_last, checkpoint=path)
+
+
 test_bad_seeds = refused_by(
     lambda seeds: ensemble(small_model(), seeds, base_at),
     ([1, 2, 1], "seeds must differ, got 1 at 0 and at 2"),

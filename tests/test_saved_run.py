@@ -184,6 +184,7 @@ def changed(path, change):
         (lambda about, arrays: arrays.update(transitions=np.full((1, 9), 7.0)), "transitions must name contacts"),
         (lambda about, arrays: arrays.update(transitions=np.full((1, 9), 1.0)), "index 1 is out of bounds"),
         (lambda about, arrays: arrays.update(transitions=np.ones((1, 8))), "transitions must have shape"),
+        (lambda about, arrays: arrays.pop("energy_damping"), "it has lost energy_damping"),
     ],
 )
 def test_contradictions_are_refused(run, tmp_path, change, message):

@@ -131,7 +131,8 @@ def _contents(run: Run) -> tuple[str, dict[str, Any]]:
         arrays["losses"] = np.column_stack((arrays["losses"], lost.friction, lost.spin))
     about["readout"], read = packed(run.readout)
     about["events"], arrays["transitions"] = _packed(run.transitions)
-    return json.dumps(about, default=float), arrays | read
+    arrays |= read
+    return json.dumps(about | {"arrays": list(arrays)}, default=float), arrays
 
 
 def _arrays_of(shapes: Any) -> tuple[Any, Any]:
@@ -239,6 +240,8 @@ def _known(
     about = json.loads(str(read("about")))
     if about["format"] != FORMAT:
         raise _OtherFormatError(f"has format {about['format']}, this version reads {FORMAT}; simulate again")
+    if missing := {*about.get("arrays", ())} - {*headers}:  # a byte of the archive's list of them hides the next one
+        raise ValueError(f"it has lost {', '.join(sorted(missing))}")
     outlines = {name: saved_arrays.outline(*headers[name]) for name in headers}
     names = saved_arrays.known(outlines, len((about.get("scene_file") or {"files": ()})["files"]))
     return about, {name: read(name) for name in names}

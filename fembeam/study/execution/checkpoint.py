@@ -50,7 +50,7 @@ class Checkpoint:
         self.values[key] = values
         if self.path is None:
             return
-        about = {"format": FORMAT, "about": self.about, "seeds": list(self.values)}
+        about = {"format": FORMAT, "about": self.about, "seeds": list(self.values), "values": list(values)}
         stacked = {f"value {name}": np.stack([v[name] for v in self.values.values()]) for name in values}
         with written_whole(self.path) as file:
             np.savez(file, header=json.dumps(about), **stacked)  # type: ignore[arg-type]
@@ -61,6 +61,8 @@ class Checkpoint:
             with np.load(path, allow_pickle=False) as data:
                 header = json.loads(str(data["header"]))
                 columns = {name.removeprefix("value "): data[name] for name in data.files if name != "header"}
+            if missing := {*header.get("values", ())} - {*columns}:  # a byte of the archive's list hides the next one
+                raise ValueError(f"it has lost {', '.join(sorted(missing))}")
             seeds = {key: {name: c[i] for name, c in columns.items()} for i, key in enumerate(header["seeds"])}
             known = header["format"], header["about"]
         except Exception as error:
