@@ -449,6 +449,14 @@ def test_random_figures_have_units_bands_and_confidence():
     left, right = (axis.get_tightbbox().x1 for axis in figure.axes)
     assert left < figure.axes[1].get_window_extent().x0
     assert right < figure.bbox.x1
+    figure = plot.random_densities({f"MOMENT AMPLITUDE, WIDE WINDOW MEMBER, {i}": signal for i in "123"})
+    figure.draw_without_rendering()
+    titles = [axis.title.get_window_extent() for axis in figure.axes]
+    assert all(one.x1 < other.x0 for one, other in pairwise(titles))
+    long = [f"guide of the main steam line at the turbine hall, {side}" for side in ("north", "south")]
+    (axis,) = plot.random_spectra({"": dict.fromkeys(long, signal)}, 1000.0).axes
+    axis.figure.draw_without_rendering()
+    assert axis.get_window_extent().x1 < axis.get_legend().get_window_extent().x0
 
 
 def test_figures_of_laws():

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fembeam.plot.figure import sheet
+from fembeam.plot.figure import NARROWEST, sheet
 from fembeam.plot.orbits import branch
 from fembeam.plot.style import (
     BLUE,
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from fembeam.statistics import Estimate, Signal
 
 FURTHEST = 5.0  # standard deviations shown of a density
-WIDTH = 44  # characters of a line over a density
+WIDTH, BROADEST = 44, 215.0  # characters and points of a line over a density
 TICKS = 5  # at most, between the ends of a density
 ROOM = 1.3  # of the highest density, the height of its axis, so that the legend has room
 
@@ -70,7 +70,7 @@ def random_spectra(
             axis.axvspan(*bands[title], ymin=0.96, color=GREY, alpha=0.6, linewidth=0)
         axis.set(title=verbatim(title), xlim=(0, omega_max), ylabel="PSD / m² s rad⁻¹")
         if len(lines) > 1:
-            axis.legend(loc="upper right")
+            _legend(axis, beside=axes is None)
         if branches:
             _beside(drawn[row * columns + 1], branches.get(title), omega_max)
     for axis in drawn[-columns:]:
@@ -104,6 +104,13 @@ def random_densities(signals: Mapping[str, Signal], axes: Axes | Sequence[Axes] 
     return figure
 
 
+def _legend(axis: Axes, beside: bool) -> None:
+    """Names within the axes, long ones beside them where there is room, as they would cover curves."""
+    inner = axis.legend(loc="upper right")
+    if beside and any("\n" in text.get_text() for text in inner.get_texts()):
+        axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=8)
+
+
 def density_panels(axes: Sequence[Axes], signals: Mapping[str, Signal]) -> None:
     """One density each, with its confidence where it is known, against its Gaussian."""
     said = ""
@@ -132,7 +139,25 @@ def density_panels(axes: Sequence[Axes], signals: Mapping[str, Signal]) -> None:
 
 def _filled(text: str) -> str:
     """A text over or below a density, on several lines where it is longer than the density is wide."""
-    return verbatim(textwrap.fill(text, WIDTH, break_on_hyphens=False).replace("\xa0", " "))
+    wide = WIDTH
+    while _points(filled := _lines(text, wide)) > BROADEST and wide > NARROWEST:  # of broad letters
+        wide -= 4
+    return filled
+
+
+def _lines(text: str, wide: int) -> str:
+    """A text on lines of so many characters."""
+    return verbatim(textwrap.fill(text, wide, break_on_hyphens=False).replace("\xa0", " "))
+
+
+def _points(text: str) -> float:
+    """How broad the broadest line of a title or label is, in points."""
+    from matplotlib import rcParams
+    from matplotlib.font_manager import FontProperties
+    from matplotlib.textpath import TextPath
+
+    font = FontProperties(size=rcParams["axes.titlesize"])
+    return max(float(TextPath((0.0, 0.0), line, prop=font).get_extents().width) for line in text.splitlines())
 
 
 def _rounded(found: Estimate) -> str:

@@ -85,7 +85,7 @@ class Ensemble(Result):
 
     def _parts(self) -> list[Part]:
         """Means and standard errors of the named numbers, one a line."""
-        head = f"{len(self)} realisations" + (f", {len(self.failures)} failed" if self.failures else "")
+        head = counted(len(self), "realisation") + (f", {len(self.failures)} failed" if self.failures else "")
         return [head, (("", "mean ± standard error"), [(name, repr(self[name])) for name in self._numbers])]
 
     def table(self) -> list[dict[str, Any]]:
@@ -115,7 +115,7 @@ class Ensemble(Result):
                 "use characteristics as the quantity")  # fmt: skip
         omega = self.values["omega"][0]
         spectra = {n: Spectrum(omega, self[n].value, 0, np.asarray(self[n].standard_error)) for n in lines}
-        return plot.random_spectra({self.title or f"{len(self)} realisations": spectra}, float(omega[-1]))
+        return plot.random_spectra({self.title or counted(len(self), "realisation"): spectra}, float(omega[-1]))
 
     @property
     def mean(self) -> Estimate:
