@@ -3,6 +3,7 @@
 import dataclasses
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -155,6 +156,24 @@ def test_long_names_of_what_varies_are_within_the_figure(scene):
     asked = {"minus the largest displacement in the middle of the beam": lambda run: -abs(run.displacement(0.2)).max()}
     for values in (gap, gap | more, more | gap, gap | more | {"base.omega": [80.0, 90.0]}):
         assert outside(study.vary(scene, values, asked, 0.1, 1e-3, modes=1).figure()) == []
+
+
+class Peak(SimpleNamespace):
+    """What is drawn of one."""
+
+
+class Fold(SimpleNamespace):
+    """What is drawn of one."""
+
+
+def test_long_names_of_what_a_resonance_goes_along_are_within_the_figure():
+    """They were cut off at both ends, below peaks and folds alike."""
+    name = "coefficient 3 of the contact law of the third upper snubber of the feedwater line in room 0123 / N/m^3"
+    values, titles = np.array([1e-3, 2e-3]), (name, f"amplitude of {name}")
+    tops = [SimpleNamespace(value=p, at=100.0 + p, amplitude=p, slope=1.0, stable=True) for p in values]
+    peak = Peak(tops=tops, least=None, z=0.5, titles=titles)
+    fold = Fold(values=values, at=values, amplitude=values, cusps=[], z=0.5, titles=titles)
+    assert outside(plot.peak_curve(peak)) == outside(plot.fold_curve(fold)) == []
 
 
 def test_the_legend_of_a_single_map_is_within_the_figure(scene):

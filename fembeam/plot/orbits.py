@@ -12,12 +12,14 @@ from fembeam.plot.axis_names import axis_name
 from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.linear import frequencies
 from fembeam.plot.style import (
+    ALONG,
     GREEN,
     GREY,
     ORANGE,
     RED,
     Vector,
     displacement_name,
+    entry,
     own_colour,
     plain_decades,
     styled,
@@ -92,7 +94,7 @@ def branch(
     if axes is None and len(linear):
         _widen(axis, linear)
     name = several[0].family.name
-    axis.set(xlabel=verbatim(axis_name(name, model.scene)), ylabel=f"max |{displacement_name(place)}| / {unit}")
+    axis.set(xlabel=entry(axis_name(name, model.scene), ALONG), ylabel=f"max |{displacement_name(place)}| / {unit}")
     handles, words = _entries(axis, several)
     legend(axis, axes is None, "outside right upper", handles=handles, labels=words, fontsize=8)
     return figure
@@ -105,7 +107,7 @@ def bifurcation(found: Bifurcation, axes: Axes | None = None) -> Figure:
     peaks = found.cloud()[1]
     scale, unit = motion_for(found.z, peaks)
     _draw_cloud(axis, found.cloud(), scale)
-    axis.set(xlabel=verbatim(found.title), ylabel=f"max |{displacement_name(found.z)}| / {unit}")
+    axis.set(xlabel=entry(found.title, ALONG), ylabel=f"max |{displacement_name(found.z)}| / {unit}")
     return figure
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.plot.figure import heading, sheet
-from fembeam.plot.style import BLUE, RED, Vector, displacement_name, styled, verbatim
+from fembeam.plot.style import ALONG, BLUE, RED, UP, Vector, displacement_name, entry, styled
 from fembeam.plot.units import motion_for
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def peak_curve(found: Peak, axes: Sequence[Axes] | None = None) -> Figure:
     if p[0] > 0.0 and p[-1] > WIDE * p[0]:
         lower.set_xscale("log")
     upper.set_ylabel(f"amplitude of {displacement_name(found.z)} / {unit}")
-    lower.set(xlabel=verbatim(found.titles[0]), ylabel=verbatim(found.titles[1]))
+    lower.set(xlabel=entry(found.titles[0], ALONG), ylabel=entry(found.titles[1], UP))
     if found.least is not None or not stable.all():
         upper.legend()
     heading([upper, lower], "Peak of the response", axes is None)
@@ -121,8 +121,8 @@ def fold_curve(found: Fold, axes: Sequence[Axes] | None = None) -> Figure:
         axis.plot(found.values[found.cusps], y[found.cusps], "*", color=RED, markersize=11, label="cusp")
     if len(found.cusps) == 1:
         upper.fill(found.values, found.at, color=BLUE, alpha=0.15, label="three orbits")
-    upper.set_ylabel(verbatim(found.titles[1]))
-    lower.set(xlabel=verbatim(found.titles[0]), ylabel=f"amplitude of {displacement_name(found.z)} / {unit}")
+    upper.set_ylabel(entry(found.titles[1], UP))
+    lower.set(xlabel=entry(found.titles[0], ALONG), ylabel=f"amplitude of {displacement_name(found.z)} / {unit}")
     if found.cusps:
         upper.legend()
     heading([upper, lower], "Folds of the response", axes is None)

@@ -31,6 +31,7 @@ P = ParamSpec("P")
 
 BLUE, RED, GREEN, ORANGE, GREY = "#0072B2", "#D55E00", "#009E73", "#E69F00", "#777777"  # Okabe and Ito
 ENTRY = 40  # characters of a line in a legend
+ALONG, UP = 60, 34  # letters along panels as broad as a page, and up
 EVEN = 0.1  # of the largest, below which the median is where values are spread evenly in their logarithm
 CYCLE = BLUE, RED, GREEN, ORANGE, "#CC79A7", "#56B4E9"
 

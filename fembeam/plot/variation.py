@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fembeam.plot.figure import heading, sheet
-from fembeam.plot.style import BLUE, RED, entry, logarithmic, styled, verbatim
+from fembeam.plot.style import ALONG, BLUE, RED, UP, entry, logarithmic, styled, verbatim
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from fembeam.study import Minimum, Variation
 
 TWO_ERRORS = 2.0  # standard errors drawn: about 95 %
-WIDE, NARROW, HIGH = 60, 28, 34  # letters along the panels, and up
+NARROW = 28  # letters along one of several panels
 
 
 @styled
@@ -49,7 +49,7 @@ def variation(found: Variation, axes: Axes | Sequence[Axes] | None = None, best:
         for j, axis in enumerate(row):
             _line(axis, found, i, j)
             _star(axis, found.points, best, j, found.values[:, i])
-            axis.set_ylabel(entry(name, HIGH))
+            axis.set_ylabel(entry(name, UP))
     heading(panels, f"{', '.join(map(verbatim, found.quantities))} at {counted(len(found), 'point')}", axes is None)
     return figure
 
@@ -76,7 +76,7 @@ def _line(axis: Axes, found: Variation, i: int, j: int) -> None:
     bars: dict[str, Any] = {"yerr": TWO_ERRORS * error} if np.isfinite(error).any() else {}
     axis.errorbar(x, found.values[:, i], fmt="o-" if len(found.axes) == 1 else "o", color=BLUE, markersize=3, **bars)
     few = len(found.titles) < 3
-    axis.set_xlabel(entry(found.titles[j], WIDE if few else NARROW))
+    axis.set_xlabel(entry(found.titles[j], ALONG if few else NARROW))
     if not (len(found.axes) == 1 and logarithmic(axis, x)):
         axis.locator_params(axis="x", nbins=5 if few else 3)
 
@@ -88,8 +88,8 @@ def _map(axis: Axes, found: Variation, i: int) -> None:
         image: Any = axis.pcolormesh(*found.axes, found[found.quantities[i]].T, shading="nearest")
     else:
         image = axis.scatter(found.points[:, 0], found.points[:, 1], c=found.values[:, i], s=12)
-    figure.colorbar(image, ax=axis, label=entry(found.value_heads[i], HIGH))
-    axis.set(xlabel=entry(found.titles[0], WIDE), ylabel=entry(found.titles[1], HIGH))
+    figure.colorbar(image, ax=axis, label=entry(found.value_heads[i], UP))
+    axis.set(xlabel=entry(found.titles[0], ALONG), ylabel=entry(found.titles[1], UP))
     axis.locator_params(axis="x", nbins=5)  # long numbers would meet
 
 
