@@ -82,7 +82,7 @@ reordered = _decorator(**_INNER, forceinline=True, fastmath={"reassoc", "contrac
 
 
 class _CompilerNotice(event.Listener):
-    """Says once per process that code is compiled."""
+    """Says once per process that code is compiled: for runs half a minute, for tangents as much, for friction too."""
 
     given = False
 
@@ -91,7 +91,7 @@ class _CompilerNotice(event.Listener):
         if not self.given:
             self.given = True
             logging.getLogger("fembeam.solvers").warning(
-                "compiling the integrator, once for this version: 10 to 30 s, later starts load it"
+                "compiling what this needs of the integrator: 10 to 60 s, later starts load it"
             )
 
     def on_end(self, _: Any) -> None:
