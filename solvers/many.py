@@ -128,6 +128,8 @@ def integrate_many(
     while again:
         prepared = prepared_once(system, method, duration)
         engines = [method.engine(system, starts[0], prepared, duration) for _ in range(min(threads, len(starts)))]
+        for engine in engines:
+            engine.sample(None)  # an earlier run may have left room for its outputs
         outcomes = Outcomes.of(len(starts), engines[0].back.shape[1], len(system.contacts))
         of_blocks = whole_starts(engines[0], starts, _of_tones(scaled, engines[0]))
         workers = [Worker(engine, of_blocks, own_gaps, outcomes, BLOCK_STEPS) for engine in engines]
