@@ -54,6 +54,20 @@ def blocks(signals, omega=(0.0, 9.0, 40.0, 75.0), zeta=(0.0, 1.0, 3.0, 0.02), co
     return System.modal(omega, zeta, contacts, loads)
 
 
+@pytest.mark.parametrize("signal", [fb.Harmonic(3.0, 1.3), Nodes()])
+@pytest.mark.parametrize("shared", [0.05, 0.3, 0.8])
+def test_damping_that_drives_some_rates_but_no_mode_balances(signal, shared):
+    """C with eigenvalues 0.1 ± shared: beyond 0.1 right runs were refused, their balance lacking what C drives."""
+    C, stop = [[0.1, shared], [shared, 0.1]], Contact([1.0, 0.5], Hertz(1e3), 0.3)
+    system = System(np.eye(2), C, np.diag([9.0, 81.0]), [stop], [([1.0, 0.0], signal)])
+    arguments = system, [1.0, 0.3], [0.0, 1.0], 2.0, 0.1
+    found = integrate(*arguments, method=Exponential(1e-10))
+    known = integrate(*arguments, method=DormandPrince(1e-12, atol=1e-14))
+    assert len(found.contacts) > 0
+    np.testing.assert_allclose(found.energy.damping, known.energy.damping, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(found.energy.residual, 0.0, atol=1e-9)
+
+
 @pytest.mark.parametrize("stops", [1, 2, 3])  # of more than two, forces act through the blocks
 @pytest.mark.parametrize("law", [Hertz(1e6), Viscoelastic.tsuji(1e6, 0.6, 1.0), KelvinVoigt(2e4, 20.0)], ids=named)
 @pytest.mark.parametrize("signals", SIGNALS, ids=len)

@@ -14,7 +14,8 @@ Limitations
   the force of another stop causes such an entry, it is found one shortest step (1e-9 s) late.
 * A law with a kink elsewhere than at its declared knots and its `bend` is integrated with smaller steps, at lower
   order; so is the start of a contact whose law has powers of δ that are no multiples of 1/4. The tolerance is kept.
-* K and C must be positive semi-definite (no buckled modes, no negative damping; a contact law may drive).
+* K must be positive semi-definite (no buckled modes), and no damped mode may grow (C may be indefinite; a contact law
+  may drive).
 """
 
 from __future__ import annotations

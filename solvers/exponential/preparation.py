@@ -308,16 +308,16 @@ def _layout(**known: int) -> Layout:
 def _loss_rows(problem: Problem, system: System) -> Array:
     """Rows whose squares sum to the damping power: √c v, or of coupled blocks √C q̇ with q̇ of the blocks.
 
-    A root of the blocks' own quadratic form of the power would err by the square of what cancels in q̇. As many rows of
-    zeros tell that the blocks are coupled.
+    A root of the blocks' own quadratic form of the power would err by the square of what cancels in q̇. As many rows
+    tell that the blocks are coupled; their squares, of what C drives where it is indefinite, are taken off.
     """
     n = len(problem.k)
     if not problem.loss.size:
         return np.hstack((np.zeros((n, n)), np.diag(np.sqrt(np.maximum(problem.c, 0.0)))))
     C = dense(system.C)
     values, vectors = np.linalg.eigh(0.5 * (C + C.T))
-    rows = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T @ system.blocks.T[n:]
-    return np.vstack((rows, np.zeros((n, 2 * n))))
+    rates = vectors.T @ system.blocks.T[n:]
+    return np.vstack([np.sqrt(np.maximum(part, 0.0))[:, None] * rates for part in (values, -values)])
 
 
 def _widened(problem: Problem, forcing: Forcing, contacts: Sequence[Contact]) -> Problem:

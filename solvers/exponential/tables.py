@@ -90,7 +90,7 @@ class Tables(NamedTuple):
     ripple_weight: Annotated[Any, "R, N"]  # amplitude of δ per unit of an oscillating block's rate
     signal_rows: Annotated[Any, "L, 2*N"]  # a load's tones from the state
     power_rows: Annotated[Any, "L, 2*N"]  # input power = signal × power row
-    loss_rows: Annotated[Any, "r, 2*N"]  # damping power = Σ (row·z)²
+    loss_rows: Annotated[Any, "r, 2*N"]  # damping power = Σ (row·z)², less those of rows beyond the blocks
     steady_rate: Annotated[Any, "2*tones, own8"]  # blocks' steady rate by p, then v, of the tones; loss_rows: × √c
     gauss: Annotated[Any, "2+S, S"]  # points, weights on (0, 1); integrals to all points of each one's polynomial
     extrapolation: Annotated[Any, "f, 5, S, S"]  # force on the next smooth step, 2^{(i-2)/2} times shorter

@@ -156,7 +156,8 @@ def _power_forms(problem: Problem, tables: Tables) -> Any:
     for j, load in enumerate(problem.table_load):
         forms[0, size + 6 * j, :size] += tables.power_rows[load]
     forms[0] = 0.5 * (forms[0] + forms[0].T)
-    forms[1, :size, :size] = tables.loss_rows.T @ tables.loss_rows
+    signs = np.where(np.arange(len(tables.loss_rows)) < int(tables.own_blocks), 1.0, -1.0)
+    forms[1, :size, :size] = (tables.loss_rows.T * signs) @ tables.loss_rows
     return forms
 
 

@@ -63,7 +63,8 @@ def powers(problem, tables, t, x):
         gain += table_value(problem, j, t) * dot(tables.power_rows[problem.table_load[j]], x, size)
     if tables.loss_rows.shape[0] > own:  # damping that couples the blocks has a row per coordinate
         for r in range(tables.loss_rows.shape[0]):
-            loss += dot(tables.loss_rows[r], x, size) ** 2
+            root = dot(tables.loss_rows[r], x, size)
+            loss += root * root if r < own else -root * root
     else:
         loss = _plain_loss(problem.k.size, own, problem.c, tables.steady_rate, x)
     return gain, loss
@@ -249,7 +250,7 @@ def exchanged_over(problem, tables, scratch):
             for k in range(own, n):
                 value += splat8(rows[r, k]) * load8(scratch.along[k], 0)
                 value += splat8(rows[r, n + k]) * load8(scratch.along[n + k], 0)
-        loss += weights * pace * value * value
+        loss += splat8(1.0 if r < own else -1.0) * weights * pace * value * value
     return sum8(gain), sum8(loss)
 
 
