@@ -415,6 +415,40 @@ def test_branches_that_a_type_excludes_are_not_compiled():
             length(1)
 
 
+class Held(NamedTuple):
+    """A field that may be a number or a text, beside others."""
+
+    number: float
+    content: Any
+    more: float
+    last: float
+
+
+@pytest.mark.parametrize("read", ["field", "line"])
+def test_branches_that_the_type_of_a_field_excludes_are_not_compiled(read):
+    """As above, for fields read by themselves or several of them in one line."""
+
+    @known_by_type(lambda kind: False if isinstance(kind, types.Float) else None)
+    @njit
+    def is_text(x):
+        return x == "text"
+
+    @njit
+    def by_field(held):
+        return len(held.content) if is_text(held.content) else 0
+
+    @njit
+    def by_line(held):
+        number, content, more, last = held.number, held.content, held.more, held.last
+        return len(content) if is_text(content) else int(number + more + last)
+
+    length, rest = (by_field, 0) if read == "field" else (by_line, 6)
+    with decorators._SHORTCUTS.taken():
+        assert length(Held(1.0, 1.5, 2.0, 3.0)) == rest
+        assert length(Held(1.0, "text", 2.0, 3.0)) == 4
+        assert length(Held(1.0, "word", 2.0, 3.0)) == rest
+
+
 LINKED = """
 @njit(no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def twice(x):

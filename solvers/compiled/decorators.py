@@ -82,7 +82,7 @@ reordered = _decorator(**_INNER, forceinline=True, fastmath={"reassoc", "contrac
 
 
 class _CompilerNotice(event.Listener):
-    """Says once per process that code is compiled: for runs half a minute, for tangents as much, for friction too."""
+    """Says once per process that code is compiled: half a minute for runs, a third of that for tangents."""
 
     given = False
 

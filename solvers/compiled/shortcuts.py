@@ -66,14 +66,32 @@ def known_by_type(answer: Callable[[Any], bool | None]) -> Callable[[Any], Any]:
 
 
 def _answer(func_ir: Any, arguments: Any, value: Any) -> bool | None:
-    """The value of an expression, if it is a call of such a function with an argument of its caller."""
+    """The value of an expression, if it is a call of such a function with something of a known type."""
     if not (isinstance(value, ir.Expr) and value.op == "call" and value.args):
         return None
     function = getattr(guard(get_definition, func_ir, value.func), "value", None)
-    given = guard(get_definition, func_ir, value.args[0])
-    if not (isinstance(function, Hashable) and function in _ANSWERS and isinstance(given, ir.Arg)):
+    if not (isinstance(function, Hashable) and function in _ANSWERS):
         return None
-    return _ANSWERS[function](arguments[given.index])
+    return _ANSWERS[function](_type_of(func_ir, arguments, value.args[0]))
+
+
+def _type_of(func_ir: Any, arguments: Any, name: Any) -> Any:
+    """The type of an argument of the caller, or of a field of one, also of several fields read in one line; or None."""
+    value = guard(get_definition, func_ir, name)
+    if isinstance(value, ir.Arg):
+        return arguments[value.index]
+    if not isinstance(value, ir.Expr):
+        return None
+    if value.op == "getattr":
+        owner = _type_of(func_ir, arguments, value.value)
+        fields = getattr(owner, "fields", ())
+        return owner.types[fields.index(value.attr)] if value.attr in fields else None
+    if value.op == "static_getitem":
+        line: Any = guard(get_definition, func_ir, value.value)
+        line = guard(get_definition, func_ir, line.value) if getattr(line, "op", "") == "exhaust_iter" else None
+        if getattr(line, "op", "") == "build_tuple":
+            return _type_of(func_ir, arguments, line.items[value.index])
+    return None
 
 
 def _inlined_and_answered(self: Any, state: Any) -> Any:

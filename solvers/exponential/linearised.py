@@ -22,12 +22,16 @@ taken as zero there.
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import Any
+
 import numpy as np
 from numba import types
 
 from solvers.compiled.dop853_tableau import STAGES, A
 from solvers.compiled.kernels import (
     PLANAR_PROBLEM,
+    PROBLEM,
     acceleration_of,
     add_push,
     add_tangential,
@@ -96,7 +100,7 @@ from solvers.problem.friction import CODE, FREE, SLIDES
 _OFF = 1e-10  # relative distance from a knot at which a law is evaluated on one side of it
 
 
-_problem = unpacker(PLANAR_PROBLEM)  # of either type: both have the same fields
+_problem, _planar_problem = unpacker(PROBLEM), unpacker(PLANAR_PROBLEM)
 _tables, _state, _scratch = unpacker(TABLES), unpacker(STATE), unpacker(SCRATCH)
 _derivatives, _variation = unpacker(DERIVATIVES), unpacker(VARIATION)
 
@@ -151,8 +155,8 @@ def _cross_knot(run, s, direction):
         jump -= force_at(problem, s, below, rate, past.entry_rate[s], derivatives.batch)
     jump *= direction
     past.now[LAST_EVENT] = t
-    within, held, friction_jump = rubs(problem, s) and border > 0 and segment + direction > 0, False, 0.0
-    if within:
+    held, friction_jump = False, 0.0
+    if rubs(problem, s) and border > 0 and segment + direction > 0:
         knot, entry_rate = problem.knots[s, border], past.entry_rate[s]
         held = is_held(problem, s, entry_rate, segment, segment + direction, knot, rate)
         if not held:
@@ -161,7 +165,7 @@ def _cross_knot(run, s, direction):
     for c in range(derivatives.y.shape[0]):
         d_delta = change_of(run, past.x, c, s, 0, t)
         derivatives.shift[c, problem.law.size] = -d_delta / rate if abs(rate) > rate_rounding else 0.0
-    if held:  # by the motion before the knot
+    if rubs(problem, s) and held:  # by the motion before the knot
         pass_slider(run, s, np.int64(SLIDES))
     for c in range(derivatives.y.shape[0]):
         shift = derivatives.shift[c, problem.law.size]
@@ -171,7 +175,7 @@ def _cross_knot(run, s, direction):
             derivatives.shift[c, s] = shift
             derivatives.entry[c, s] = 0.0 if floored else change
         add_push(problem, s, -jump * shift, past.x, derivatives.y[c])
-        if within:
+        if rubs(problem, s) and friction_jump != 0.0:
             add_tangential(problem, s, -friction_jump * shift, past.x, derivatives.y[c])
     past.segment[s] += direction
     if rubs(problem, s) and entering:
@@ -307,19 +311,10 @@ def _land(run, row):
         copy(derivatives.trial[c], derivatives.y[c], size)
 
 
-@entry(types.void(types.UniTuple(types.int64, 9), types.int64, types.boolean))
-def linearise_run(addresses, modes, begins):
-    """Move the derivatives along the event record of a run to the time it has reached, and empty the record.
-
-    ``addresses`` are those of the fields of `Linearised`, the state of the run behind its tables; blocks from ``modes``
-    on are tones.
-    """
-    problem_at, ahead_at, behind_at, tables_at, state_at, scratch_at, past_at, derivatives_at, variation_at = addresses
-    run = Linearised(
-        *(_problem(problem_at), _problem(ahead_at), _problem(behind_at), _tables(tables_at), _state(past_at)),
-        *(_scratch(scratch_at), _derivatives(derivatives_at), _variation(variation_at)),
-    )
-    problem, state, past, derivatives = run.problem, _state(state_at), run.past, run.derivatives
+@inner
+def _follow(run, state, modes, begins):
+    """Move the derivatives along a record; here the type of ``run`` is known, so that lines need no friction."""
+    problem, past, derivatives = run.problem, run.past, run.derivatives
     if begins:
         _begin(run)
     for r in range(state.count[RECORDED]):
@@ -340,3 +335,38 @@ def linearise_run(addresses, modes, begins):
     _fly(problem, state.now[T] - past.now[T], derivatives.y)
     past.now[T] = state.now[T]
     rhs(problem, state.now[T], state.x, state.segment, state.entry_rate, derivatives.rate[0], derivatives.batch)
+
+
+@merged
+def _linearise(problem, ahead, behind, addresses, modes, begins):
+    """Move the derivatives with the problem, and those whose laws have the value of the parameter ahead and behind."""
+    _, _, _, tables_at, state_at, scratch_at, past_at, derivatives_at, variation_at = addresses
+    run = Linearised(
+        *(problem, ahead, behind, _tables(tables_at), _state(past_at)),
+        *(_scratch(scratch_at), _derivatives(derivatives_at), _variation(variation_at)),
+    )
+    _follow(run, _state(state_at), modes, begins)
+
+
+def _linearise_line(addresses, modes, begins):
+    """For a `Problem`."""
+    at = addresses
+    _linearise(_problem(at[0]), _problem(at[1]), _problem(at[2]), addresses, modes, begins)
+
+
+def _linearise_plane(addresses, modes, begins):
+    """For a `PlanarProblem`."""
+    at = addresses
+    _linearise(_planar_problem(at[0]), _planar_problem(at[1]), _planar_problem(at[2]), addresses, modes, begins)
+
+
+@lru_cache(maxsize=2)
+def linearise_of(planar: bool) -> Any:
+    """Compiled for a type of problem: it moves derivatives along the event record of a run, and empties the record.
+
+    Its arguments: addresses, those of the fields of `Linearised`, the state of the run behind its tables; blocks from
+    ``modes`` on are tones; whether the run begins. The derivatives end at the time that the run has reached.
+    """
+    return entry(types.void(types.UniTuple(types.int64, 9), types.int64, types.boolean))(
+        _linearise_plane if planar else _linearise_line
+    )

@@ -32,7 +32,7 @@ from solvers.exponential.flight import propagate_blocks, signal_derivatives
 class Derivatives(NamedTuple):
     """Derivatives and scratch arrays; the first index counts columns: the 2n start coordinates, then the parameter.
 
-    `Tangent` fills y, from then on `linearise_run` alone writes to them.
+    `Tangent` fills y, from then on `linearise_of` alone writes to them.
     """
 
     y: Annotated[Any, "columns, X"]  # of the state at fixed time

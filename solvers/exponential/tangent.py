@@ -11,7 +11,7 @@ import numpy as np
 
 from solvers.compiled.dop853_tableau import STAGES
 from solvers.compiled.fields import shapes_of
-from solvers.compiled.kernels import PLANAR_PROBLEM, Problem
+from solvers.compiled.kernels import PlanarProblem, Problem, type_of
 from solvers.compiled.packed import Layout, Packed
 from solvers.compiled.state import (
     HEAD,
@@ -26,7 +26,7 @@ from solvers.compiled.state import (
     radii_of,
 )
 from solvers.exponential.contact.nodes import S
-from solvers.exponential.linearised import linearise_run
+from solvers.exponential.linearised import linearise_of
 from solvers.exponential.linearised_step import DERIVATIVES, VARIATION, Derivatives, Variation
 from solvers.exponential.preparation import places_among_tones
 from solvers.exponential.steady_response import steady_response
@@ -73,13 +73,14 @@ class Tangent:
         here, ahead, behind, variation = (packed.address for packed in self.packed)
         derivatives, past = (words + start for start in layout.starts)
         self.addresses = here, ahead, behind, *engine.addresses[1:], past, derivatives, variation
+        self.linearise = linearise_of(isinstance(problem, PlanarProblem))
         self.log_scale = 0.0  # the derivatives are exp(log_scale) times the arrays
         self.begun = False
 
     def follow(self) -> None:
         """Move the derivatives to the time the engine has reached, and empty its event record."""
         engine = self.engine
-        linearise_run(self.addresses, self.blocks.k.size, not self.begun)
+        self.linearise(self.addresses, self.blocks.k.size, not self.begun)
         self.begun = True
         self.y[:, self.tones] = 0.0  # rounding there would not decay
         if not np.all(np.isfinite(self.y)):
@@ -113,7 +114,7 @@ def _packed(engine: Any, parameters: Array) -> Packed:
     """The problem of an engine with other parameters of its laws."""
     packed: Packed = engine.packed
     same = parameters is engine.problem.parameters
-    return packed if same else packed.replaced(PLANAR_PROBLEM, parameters=parameters)
+    return packed if same else packed.replaced(type_of(engine.problem), parameters=parameters)
 
 
 @lru_cache(maxsize=64)
