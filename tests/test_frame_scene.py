@@ -190,6 +190,14 @@ def test_released_nodes():
     wheel, spring = fb.LumpedMass("B", mass=0.1, inertia=1.0), fb.Spring("B", 1e3, direction="rz")
     found = fb.Scene(loose, [fb.Clamped("A"), fb.Clamped("D")], [wheel], [spring]).reduce(modes=3, elements=9).omega
     assert np.min(np.abs(found / np.sqrt(1e3) - 1)) < 1e-9
+    bar = fb.Section.rectangle(2e11, 7800.0, 0.02, 0.02)
+    sides = (
+        fb.Member("A", "B", bar, release=["end y", "end rz"]),
+        fb.Member("B", "C", bar, release=["start y", "start rz"]),
+    )
+    row, ends = fb.Frame({"A": (0, 0), "B": (1, 0), "C": (2, 0)}, sides), [fb.Clamped("A"), fb.Clamped("C")]
+    with pytest.raises(ValueError, match="releases must not free a node; 'B' moves along 'rz'"):  # y + 0.1 rz alone
+        fb.Scene(row, ends, [fb.LumpedMass("B", 1.0, offset=(0.1, 0.0))]).reduce(modes=3)
 
 
 def test_mechanisms():

@@ -25,6 +25,16 @@ def test_it_is_the_matrices_it_was_given():
     assert one.lines() == []
 
 
+def test_lines_and_interfaces_may_be_anything_that_is_listed():
+    """Ranges, keys, rows of an array, and what can be gone through only once."""
+    K3, at = np.diff(np.eye(4), axis=0).T @ np.diff(np.eye(4), axis=0), {n: (n, 0.0, 0.0) for n in range(4)}
+    labels = [(n, "x") for n in range(4)]
+    for lines in ([range(4)], [at], np.array([[0.0, 1.0], [1.0, 2.0], [2.0, 3.0]])):
+        chain = fb.Structure(K3, np.eye(4), labels=labels, nodes=at, lines=lines)
+        assert chain.edges == ((0, 1), (1, 2), (2, 3))
+    assert chain.reduced(iter([0, 3]), modes=1).labels == chain.reduced([0, 3], modes=1).labels
+
+
 def test_the_callers_arrays_stay():
     given, mass = K.copy(), sparse.csr_matrix(M)
     one = fb.Structure(given, mass)

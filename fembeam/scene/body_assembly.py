@@ -22,7 +22,6 @@ from fembeam.scene.places import place_words, quoted
 from fembeam.scene.rotors import Disk, gyroscopic, shaft_axes
 from fembeam.scene.signals import support_motion
 from fembeam.structures import (
-    COMPONENTS,
     Assembled,
     Frame,
     Six,
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
 
 MOST_RIGID = 6
-INERT = 1.0 - 1e-9  # of 1: the share of a motion that a mass has inertia for
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,16 +200,15 @@ def _free_stiffness(scene: Scene, assembled: Assembled) -> Vector:
     return np.asarray(_with_parts(scene, assembled)[1][free][:, free].toarray())
 
 
-def _holding(scene: Scene) -> dict[Any, list[str]]:
-    """{place: components} that supports or inertia hold."""
-    found: dict[Any, list[str]] = {}
+def _holding(scene: Scene) -> dict[Any, list[Any]]:
+    """{place: components that supports hold, and rows (6,) of what has inertia}."""
+    found: dict[Any, list[Any]] = {}
     for part in scene.supports:
         found.setdefault(part.z, []).extend(dof for dof in part.dofs if dof in scene.beam.components)
     for mass in scene.masses:
         rows = _moved_by(mass, scene.beam)
-        shares = [np.diag(np.linalg.pinv(block) @ block) for block in (rows[:, :3], rows[:, 3:])]
-        inert = np.concatenate(shares) > INERT
-        found.setdefault(mass.z, []).extend(c for c, moves in zip(COMPONENTS, inert, strict=True) if moves)
+        sizes = np.linalg.norm(rows, axis=1)
+        found.setdefault(mass.z, []).extend(rows[sizes > 0.0] / sizes[sizes > 0.0, None])
     return found
 
 

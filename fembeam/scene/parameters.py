@@ -105,10 +105,18 @@ def path_of(scene: Scene, name: str) -> str:
 def numbered(scene: Scene, path: str) -> str:
     """A path with numbers for the names of parts: "stops[0].gap" for "stops[valve].gap"; what is a number stays one."""
     for numbers, part in scene.named_parts.items():
-        called = f"{numbers.rpartition('[')[0]}[{part.name}]."
-        if path.startswith(called) and not part.name.isdecimal():
-            return f"{numbers}.{path.removeprefix(called)}"
+        parts = numbers.rpartition("[")[0]
+        if path.startswith(f"{parts}[{part.name}].") and not _is_number(scene, parts, part.name):
+            return f"{numbers}.{path.removeprefix(f'{parts}[{part.name}].')}"
     return path
+
+
+def _is_number(scene: Scene, parts: str, name: str) -> bool:
+    """Whether a name is the number of one of the parts at a path, such as "bodies[0].stops": then it means this one."""
+    *bodies, last = parts.split(".")
+    for body in bodies:
+        scene = scene.bodies[int(body.removeprefix("bodies[").removesuffix("]"))]
+    return name.isdecimal() and int(name) < len(getattr(scene, last))
 
 
 def called(scene: Scene, name: str) -> str:
@@ -124,7 +132,7 @@ def _by_name(scene: Scene, known: Iterable[str]) -> list[str]:
         f"{numbers.rpartition('[')[0]}[{part.name}]{path.removeprefix(numbers)}"
         for path in known
         for numbers, part in parts
-        if path.startswith(f"{numbers}.") and not part.name.isdecimal()
+        if path.startswith(f"{numbers}.")
     ]
 
 

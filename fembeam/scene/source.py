@@ -125,8 +125,8 @@ def _override(tables: dict[str, Any], text: str) -> None:
     for i, (name, after) in enumerate(pairwise([*path, ""])):
         if isinstance(item, list):
             called = [number for number, one in enumerate(item) if isinstance(one, dict) and one.get("name") == name]
-            if name.isdecimal():  # a number, whatever parts are called
-                called = [int(name)] if int(name) < len(item) else []
+            if name.isdecimal() and int(name) < len(item):  # a number, whatever parts are called
+                called = [int(name)]
             if not called:
                 has = f"{'.'.join(path[:i])} has {counted(len(item), 'item')}"
                 raise ValueError(f"--set {text}: {has}, counted from 0, none of the name {name!r}")

@@ -12,7 +12,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from multiprocessing import active_children, parent_process
@@ -818,12 +818,14 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor | None]:
     if workers == 1:
         yield None
         return
+    others = {process.pid for process in active_children()}
     with ProcessPoolExecutor(workers, initializer=_end_with_parent) as pool:
         try:
             yield pool
         except KeyboardInterrupt:
-            for process in active_children():
-                os.kill(process.pid or 0, signal.SIGINT)
+            for pid in {process.pid for process in active_children()} - others:
+                with suppress(ProcessLookupError):  # it has ended
+                    os.kill(pid or 0, signal.SIGINT)
             raise
 
 

@@ -265,7 +265,7 @@ class Frame:
         named = f", or write {str(z)!r}, the node" if str(z) in self.nodes else in_mm(z, most)
         raise ValueError(f"z must lie on the frame, {least:g} to {most:g} m, got {z} in {where}; move it{named}")
 
-    def check_held(self, held: Mapping[Any, Collection[str]], where: str) -> None:
+    def check_held(self, held: Mapping[Any, Collection[Any]], where: str) -> None:
         """Raise ValueError where releases free a node: `held` are its components that supports or inertia hold."""
         from fembeam.structures.frame_checks import check_held
 
@@ -317,11 +317,11 @@ class Frame:
         >>> [node for node, component in beam.reduced(["A", "B"], modes=2).labels if component in ("x", "mode")]
         ['A', 'B', 'mode 1', 'mode 2']
         """
-        from fembeam.structures.superelement import check_interface, reduced
+        from fembeam.structures.superelement import interface_of, reduced
 
-        check_interface(nodes, "Frame.reduced")
-        made = self.assembled(elements, max(int(modes), 1) if is_finite(modes) else None, tuple(nodes))
-        return reduced(self, made, nodes, modes, "Frame.reduced")
+        listed = interface_of(nodes, "Frame.reduced")
+        made = self.assembled(elements, max(int(modes), 1) if is_finite(modes) else None, tuple(listed))
+        return reduced(self, made, listed, modes, "Frame.reduced")
 
     def assembled(
         self,

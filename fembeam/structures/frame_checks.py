@@ -157,7 +157,7 @@ def _unheld(rows: Vector, names: Sequence[str]) -> str | None:
     return None if size[-1] > ALIGNED else names[int(np.argmax(np.abs(directions[-1])))]
 
 
-def check_held(frame: Frame, held: Mapping[Any, Collection[str]], where: str) -> None:
+def check_held(frame: Frame, held: Mapping[Any, Collection[Any]], where: str) -> None:
     """Raise ValueError if releases leave a node free: `held` are the components that supports or inertia there hold."""
     at: dict[Any, list[str]] = {}
     for place, components in held.items():
@@ -190,10 +190,11 @@ def _ends(frame: Frame, node: str) -> list[tuple[int, int]]:
     return [(i, end) for i, one in enumerate(frame.members) for end in range(2) if node == (one.a, one.b)[end]]
 
 
-def carried(frame: Frame, node: str, held: Collection[str]) -> list[Vector]:
-    """Rows (…, 6) of the motions of a node that its members carry, and of those that are `held` by something else."""
+def carried(frame: Frame, node: str, held: Collection[Any]) -> list[Vector]:
+    """Rows (…, 6) of the motions of a node that its members carry, and of the components or rows `held` otherwise."""
     members = [_kept(frame, i, end) @ arm_matrix(frame.members[i].offset[end]) for i, end in _ends(frame, node)]
-    return [*members, *(np.eye(6)[[COMPONENTS.index(name)]] for name in held)]
+    rows = (np.eye(6)[COMPONENTS.index(one)] if isinstance(one, str) else one for one in held)
+    return [*members, *(row[None] for row in rows)]
 
 
 def _carries(frame: Frame, member: int) -> None:

@@ -204,7 +204,7 @@ class JoinedBodies:
         each = [(number, body.check()) for number, body in enumerate(self.bodies) if hasattr(body, "check")]
         return [f"body {number}: {said}" for number, sentences in each for said in sentences]
 
-    def check_held(self, held: Mapping[Any, Collection[str]], where: str) -> None:
+    def check_held(self, held: Mapping[Any, Collection[Any]], where: str) -> None:
         """Raise ValueError where releases free a node of a frame that neither supports nor joints hold."""
         at: list[tuple[Any, Collection[str]]] = [(self.located(place, where), dofs) for place, dofs in held.items()]
         joined = [

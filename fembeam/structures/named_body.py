@@ -114,12 +114,12 @@ def checked_edges(lines: Any, nodes: dict[Hashable, Vector], where: str) -> tupl
     require(listed, "lines must be a list", lines, where, PAIRS)
     chains = []
     for chain in lines:
-        paired = isinstance(chain, (list, tuple, np.ndarray)) and len(chain) > 1
-        require(paired, "each of lines must be two nodes, or a chain of more", chain, where, PAIRS)
-        chains.append(tuple(int(n) if isinstance(n, np.integer) else n for n in chain))
+        found = tuple(chain) if isinstance(chain, Iterable) and not isinstance(chain, str) else ()
+        require(len(found) > 1, "each of lines must be two nodes, or a chain of more", chain, where, PAIRS)
+        chains.append(tuple(int(n) if isinstance(n, np.integer) else n for n in found))
     for chain in chains:
         for node in chain:
-            require(isinstance(node, (str, int)), "lines must join names or numbers of nodes", node, where, PAIRS)
+            require(isinstance(node, Hashable), "lines must join names or numbers of nodes", node, where, PAIRS)
             require(node in nodes, f"lines must join nodes whose coordinates are given; {nearest(node, list(nodes))}",
                     node, where, "add it to nodes")  # fmt: skip
     return tuple(pair for chain in chains for pair in pairwise(chain))

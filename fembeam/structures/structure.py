@@ -196,10 +196,9 @@ class Structure(NamedBody):
         >>> chain.reduced([1, 3], modes=0).K.toarray().tolist()
         [[0.5, -0.5], [-0.5, 0.5]]
         """
-        from fembeam.structures.superelement import check_interface, reduced
+        from fembeam.structures.superelement import interface_of, reduced
 
-        check_interface(nodes, "Structure.reduced")
-        listed = [self.node(node) for node in nodes]
+        listed = [self.node(node) for node in interface_of(nodes, "Structure.reduced")]
         own = self.condensed(listed)
         return reduced(own, own.assembled(), listed, modes, "Structure.reduced")
 

@@ -11,7 +11,7 @@ R.R. Craig, M.C.C. Bampton, AIAA Journal 6 (1968) 1313.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -57,10 +57,11 @@ def reduced(body: Any, made: Assembled, nodes: Sequence[Any], modes: int, where:
     return found.knowing(root, np.asarray(T.T @ made.base_loads[:, along]))
 
 
-def check_interface(nodes: Any, where: str) -> None:
-    """Raise ValueError unless nodes are a list with one at least; a name by itself would be a list of letters."""
-    listed = isinstance(nodes, Iterable) and not isinstance(nodes, (str, Mapping)) and len(list(nodes)) > 0
-    require(listed, "nodes must name the places of joints, supports and stops", nodes, where, "write ['A', 'B']")
+def interface_of(nodes: Any, where: str) -> list[Any]:
+    """Nodes as a list with one at least, or ValueError; a name by itself would be a list of letters."""
+    listed = list(nodes) if isinstance(nodes, Iterable) and not isinstance(nodes, str) else []
+    require(bool(listed), "nodes must name the places of joints, supports and stops", nodes, where, "write ['A', 'B']")
+    return listed
 
 
 def _dofs(body: Any, made: Assembled, node: Any, where: str) -> dict[str, int]:
