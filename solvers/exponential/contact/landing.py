@@ -750,6 +750,8 @@ def _locate(problem, tables, state, scratch, stop, border, search):
         if not shortest < following <= search.longest or following == length:
             break
         last_length, last_value, length = length, value, following
+    else:
+        return Zero(last_length, last_value, rounding, known)
     return Zero(length, np.nan, rounding, 0.0)
 
 
