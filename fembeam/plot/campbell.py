@@ -37,7 +37,7 @@ def campbell(result: Campbell, axes: Axes | None = None) -> Figure:
     for kind, colour, name in KINDS:
         mine = result.turning == kind
         if mine.any():
-            axis.plot(spins[mine], result.omega[mine], ".", color=colour, markersize=3, label=name)
+            axis.scatter(spins[mine], result.omega[mine], 9.0, color=colour, marker=".", label=name)
     low, high = result.spins[0], result.spins[-1]
     line = np.unique([low, min(max(0.0, low), high), high])
     axis.plot(line, np.abs(line), "--", color=GREY, linewidth=1.0, label="ω = Ω" if low >= 0.0 else "ω = |Ω|")
