@@ -59,7 +59,13 @@ from solvers.exponential.contact.node_response import (
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import maximum_and_place, motion_around, polynomial
 from solvers.exponential.contact.slider_margins import (
+    BEGIN,
+    DELTA_RIPPLED,
+    DELTA_ROUNDED,
+    END,
     ENDS,
+    RATE_RIPPLED,
+    RATE_ROUNDED,
     margin_rounding,
     slider_margins_around,
     slider_margins_at_nodes,
@@ -81,7 +87,7 @@ _ROOT_EXPECTED = 1e-4  # the same beyond the end of the step, where the polynomi
 _SLOPE_STEP = 1e-5  # relative step in σ for the slope of this polynomial at its root
 _MOST_ILLINOIS = 6  # iterations for a root of the polynomial through the nodes
 _INTERPOLATED = 4.0  # rounding of a margin at points around a node, in units of that at the nodes
-_LOWEST = 2  # place in `Scratch.ends`, once the rounding is known, of the lowest margin at the end or between nodes
+_LOWEST = DELTA_ROUNDED  # its place in `Scratch.ends` is later that of the lowest margin at the end or between nodes
 _CHECKED_BELOW = 0.5  # margin at an end of a landing, in units of its largest, below which minima inside are looked for
 _CLEAR = 0.03  # estimate of such a minimum, in the same units, that counts as positive
 
@@ -128,7 +134,7 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
 
     The start is moved by the rounding of δ in the direction of the motion: before its first motion a law may depend on
     the sign of δ. The margins there are evaluated again with the rounding of δ and of δ̇, and with the ripple of fast
-    blocks in δ and in δ̇; see `slider_margins.ENDS`.
+    blocks in δ and in δ̇.
     """
     if rubs(problem, s):
         slider_margins_on_step(problem, tables, state, scratch, s, node_set, level)
@@ -139,20 +145,21 @@ def _margins_on_step(problem, tables, state, scratch, s, node_set, level):
     direction, rounding = math.copysign(1.0, rate), surface_tolerance(problem, s, state.x)
     for i in range(ENDS):
         deltas[i], rates[i] = delta + direction * rounding, rate
-    deltas[1], rates[1] = indentation_and_rate(problem, s, scratch.x_new)
-    deltas[2] += direction * rounding
-    rates[3] += direction * max(rate_tolerance(problem, s, state.x), REST * scratch.reference_speed[s])
-    deltas[4] += direction * ripple_of(weight, alias, state.x, n)
-    rates[5] += direction * rate_ripple_of(weight, problem.k, alias, state.x, n)
+    deltas[END], rates[END] = indentation_and_rate(problem, s, scratch.x_new)
+    deltas[DELTA_ROUNDED] += direction * rounding
+    rates[RATE_ROUNDED] += direction * max(rate_tolerance(problem, s, state.x), REST * scratch.reference_speed[s])
+    deltas[DELTA_RIPPLED] += direction * ripple_of(weight, alias, state.x, n)
+    rates[RATE_RIPPLED] += direction * rate_ripple_of(weight, problem.k, alias, state.x, n)
     margins(problem, state, s, ENDS, deltas, rates, scratch.ends)
     _margins_at_nodes(problem, tables, state, scratch, s, node_set, tables.contact_step[level])
     for j in range(problem.border_count[s]):
         ends = scratch.ends[ENDS * j : ENDS * (j + 1)]
-        largest = max(abs(ends[0]), abs(ends[1]))
+        largest = max(abs(ends[BEGIN]), abs(ends[END]))
         for i in range(S):
             largest = max(largest, abs(scratch.margin[S * j + i]))
         scratch.largest[s, j] = largest
-        scratch.noise[s, j] = max(ROUNDING * largest, 2.0 * (abs(ends[2] - ends[0]) + abs(ends[3] - ends[0])))
+        rounding = abs(ends[DELTA_ROUNDED] - ends[BEGIN]) + abs(ends[RATE_ROUNDED] - ends[BEGIN])
+        scratch.noise[s, j] = max(ROUNDING * largest, 2.0 * rounding)
 
 
 @merged
@@ -267,7 +274,7 @@ def _expect(tables, scratch, s, j, node_set, h):
 
     The parabola through the last two nodes and the end tells whether that is worth a closer look.
     """
-    nodes, margin, end = tables.nodes[node_set], scratch.margin[S * j : S * j + S], scratch.ends[ENDS * j + 1]
+    nodes, margin, end = tables.nodes[node_set], scratch.margin[S * j : S * j + S], scratch.ends[ENDS * j + END]
     fall = (margin[S - 1] - end) / (1.0 - nodes[S - 1])
     before = (margin[S - 2] - margin[S - 1]) / (nodes[S - 1] - nodes[S - 2])
     last = 2.0 ** (1.0 / tables.time_exponent[node_set])
@@ -305,7 +312,7 @@ def _crossing_time(problem, tables, state, scratch, s, j, node_set, h):
     stick has begun, it rises by less than its noise: told to fall at once, the slider would stick and slip at one
     instant for ever.
     """
-    noise, before, t = scratch.noise[s, j], scratch.ends[ENDS * j], 0.0
+    noise, before, t = scratch.noise[s, j], scratch.ends[ENDS * j + BEGIN], 0.0
     tolerance = max(ON_BORDER * scratch.largest[s, j], noise)
     overshot = state.now[T] == state.now[LAST_EVENT] and state.now[T] > 0.0 and scratch.margin[S * j] > before
     overshot &= before > -_MISSED * scratch.largest[s, j]
@@ -315,7 +322,7 @@ def _crossing_time(problem, tables, state, scratch, s, j, node_set, h):
     if _falls_as_run_begins(problem, tables, state, scratch, s, j, before, h * tables.times[node_set, 0]):
         return 0.0, 0.0
     for i in range(S + 1):
-        value = scratch.margin[S * j + i] if i < S else scratch.ends[ENDS * j + 1]
+        value = scratch.margin[S * j + i] if i < S else scratch.ends[ENDS * j + END]
         after = h * tables.times[node_set, i] if i < S else h
         if value < -noise and not (overshot and before < -noise and value > before):
             believed = state.count[AT_ONCE] >= _UNDECIDED and rubs(problem, s) and slider_of(problem, s)[CODE] == STICK
@@ -329,7 +336,7 @@ def _crossing_time(problem, tables, state, scratch, s, j, node_set, h):
             return time, slope if not _has_kink(problem, scratch, s) else 0.0
         before, t = value, after
     first = h * tables.times[node_set, 0]
-    return _before_first_node(problem, state, scratch, s, j, scratch.ends[ENDS * j], first, h), 0.0
+    return _before_first_node(problem, state, scratch, s, j, scratch.ends[ENDS * j + BEGIN], first, h), 0.0
 
 
 @inlined
@@ -348,9 +355,9 @@ def _crossing_between_nodes(problem, tables, state, scratch, s, j, node_set, h):
     """
     ends, values = scratch.ends[ENDS * j : ENDS * (j + 1)], scratch.margin[S * j : S * j + S]
     watched, t = WATCHED_BELOW * scratch.largest[s, j], tables.times[node_set]
-    ends[_LOWEST] = ends[1]
+    ends[_LOWEST] = ends[END]
     for i in range(S):
-        before, after = values[i - 1] if i > 0 else ends[0], values[i + 1] if i < S - 1 else ends[1]
+        before, after = values[i - 1] if i > 0 else ends[BEGIN], values[i + 1] if i < S - 1 else ends[END]
         low = values[i] <= min(before, after, watched)
         if i == 0:
             low |= before <= watched and _has_minimum_within(before, values[0], after, t[0], t[1])
@@ -386,7 +393,8 @@ def _crossing_around(problem, tables, state, scratch, s, j, node_set, h, lowest)
 def _may_be_hidden(scratch, s, j):
     """Whether fast blocks, which the nodes do not resolve, may make a margin negative at or between them."""
     ends = scratch.ends[ENDS * j : ENDS * (j + 1)]
-    ripple, lowest = abs(ends[4] - ends[0]) + abs(ends[5] - ends[0]), ends[_LOWEST]
+    ripple = abs(ends[DELTA_RIPPLED] - ends[BEGIN]) + abs(ends[RATE_RIPPLED] - ends[BEGIN])
+    lowest = ends[_LOWEST]
     for i in range(S):
         lowest = min(lowest, scratch.margin[S * j + i])
     return ripple > scratch.noise[s, j] and lowest < ripple

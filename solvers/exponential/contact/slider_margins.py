@@ -61,7 +61,8 @@ from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR
 from solvers.exponential.tables import STIFFNESS as ELASTICITY
 from solvers.problem.friction import CODE, CUT, FREE, MU, PEAK, PRESSES, SLIDES, STICK, STIFFNESS
 
-ENDS = 6  # margins in `Scratch.ends` for a border: at start, end; at the start with rounding, then ripple, in δ and δ̇
+ENDS = 6  # margins in `Scratch.ends` for a border: at the start, at the end, and at the start with what may change it
+BEGIN, END, DELTA_ROUNDED, RATE_ROUNDED, DELTA_RIPPLED, RATE_RIPPLED = range(ENDS)
 _SLOPE_ROUNDING = 1e-8  # of a margin, in units of its largest, that contains the slope of a polynomial
 _TINY = 1e-300  # m, keeps N/δ finite
 _DIFFERENCE_STEP = 1e-6  # relative step in δ and δ̇ for differences of the slopes of N
@@ -226,13 +227,13 @@ def _ends_by_polynomial(problem, tables, scratch, s):
     """
     begin_told, end_told, far, summary = True, True, True, scratch.local_motion[KNOWN, :S]
     for j in range(problem.border_count[s]):
-        end, margin = scratch.ends[ENDS * j : ENDS * j + 2], scratch.margin[S * j : S * j + S]
+        ends, margin = scratch.ends[ENDS * j : ENDS * (j + 1)], scratch.margin[S * j : S * j + S]
         combine(tables.summary[0], margin, S, None, summary)
-        end[0], end[1], values = summary[AT_BEGIN], summary[AT_END], load8(margin, 0)
+        ends[BEGIN], ends[END], values = summary[AT_BEGIN], summary[AT_END], load8(margin, 0)
         zero = max(_LEFT_OUT * max(abs(summary[2]), abs(summary[3])), _CLEAR_OF_ZERO * largest8(size8(values)))
-        begin_told &= end[0] > zero
-        end_told &= abs(end[1]) > zero
-        far &= min(end[0], end[1], least8(values)) > zero
+        begin_told &= ends[BEGIN] > zero
+        end_told &= abs(ends[END]) > zero
+        far &= min(ends[BEGIN], ends[END], least8(values)) > zero
     return begin_told, end_told, begin_told and end_told and far
 
 
@@ -242,11 +243,11 @@ def _ends_in_states(problem, state, scratch, s, h, begin_told, end_told):
     if not end_told:
         slider_margins_in(problem, state, scratch, s, state.now[T] + h, scratch.x_new, 0.0, scratch.fired)
         for j in range(problem.border_count[s]):
-            scratch.ends[ENDS * j + 1] = scratch.fired[j]
+            scratch.ends[ENDS * j + END] = scratch.fired[j]
     if not begin_told:
         slider_margins_in(problem, state, scratch, s, state.now[T], state.x, 0.0, scratch.fired)
         for j in range(problem.border_count[s]):
-            scratch.ends[ENDS * j] = scratch.fired[j]
+            scratch.ends[ENDS * j + BEGIN] = scratch.fired[j]
 
 
 @part(RUB_MARGINS, types.void, *[types.int64] * 3)
@@ -269,9 +270,10 @@ def slider_margins_on_step(problem, tables, state, scratch, s, node_set, level):
         slopes = _margin_slopes(problem, tables, state, scratch, s)
     _ends_in_states(problem, state, scratch, s, h, begin_told, end_told)
     for j in range(problem.border_count[s]):
-        end = scratch.ends[ENDS * j : ENDS * (j + 1)]
-        end[2], end[3], end[4], end[5] = end[0], end[0], end[0], end[0]
-        scratch.largest[s, j] = max(abs(end[0]), abs(end[1]), largest8(size8(load8(scratch.margin[S * j :], 0))))
+        ends, values = scratch.ends[ENDS * j : ENDS * (j + 1)], load8(scratch.margin[S * j :], 0)
+        for i in range(DELTA_ROUNDED, ENDS):
+            ends[i] = ends[BEGIN]
+        scratch.largest[s, j] = max(abs(ends[BEGIN]), abs(ends[END]), largest8(size8(values)))
     if not far:
         _add_rounding(problem, state, scratch, s, slopes, ripple, faster)
 
@@ -292,7 +294,7 @@ def _add_rounding(problem, state, scratch, s, slopes, ripple, faster):
         if j == PRESSES:
             by_delta, by_rate, by_way, by_speed = normal_by_delta, normal_by_rate, 0.0, 0.0
         if j == SLIDES or slips:
-            scratch.ends[ENDS * j + 4] += (by_delta + by_way) * ripple + by_speed * faster
+            scratch.ends[ENDS * j + DELTA_RIPPLED] += (by_delta + by_way) * ripple + by_speed * faster
         noise = by_delta * delta + by_rate * rate + by_way * xi + by_speed * max(xi_rate, rest)
         differenced = j == SLIDES and slips and _rate_dependent(problem, s)
         share = _SLOPE_ROUNDING if differenced else ROUNDING
