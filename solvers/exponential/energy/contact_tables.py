@@ -39,25 +39,41 @@ def contact_table(
     apart = lagrange_weights(nodes)
     weights = np.array([apart, apart * nodes ** (-weight_exponent)])
     points = gauss(_POINTS)
-    out = np.zeros((len(h), len(k), SQUARES + S + 2, 2 * S))
-    shapes = (_POINTS, _ROWS), (2, _POINTS, S), (_POINTS, 2, _BEGIN), (2, _ROWS), (_ROWS, _WIDE)
+    sums = np.zeros((len(h), len(k), _ROWS, _WIDE))
+    shapes = (_POINTS, _ROWS), (2, _POINTS, S), (_POINTS, 2, _BEGIN), (2, _ROWS)
     scratch = tuple(np.zeros(shape) for shape in shapes)
     structure = k.copy(), c.copy(), h.copy()
     kind = time_exponent, weight_exponent, nodes.copy(), weights
-    _fill(structure, kind, (points, np.vstack((so_far(points[0]), points[1]))), scratch, out)
+    _integrate(structure, kind, (points, np.vstack((so_far(points[0]), points[1]))), scratch, sums)
+    return _table(sums[..., :S], sums[..., S:])
+
+
+def _table(moments: Any, products: Any) -> Any:
+    """Tables of all blocks from their ∫ L_i v dt and ∫ v_e v_f dt with f <= e, every form once."""
+    plain, entering, x = slice(0, S), slice(S, _BEGIN), slice(_BEGIN, _ROWS)
+    out = np.zeros((*moments.shape[:2], SQUARES + S + 2, 2 * S))
+    forms = (plain, 0, 1.0), (x, S, 2.0), (entering, ENTERING, 2.0)
+    for rows, first, factor in forms:
+        there = out[:, :, first : first + rows.stop - rows.start]
+        there[..., :S], there[..., S:] = moments[:, :, rows], factor * products[:, :, rows, plain]
+    out[:, :, SQUARES : SQUARES + S, :S] = products[:, :, entering, entering]
+    out[:, :, SQUARES + S :, :S] = 2.0 * products[:, :, x, entering]
+    squares = products[:, :, x, x]
+    out[:, :, BEGAN, 0], out[:, :, BEGAN, 2] = squares[..., 0, 0], squares[..., 1, 1]
+    out[:, :, BEGAN, 1] = 2.0 * squares[..., 1, 0]
     return out
 
 
 @kernel
-def _fill(structure, kind, rule, scratch, out):
-    """Fill all tables of a kind; ``rule`` has the points of a panel and the weights of integrals up to these."""
+def _integrate(structure, kind, rule, scratch, sums):
+    """Integrals of all steps and blocks; ``rule`` has the points of a panel and weights of integrals up to these."""
     (k, c, h), (time_exponent, _, _, _), (points, _) = structure, kind, rule
-    velocity, basis, pushed, state, sums = scratch
+    velocity, basis, pushed, state = scratch
     for level in range(h.size):
         known = 0  # panels for which ``basis`` has been computed; it can be reused if there is one panel
         for b in range(k.size):
             panels = 1 + int(time_exponent * (math.sqrt(k[b]) + c[b]) * h[level] / _PANEL)
-            state[:], sums[:] = 0.0, 0.0
+            state[:] = 0.0
             state[0, _BEGIN], state[1, _BEGIN + 1] = 1.0, 1.0
             for panel in range(panels):
                 begin, width = panel / panels, 1.0 / panels
@@ -70,23 +86,7 @@ def _fill(structure, kind, rule, scratch, out):
                 for q in range(points.shape[1]):
                     sigma = begin + width * points[0, q]
                     measure = points[1, q] * width * h[level] * time_exponent * sigma ** (time_exponent - 1.0)
-                    _add_products(measure, basis[0, q], velocity[q], sums)
-            _write(sums, out[level, b])
-
-
-@inner
-def _write(sums, out):
-    """Write a block's table from ∫ L_i v dt and ∫ v_e v_f dt, every form once."""
-    x = _BEGIN
-    for i in range(S):
-        for j in range(S):
-            out[j, i], out[j, S + i] = sums[j, i], sums[j, S + i]
-            out[ENTERING + j, i], out[ENTERING + j, S + i] = sums[S + j, i], 2.0 * sums[S + j, S + i]
-            out[SQUARES + j, i] = sums[S + j, 2 * S + i]
-        for j in range(2):
-            out[S + j, i], out[S + j, S + i] = sums[x + j, i], 2.0 * sums[x + j, S + i]
-            out[SQUARES + S + j, i] = 2.0 * sums[x + j, 2 * S + i]
-    out[BEGAN, 0], out[BEGAN, 1], out[BEGAN, 2] = sums[x, S + x], 2.0 * sums[x + 1, S + x], sums[x + 1, S + x + 1]
+                    _add_products(measure, basis[0, q], velocity[q], sums[level, b])
 
 
 @inner
