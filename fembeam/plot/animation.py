@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.plot.bodies import BodyStage
+from fembeam.plot.figure import side_by_side
 from fembeam.plot.run_signals import samples_in
 from fembeam.plot.style import BLUE, GREY, ORANGE, RED, entry, own_colour, styled
 from fembeam.plot.units import length_for, unit_for
@@ -27,7 +28,6 @@ Vector = NDArray[np.float64]
 
 MOST_FRAMES = 1000  # above it a GIF takes minutes and fills disks
 POINTS = 121  # along a beam
-ACROSS, HANDLE = 96, 8  # characters of a legend side by side, and as many as the handle of an entry takes
 STAY = 0.6  # of the height of the picture, the length of the arrow of the largest force
 
 
@@ -233,9 +233,7 @@ class _Stage:
             self.force_axis.set(yticks=[], ylabel="")
         if len(self.forces) > 1:
             handles, labels = self.force_axis.get_legend_handles_labels()
-            longest = max(len(line) for label in labels for line in label.splitlines())
-            columns = max(1, min(4, ACROSS // (longest + HANDLE)))
-            self.figure.legend(handles, labels, loc="outside lower center", ncols=columns)
+            self.figure.legend(handles, labels, loc="outside lower center", ncols=side_by_side(labels, 4))
         for _ in range(2):  # the first may change the ticks, and so the space for them
             self.figure.draw_without_rendering()
         self.figure.set_layout_engine("none")  # takes longer than a picture

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 TITLE = 12.5  # characters of a title on an inch of a figure
 NARROWEST = 20  # characters of a line
 FULL = 0.96  # of the width, as letters are wider where there are fewer dots an inch
+ACROSS, HANDLE = 96, 8  # characters of a legend side by side, and as many as the handle of an entry takes
 MANY_ROOM = "the axes must be as many as the figure has panels"
 
 
@@ -90,3 +91,15 @@ def legend(axis: Axes, own: bool, loc: str, **options: Any) -> None:
         figure.legend(loc=loc, **options)
     else:
         axis.legend(**options)
+
+
+def side_by_side(labels: Sequence[str], most: int) -> int:
+    """How many columns of a legend as wide as a figure its entries fit into, at most ``most``.
+
+    Examples
+    --------
+    >>> side_by_side(["valve"] * 19, 5), side_by_side(["a stop with a name of forty letters, thick"], 5)
+    (5, 1)
+    """
+    longest = max(len(line) for label in labels for line in label.splitlines())
+    return max(1, min(most, ACROSS // (longest + HANDLE)))

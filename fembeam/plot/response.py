@@ -33,7 +33,7 @@ from fembeam.model import places
 from fembeam.plot.axis_names import coordinate_name
 from fembeam.plot.bodies import deflected_figure
 from fembeam.plot.body_shapes import body_mode_shapes
-from fembeam.plot.figure import after, heading, sheet
+from fembeam.plot.figure import after, heading, sheet, side_by_side
 from fembeam.plot.random import density_panels
 from fembeam.plot.run_signals import (
     between_samples,
@@ -62,6 +62,7 @@ PERIODS = 8  # of the lowest mode in a time history
 BEFORE = 0.3  # of a transient's window, before the largest force
 FEW = 10  # samples in a contact, below which its peak is drawn instead of its history
 LEGEND_COLUMNS, LEGEND_ROW = 2, 0.2  # of mode shapes; a row's height in units of the axis
+LEGEND_ROWS = 4  # of forces, above their axis
 
 
 @styled
@@ -269,7 +270,8 @@ def _draw_forces(axis: Axes, run: Run, lo: float, hi: float, least: float, tick:
     kind = "peak contact force" if len(drawn) > len(always) and np.all(short[inside]) else "contact force"
     axis.set_ylabel(f"{'force' if len(always) else kind} / {unit}")
     if len(run.stops) > 1 and len(drawn):
-        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=2, borderaxespad=0.0, fontsize=8)
+        columns = side_by_side(axis.get_legend_handles_labels()[1], max(2, -(-len(drawn) // LEGEND_ROWS)))
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 0.98), ncols=columns, borderaxespad=0.0, fontsize=8)
     if len(drawn):
         axis.set_ylim(bottom=min(0.0, axis.get_ylim()[0]))
     else:
