@@ -15,16 +15,15 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import linalg as sparse_linalg
 
-import reduction
+from fembeam.scene import rigid_shapes
 from fembeam.structures import COMPONENTS
 from reduction.modal import factored
 
 if TYPE_CHECKING:
-    from fembeam.scene import BodyMatrices, Matrices, Scene
+    from fembeam.scene import BodyMatrices, Scene
 
 Vector = NDArray[np.float64]
 REFINED = 2  # times
-MOST_RIGID = 6
 
 
 class BodyHeld:
@@ -82,13 +81,6 @@ class BodyHeld:
             return np.asarray(-part.stiffness * (self.full.own_row(part.z, part.along) @ self.displacement)[0])
         number = next(i for i, one in enumerate(self.scene.springs) if one is part) - len(self.scene.springs)
         return np.asarray(-np.sqrt(part.stiffness) * self.stresses[number])
-
-
-def rigid_shapes(matrices: Matrices, most: int = MOST_RIGID) -> Vector:
-    """Rigid-body modes (N, r) on the free dofs."""
-    count = min(most, matrices.M.shape[0])
-    lowest = reduction.modal_basis(matrices.M, matrices.K, count, root=matrices.root)
-    return np.asarray(lowest.vectors[:, lowest.omega == 0.0])
 
 
 def static_solver(K: sparse.csr_matrix, M: sparse.csr_matrix, rigid: Vector) -> Any:

@@ -26,8 +26,8 @@ from scipy import sparse
 
 import reduction
 from fembeam.beams import Beam, element_matrices, joining, on_beam
-from fembeam.response.body_reactions import balanced, rigid_shapes, static_solver
-from fembeam.scene import BodyMatrices, carried_on, loaded
+from fembeam.response.body_reactions import balanced, static_solver
+from fembeam.scene import BodyMatrices, carried_on, loaded, rigid_shapes
 from fembeam.structures import FrameForces, JoinedForces
 from fembeam.support import require
 
@@ -118,7 +118,7 @@ def _inertia(beam: Matrices, vectors: Vector, omega: Vector, rows: Vector) -> tu
     a = vectors * omega**2
     load = beam.K @ vectors
     left = np.linalg.norm(load - beam.M @ a, axis=0)
-    others = left > BALANCED * np.linalg.norm(load, axis=0)
+    others = (omega > 0.0) & (left > BALANCED * np.linalg.norm(load, axis=0))  # of a rigid motion both are rounding
     if not np.any(others):
         return a, beam.M @ a
     # static shapes, orthogonal to modes or not: point loads beside inertia of the basis

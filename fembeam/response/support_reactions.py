@@ -20,9 +20,19 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from fembeam.beams import bending_root, hermite_rows
-from fembeam.response.body_reactions import BodyHeld, rigid_shapes, static_solver
+from fembeam.response.body_reactions import BodyHeld, static_solver
 from fembeam.response.histories import modal_accelerations
-from fembeam.scene import PER_DOF, BodyMatrices, Spring, contact_rows, loads, loads_of_order, quoted, unsupported
+from fembeam.scene import (
+    PER_DOF,
+    BodyMatrices,
+    Spring,
+    contact_rows,
+    loads,
+    loads_of_order,
+    quoted,
+    rigid_shapes,
+    unsupported,
+)
 from fembeam.structures import COMPONENTS
 from fembeam.support import Part, Printed, is_finite, is_whole, require
 

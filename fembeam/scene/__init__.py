@@ -41,6 +41,7 @@ from fembeam.scene.parts import (
     Stop,
 )
 from fembeam.scene.places import Place, body_words, directed_words, is_directed, place_words, quoted, split, turns_at
+from fembeam.scene.rigid_motions import rigid_shapes
 from fembeam.scene.rotors import Disk, Unbalance
 from fembeam.scene.rubbing import Friction, spin_of
 from fembeam.scene.scene import FEATURES, Scene

@@ -19,6 +19,7 @@ import reduction
 from fembeam.beams import MESHED_MODES
 from fembeam.scene.assembly import UNIT, Matrices, Vector, main_load, moved_by_rows, moving
 from fembeam.scene.places import place_words, quoted
+from fembeam.scene.rigid_motions import MOST_RIGID
 from fembeam.scene.rotors import Disk, gyroscopic, shaft_axes
 from fembeam.scene.signals import support_motion
 from fembeam.structures import (
@@ -36,8 +37,6 @@ from fembeam.support import require, warn
 
 if TYPE_CHECKING:
     from fembeam.scene.scene import Scene
-
-MOST_RIGID = 6
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fembeam.scene.places import scene_words
 from fembeam.scene.signals import signals_of
@@ -12,6 +13,10 @@ from fembeam.scene.signals import signals_of
 if TYPE_CHECKING:
     from fembeam.scene.assembly import Matrices
     from fembeam.scene.scene import Scene
+
+Vector = NDArray[np.float64]
+
+MOST_RIGID = 6  # of one body
 
 
 def rigid_body_modes(scene: Scene, turning: bool = True) -> int:
@@ -22,7 +27,7 @@ def rigid_body_modes(scene: Scene, turning: bool = True) -> int:
     if scene.named:
         from fembeam.scene.assembly import assemble
 
-        return rigid_of(assemble(scene, None, None, ()))
+        return int(rigid_shapes(assemble(scene, None, None, ())).shape[1])
     rows = [row for s in scene.supports for row, fixed in zip(_rigid_rows(s.z), s.fixed, strict=True) if fixed]
     for spring in scene.springs:
         translation, rotation = _rigid_rows(spring.z)
@@ -34,12 +39,15 @@ def rigid_body_modes(scene: Scene, turning: bool = True) -> int:
     return 2 - int(np.linalg.matrix_rank(scaled, tol=1e-9))
 
 
-def rigid_of(matrices: Matrices) -> int:
-    """How many modes of frequency 0 the matrices of a body have."""
+def rigid_shapes(matrices: Matrices, most: int = MOST_RIGID) -> Vector:
+    """Modes of frequency 0 (N, r) on the free dofs: `most` of one body, more where hinges let several move."""
     import reduction
 
-    size = matrices.M.shape[0]
-    return int(np.sum(reduction.modal_basis(matrices.M, matrices.K, min(6, size), root=matrices.root).omega == 0.0))
+    count = min(most, matrices.M.shape[0])
+    lowest = reduction.modal_basis(matrices.M, matrices.K, count, root=matrices.root)
+    if count == most and not np.any(lowest.omega):
+        return rigid_shapes(matrices, 2 * most)
+    return np.asarray(lowest.vectors[:, lowest.omega == 0.0])
 
 
 def drifting(scene: Scene) -> list[str]:
