@@ -236,6 +236,23 @@ def test_a_signal_made_of_that_of_an_unbalance_stays():
 # --- runs -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("spin", [220.0, -220.0])
+def test_the_clamp_turns_the_angular_momentum_of_the_disk(spin):
+    """On a shaft without mass: M_x = I_d θ_x'' + I_p Ω θ_y' - L m a_y + L f_y about the clamp, M_y alike."""
+    shaft = fb.Frame.straight(LENGTH, replace(SECTION, rho=1e-3), spin=spin, bending_only=True)
+    scene = fb.Scene(shaft, [fb.Clamped("A")], masses=[DISK], forces=[fb.Unbalance("B", 1e-4)])
+    run = scene.reduce(4).simulate(0.1, 1e-3)
+    (x, y), (turn_x, turn_y) = ([run.acceleration("B", r + way) for way in "xy"] for r in ("", "r"))
+    push_x, push_y = (DISK.mass * a - force.signal(run.t) for a, force in zip((x, y), scene.forces, strict=True))
+    spun = DISK.polar * spin
+    expected = [
+        DISK.diametral * turn_x + spun * run.velocity("B", "ry") - LENGTH * push_y,
+        DISK.diametral * turn_y - spun * run.velocity("B", "rx") + LENGTH * push_x,
+    ]
+    found = run.reactions()[0].moment[:, :2].T
+    np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(found).max())
+
+
 def test_a_stop_on_the_housing_is_met_as_by_another_method():
     from solvers import DormandPrince
 
