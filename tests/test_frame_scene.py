@@ -221,6 +221,21 @@ def test_mechanisms():
     assert np.count_nonzero(turning.omega == 0.0) == 3
 
 
+def test_a_wheel_turns_in_its_bearing():
+    """It has inertia but nothing that resists: a rigid motion, no mechanism; it turns by the share of the moment."""
+    bar = fb.Section.circle(2.1e11, 7850.0, 0.03)
+    shaft = fb.Frame({"A": (0, 0, 0), "B": (0.6, 0.3, 0.5)}, [fb.Member("A", "B", bar, release="end along")])
+    moment = fb.PointMoment("B", fb.Harmonic(2.0, 0.0), direction="rx")
+    scene = fb.Scene(shaft, [fb.Clamped("A")], [fb.LumpedMass("B", 1.0, 0.01)], forces=[moment])
+    with pytest.warns(UserWarning, match="1 rigid-body mode appears"):
+        model = scene.reduce(modes=5)
+    assert np.count_nonzero(model.omega == 0.0) == 1
+    run, axis = model.simulate(1e-3, 1e-4), shaft.axes[0, 2]
+    found = sum(axis[i] * run.acceleration("B", way) for i, way in enumerate(("rx", "ry", "rz")))
+    np.testing.assert_allclose(found, 2.0 * axis[0] / 0.01, rtol=1e-9)
+    np.testing.assert_allclose(run.reactions()[0].moment @ axis, 0.0, atol=1e-9)
+
+
 def pressed(force, upper=0.0, space=False):
     """Euler's column, clamped below, in one member or in two; in space its weak axis is the other one."""
     nodes = {"A": (0, 0), "B": (0.3, 0), "C": (1.0, 0)}

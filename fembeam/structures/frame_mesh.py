@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 
 MECHANISM = 1e-4  # of a motion without resistance: what is left of it without the rigid part, where there is any
+ALONE = 1e-6  # of a motion: what rounding may leave of it on the members where nodes turn by themselves
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,12 +209,16 @@ class FrameMatrices(Assembled):
         return moved
 
     def check_mechanism(self, loose: Vector, where: str) -> None:
-        """Raise ValueError, naming the motion, if motions (N, n) without resistance are not of the frame as a whole."""
+        """Raise ValueError, naming the motion, if motions (N, n) without resistance move members against each other.
+
+        A node that all members release, and that has inertia, may turn by itself.
+        """
         if loose.shape[1] == 0:
             return
-        left = loose - self.rigid_motions @ np.linalg.lstsq(self.rigid_motions, loose, rcond=None)[0]
-        most, mix = np.linalg.svd(left, full_matrices=False)[1:]
-        rigid = bool(most[0] <= MECHANISM * np.linalg.norm(loose, axis=0).max())
+        whole, moved = self.mesh.join @ self.rigid_motions, self.mesh.join @ loose
+        most, mix = np.linalg.svd(moved - whole @ np.linalg.lstsq(whole, moved, rcond=None)[0], full_matrices=False)[1:]
+        size, given = (np.linalg.norm(one, axis=0).max() for one in (moved, loose))
+        rigid = bool(most[0] <= MECHANISM * max(size, ALONE * given))
         motion = np.abs(loose @ mix[0])
         shift = np.array([name in COMPONENTS[:3] for _, name in self.labels])
         moving = motion * shift if np.any(motion[shift] > MECHANISM * motion.max()) else motion
