@@ -294,10 +294,10 @@ def _wanted(size: int, count: int | None, indices: Sequence[int] | None) -> NDAr
 
 def checked_matrix(A: Matrix, name: str, where: str) -> sparse.csc_matrix:
     """A as sparse float matrix, checked: square, finite, symmetric; ``where`` is the caller, for the message."""
-    given: Any = A
+    given = A.tocsc() if sparse.issparse(A) else reals(A, name, where)
     if sparse.issparse(A):
         reals(given.data, name, where)
-    matrix = sparse.csc_matrix(given if sparse.issparse(A) else reals(A, name, where), dtype=float)
+    matrix = sparse.csc_matrix(given, dtype=float)
     if matrix.shape[0] != matrix.shape[1] or matrix.shape[0] == 0:
         raise ValueError(f"{name} must be square, got shape {matrix.shape} in {where}; give (N, N)")
     if not np.all(np.isfinite(matrix.data)):

@@ -47,6 +47,12 @@ def test_dense_and_sparse_agree(cantilever, monkeypatch):
     np.testing.assert_allclose(found[0].vectors, found[1].vectors, atol=1e-7 * np.abs(found[0].vectors).max())
 
 
+@pytest.mark.parametrize("kind", ["bsr", "coo", "csc", "csr", "dia", "dok", "lil"])
+def test_matrices_of_any_sparse_kind(kind):
+    found = reduction.modal_basis(sparse.eye(2).asformat(kind), sparse.diags([4.0, 9.0]).asformat(kind))
+    assert found.omega.tolist() == [2.0, 3.0]
+
+
 def test_list_of_modes_is_a_part_of_the_whole(cantilever):
     M, K = cantilever.M, cantilever.K
     whole, part = reduction.modal_basis(M, K, 6), reduction.modal_basis(M, K, indices=[5, 0, 2])

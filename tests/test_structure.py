@@ -15,8 +15,9 @@ from fembeam.structures import direction_of, following
 K, M = np.array([[3e4, -1e4], [-1e4, 1e4]]), np.diag([1.0, 2.0])
 
 
-def test_it_is_the_matrices_it_was_given():
-    one = fb.Structure(sparse.coo_matrix(K), M, labels=[("a", "x"), ("b", "x")], points={"end": "b"})
+@pytest.mark.parametrize("kind", [sparse.coo_matrix, sparse.lil_array, sparse.dok_matrix, sparse.dia_array])
+def test_it_is_the_matrices_it_was_given(kind):
+    one = fb.Structure(kind(K), M, labels=[("a", "x"), ("b", "x")], points={"end": "b"})
     assert (one.K.toarray() == K).all()
     assert (one.M.toarray() == M).all()
     assert one.rows("end").toarray().tolist() == [[0.0, 1.0]]

@@ -45,7 +45,8 @@ def matrix(name: str, values: Any, where: str) -> sparse.csr_matrix:
 
 def real(name: str, values: Any, where: str) -> Any:
     """Numbers without their imaginary parts; ValueError where there are any, or what is no number."""
-    given: Any = getattr(values, "data", None) if sparse.issparse(values) else values
+    values = values.tocsr() if sparse.issparse(values) else values
+    given: Any = values.data if sparse.issparse(values) else values
     try:
         kind: str = np.asarray(given).dtype.kind
     except ValueError:  # rows of unequal length
