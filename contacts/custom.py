@@ -70,7 +70,8 @@ class CustomLaw(Law):
     def equation(self) -> str:  # type: ignore[override]
         """First line of the function's docstring, or its call."""
         doc = inspect.getdoc(self.function)
-        return doc.splitlines()[0] if doc else f"F = {self.name}{inspect.signature(self.function)}"
+        names = ", ".join(inspect.signature(self.function).parameters)
+        return doc.splitlines()[0] if doc else f"F = {self.name}({names})"
 
     def __reduce__(self) -> tuple:
         """Pickle by the function's name, so that laws travel to worker processes; it stands for what was decorated."""

@@ -67,6 +67,11 @@ def constant(delta, delta_dot, entry_rate):
     return 10.0
 
 
+@law
+def untold(delta, delta_dot, entry_rate, k=2.0):
+    return k * delta
+
+
 @pytest.mark.parametrize("one", LAWS, ids=repr)
 def test_force_is_the_formula(one):
     rng = np.random.default_rng(1)
@@ -311,6 +316,7 @@ def test_a_table_that_is_no_text(tmp_path):
         (PiecewiseLinear([1e5, 2e6], [1e-3], [0.0, 100.0]), "(by integration)|kinks at δ = 0.001 m"),
         (Hertz(1e8) + KelvinVoigt(1e5, 50.0), "Hertz: F = |KelvinVoigt: F = |pulls, for example|jumps"),
         (with_defaults(), "Return k delta²|k = 2, a = 0.25|pulls nowhere|begins like δ^2"),
+        (untold(k=3.0), "F = untold(delta, delta_dot, entry_rate, k)|k = 3|1.000000"),
     ],
     ids=lambda x: type(x).__name__,
 )  # fmt: skip
