@@ -87,6 +87,16 @@ def test_made_names_of_contacts_differ():
     ]  # fmt: skip
 
 
+def test_files_tell_a_stop_from_one_that_is_called_as_it_would_be(tmp_path):
+    """The made name of the second column took the place of the first one, whose history was lost."""
+    stops = [fb.Stop(0.5, Hertz(1e7), name="stop 1"), fb.Stop(0.4, Hertz(1e7))]
+    run = cantilever(stops=stops).reduce(modes=1).simulate(1e-3, 1e-3)
+    assert [run.key(i) for i in range(2)] == ["stop 1", "stop 1 (2)"]
+    histories, _ = run.to_csv(tmp_path, quantities=["force"])
+    head = next(csv.reader(histories.open(encoding="utf-8")))
+    assert head[-2:] == ["force stop 1 [N]", "force stop 1 (2) [N]"]
+
+
 def test_names_are_unique_in_a_scene_and_its_bodies():
     law = Hertz(1e7)
     message = "names must be unique, got 'tip' in masses[0] and stops[1] of Scene; give each part its own, or none"

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
-from itertools import pairwise
+from itertools import compress, pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -293,13 +293,14 @@ class Histories:
     def key(self, stop: int) -> str:
         """What files call a stop or element, which other places and gaps leave as it is.
 
-        The given name, else "stop 0", "element 2 (rotation)".
+        The given name, else "stop 0", "element 2 (rotation)", with "(2)" behind it where another one is called so.
         """
         stop = self._stop(stop) % len(self.stops)
         if self.name_given[stop]:
             return self.names[stop]
         kind = "element" if self.always_acting[stop] else "stop"
-        return f"{kind} {stop}" + " (rotation)" * bool(self.rotational[stop])
+        made = f"{kind} {stop}" + " (rotation)" * bool(self.rotational[stop])
+        return made + " (2)" * (made in compress(self.names, self.name_given))
 
     def number(self, stop: int | str) -> int:
         """The number of a stop or element, from 0, that is given by its name or number; ValueError if there is none."""
