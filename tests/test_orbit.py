@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 import fembeam as fb
 import solvers
-from contacts import Hysteretic, law
+from contacts import Hysteretic, PiecewiseLinear, law
 from fembeam.cli import commands as cli
 from fembeam.model import extremes_of
 from fembeam.model.equations import common_period
@@ -165,6 +165,39 @@ def test_brute_force_of_a_rotation_is_in_radians():
     assert found.peaks[0, 0] == pytest.approx(np.abs(model.orbit().extremes(turned)).max(), rel=1e-4)
     assert f"{1e3 * found.peaks[0, 0]:.5g}" in str(found)
     assert "largest peak / mrad" in str(found)
+
+
+def between_clamps(mass: float, stop: float) -> fb.Scene:
+    """A beam between clamps, driven aside of its middle; of masses and stops elsewhere it is symmetric."""
+    section, sheet = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12), PiecewiseLinear([2e4])
+    return fb.Scene(fb.Beam(0.5, section), [fb.Clamped(0.0), fb.Clamped(0.5)], [fb.LumpedMass(0.35, mass=mass)],
+                    stops=[fb.Stop(stop, sheet, gap=1e-4)], forces=[fb.PointForce(0.2, fb.Harmonic(0.5, 230.0))],
+                    damping=fb.ModalDamping(0.03))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "span", "first", "last"),
+    [
+        ("masses[0].mass", (0.0, 0.02), (0.0, 0.25), (0.02, 0.25)),
+        ("stops[0].z", (0.2, 0.3), (0.0, 0.2), (0.0, 0.3)),
+    ],
+)
+def test_a_branch_passes_where_a_mode_has_its_node_at_the_stop(name, span, first, last):
+    """The second mode has its node there, so that the rule for its sign turns it: branches were lost at once."""
+    branch = between_clamps(0.0, 0.25).reduce(modes=2).branch(name, span).run()
+    assert set(branch.parameter[[0, -1]]) == {*span}
+    for orbit, of in zip((branch.orbits[0], branch.orbits[-1]), (first, last), strict=True):
+        anew = between_clamps(*of).reduce(modes=2).orbit()
+        assert len(orbit.contacts) == len(anew.contacts) > 0
+        np.testing.assert_allclose(orbit.extremes(0.2), anew.extremes(0.2), rtol=1e-6)
+
+
+def test_brute_force_starts_where_it_is_told_whatever_the_signs_of_modes():
+    """The second mode, whose node is at the stop without the mass, turned its sign over the values."""
+    free = replace(between_clamps(0.0, 0.25), stops=[fb.Stop(0.25, PiecewiseLinear([1.0]), gap=10.0)])
+    model, start = free.reduce(modes=2), [0.0, 0.0, 250.0, 700.0]
+    found = fb.study.bifurcation(model, "masses[0].mass", [0.0, 1e-5], 0.1, settle=1, keep=1, start=start)
+    assert found.peaks[1, 0] == pytest.approx(found.peaks[0, 0], rel=1e-3)
 
 
 def test_brute_force_reduces_as_the_model_was(model):

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam.model.equations import load_period
 from fembeam.model.orbit import Orbit, checked_period, orbit
+from fembeam.model.reduce import likeness, signed_like
 from fembeam.scene import changes_structure, path_of, replaced, value_of
 from fembeam.support import Part, Printed, changes, counting, note, numbers, require, write_rows, written_whole
 from fembeam.support.fingerprint import fingerprint
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 RECORDED = {"name", "period", "scene", "digest", "modes", "omega", "walks"}  # of a saved branch
 SAME = 1e-9  # relative: frequencies of one model, made again
+ALIKE = 0.8  # cosine between shapes of a mode, from which on its sign is known
+SHORTEST = 2.0**-8  # share of a step in which signs are followed
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,14 +40,38 @@ class Family:
     name: str
     period: int
     kept: dict[float, tuple[solvers.System, float]] = field(default_factory=dict, repr=False)
+    known: dict[float, Model] = field(default_factory=dict, repr=False)  # by which signs of shapes are followed
 
     def __repr__(self) -> str:
         return f"<{self.model!r} along {self.name}, period {self.period}>"
 
     def at(self, parameter: float) -> Model:
-        """The model at a value of the parameter."""
-        scene = replaced(self.model.scene, self.name, parameter)
-        return self.model.again(scene) if changes_structure(self.name) else self.model.under(scene)
+        """The model at a value of the parameter; the signs of its shapes are followed from the family's own model."""
+        if not changes_structure(self.name):
+            return self.model.under(replaced(self.model.scene, self.name, parameter))
+        if not self.known:
+            self.known[value_of(self.model.scene, self.name)] = self.model
+        return self._followed(parameter, self._again(parameter))
+
+    def _again(self, parameter: float) -> Model:
+        """The scene reduced anew: a shape whose node passes the watched place changes its sign there."""
+        return self.model.again(replaced(self.model.scene, self.name, parameter))
+
+    def _followed(self, parameter: float, model: Model) -> Model:
+        """The model with signs followed from the nearest one known, in steps within which shapes stay alike."""
+        at = min(self.known, key=lambda one: abs(one - parameter))
+        near, step = self.known[at], parameter - at
+        least = SHORTEST * abs(step)
+        while likeness(model, near) < ALIKE:
+            step *= 0.5
+            if abs(step) <= least:  # frequencies that cross change places
+                self.known[parameter] = model = signed_like(model, near)
+                break
+            between = signed_like(self._again(at + step), near)
+            if likeness(between, near) >= ALIKE:
+                at, near = at + step, between
+                self.known[at], step = near, parameter - at
+        return signed_like(model, near)
 
     def __call__(self, parameter: float) -> tuple[solvers.System, float]:
         """The system and its period, s; the latest are kept, because Newton's method asks for them again."""

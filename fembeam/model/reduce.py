@@ -83,14 +83,42 @@ def reduced(
 
 
 def signed_like(model: Model, near: Model) -> Model:
-    """The same model with the signs of shapes that one near it has, where both have the same mesh."""
-    vectors = model.basis.vectors
-    if vectors.shape != near.basis.vectors.shape or np.all(np.sum(vectors * near.basis.vectors, axis=0) >= 0.0):
+    """The same model with the signs of shapes that one near it has."""
+    own, other = _motions(model, near)
+    signs = np.where(np.sum(own * other, axis=0) < 0.0, -1.0, 1.0)
+    if np.all(signs > 0.0):
         return model
-    signs = np.where(np.sum(vectors * near.basis.vectors, axis=0) < 0.0, -1.0, 1.0)
-    basis = reduction.Basis(vectors * signs, model.omega)
+    basis = reduction.Basis(model.basis.vectors * signs, model.omega)
     shapes, *others = _shapes_of_each(model.scene, model.matrices, basis)
     return replace(model, basis=basis, shapes=shapes, others=tuple(others))
+
+
+def likeness(model: Model, near: Model) -> float:
+    """Least |cos| of the angles between the shapes of two models: 1 where all are the same but for signs."""
+    own, other = _motions(model, near)
+    sizes = np.linalg.norm(own, axis=0) * np.linalg.norm(other, axis=0)
+    moving = sizes > 0.0  # those of impactors do not
+    return float(np.min(np.abs(np.sum(own * other, axis=0))[moving] / sizes[moving], initial=1.0))
+
+
+def _motions(model: Model, near: Model) -> tuple[Vector, Vector]:
+    """Shapes (k, n) of both at the same places: of bodies at all dofs of one mesh, else at places that both have."""
+    pairs = list(zip((model.shapes, *model.others), (near.shapes, *near.others), strict=True))
+    beams = any(isinstance(one, Shapes) for pair in pairs for one in pair)
+    if not beams and model.basis.vectors.shape == near.basis.vectors.shape:
+        return model.basis.vectors, near.basis.vectors
+    own, other = zip(*(_at_same_places(*pair) for pair in pairs), strict=True)
+    return np.vstack(own), np.vstack(other)
+
+
+def _at_same_places(own: Any, other: Any) -> tuple[Vector, Vector]:
+    """Shapes (k, n) of a body on two meshes, of a beam at equal parts of its length."""
+    if isinstance(own, Shapes):
+        along = np.linspace(0.0, 1.0, 4 * own.values.shape[1] + 9)
+        return own(along * own.nodes[-1]), other(along * other.nodes[-1])
+    places = [(own.known.index(place), k) for k, place in enumerate(other.known) if place in own.known]
+    first, second = np.array(places, dtype=int).reshape(-1, 2).T
+    return np.vstack(own.values[first]), np.vstack(other.values[second])
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam import plot
 from fembeam.model import Model, extremes_of, load_period, observed
+from fembeam.model.branch import Family
 from fembeam.plot.axis_names import axis_name, parameter_unit
 from fembeam.plot.units import motion_for
-from fembeam.scene import Place, changes_structure, path_of, turns_at, with_value
+from fembeam.scene import Place, path_of, turns_at
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import samples_per_period
 from fembeam.study.result import Result
@@ -131,18 +132,13 @@ def _settled(
     model: Model, path: str, z: Any, settle: int, keep: int, start: Vector, value: float
 ) -> tuple[Vector, Vector]:
     """States and peaks of the periods kept."""
-    scene = with_value(model.scene, path, value)
-    if changes_structure(path):
-        model = model.again(scene)
-        system = model.system
-    else:
-        system = model.system_like(scene)
-    T, n = load_period(scene), len(model.omega)
+    model = Family(model, path, 1).at(value)
+    T, n = load_period(model.scene), len(model.omega)
     method = solvers.Exponential(1e-8, ledger=False)
     # settling needs no samples; but it is one run: a restart would forget the entry rate of a contact under way
-    looks = samples_per_period(scene, model.omega, T)
+    looks = samples_per_period(model.scene, model.omega, T)
     times = np.linspace(settle * T, (settle + keep) * T, keep * looks + 1)
-    run = solvers.integrate(system, start[:n], start[n:], (settle + keep) * T, times, method)
+    run = solvers.integrate(model.system, start[:n], start[n:], (settle + keep) * T, times, method)
     states = np.concatenate((run.q, run.q_dot), axis=1)[:-1:looks]
     u, v = run.q @ model.phi(z), run.q_dot @ model.phi(z)
     periods = [slice(i, i + looks + 1) for i in range(0, keep * looks, looks)]
