@@ -63,6 +63,18 @@ def test_subharmonics_from_nothing_and_their_names(model, monkeypatch):
         model.orbit(period=2, start=model.orbit())
 
 
+def test_starts_that_settle_slowly_are_on_no_unstable_orbit():
+    """They near an orbit whose multiplier is -0.998: Newton's method took half of them to one with 12.2."""
+    law = Hysteretic(34876461.985566534, damping_factor=0.2752137808049512, exponent=1.5)
+    stops = [fb.Stop(TIP, law), fb.Stop(TIP, law, gap=2e-3, side="above")]
+    push = fb.PointForce(0.2, fb.Harmonic(0.7881704090917894, 3 * 290.7190220035914, 3.95579346384189))
+    scene = replace(paper_scene(fb.Harmonic(1.4324847429712658e-3, 290.7190220035914)), stops=stops, forces=[push],
+                    damping=fb.ModalDamping(0.028479455880775946))  # fmt: skip
+    found = scene.reduce(1).attractors(starts=6, seed=39)
+    assert sum(one.count for one in found) == 6
+    assert all(one.orbit is None or one.orbit.stable for one in found)
+
+
 def test_bad_numbers_of_a_search_for_attractors_are_refused(model):
     """With longest=0 all motion was "not periodic"; 3.0 starts failed inside."""
     for name in ("longest", "starts"):

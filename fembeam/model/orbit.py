@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 SAME = 1e-6  # relative distance below which two states are one
+NEAR = 0.01  # relative distance within which a settled start is on an unstable orbit, such as a symmetric one
 LONGEST = 8  # periods of the load of an attractor that is looked for
 WHERE = "Model.attractors"
 STARTS = 12  # settled where shooting from rest finds nothing
@@ -352,9 +353,12 @@ def _settle(model: Model, T: float, start: Vector, longest: int, method: Any) ->
         for k in range(1, longest + 1):
             if np.all(np.abs(strobes[k:] - strobes[:-k]) <= 1e-3 * size):
                 try:
-                    return x[: 2 * n], _shortest_orbit(model, x, k, T)
+                    found = _shortest_orbit(model, x, k, T)
                 except solvers.OrbitError:
                     break
+                if found.stable or _passes(found, x, T, NEAR):
+                    return x[: 2 * n], found
+                break  # Newton's method has left what the run comes to
     return x[: 2 * n], None
 
 
@@ -375,10 +379,14 @@ def _same(a: Orbit | None, b: Orbit | None, T: float) -> bool:
         return a is b
     if a.period != b.period or len(a.contacts) != len(b.contacts):
         return False
-    x, y = orbits.at_zero(a.found), orbits.at_zero(b.found)
-    n2 = len(a.state)
-    for _ in range(a.period):
-        if np.linalg.norm(x[:n2] - y[:n2]) <= 1e-5 * np.linalg.norm(x[:n2]):
+    return _passes(b, orbits.at_zero(a.found), T, 1e-5)
+
+
+def _passes(orbit: Orbit, x: Vector, T: float, within: float) -> bool:
+    """Whether an orbit passes near a state at the beginning of a load's period, of the state's size."""
+    y, n2 = orbits.at_zero(orbit.found), len(orbit.state)
+    for _ in range(orbit.period):
+        if np.linalg.norm(x[:n2] - y[:n2]) <= within * np.linalg.norm(x[:n2]):
             return True
-        y = orbits.state_after(b.model.system, y, T, b.found.method)
+        y = orbits.state_after(orbit.model.system, y, T, orbit.found.method)
     return False
