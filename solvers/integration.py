@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from solvers.compiled.sliding import slider_force
 from solvers.compiled.state import EVENTS, LOG_FULL, LOGGED, RUNNING, SAMPLED, STATUSES, State, T, event_row, slider_row
-from solvers.exponential.energy.check import unbalanced
+from solvers.exponential.energy.check import cancelling, unbalanced
 from solvers.problem import (
     Array,
     Forcing,
@@ -161,9 +161,10 @@ def integrate(
         column, known = (ahead - behind) / (2.0 * tangent.step), cast(Array, solution.tangent)
         solution = replace(solution, tangent=np.column_stack((known, column)))
     if check and status not in (Status.DONE, Status.INTERRUPTED):
-        raise SolverError(
-            f"stopped at t = {run.time:.9g} s of {duration:g} s: {status.value}{run.engine.explain(status)}", solution
-        )
+        words = status.value + run.engine.explain(status)
+        if status is Status.UNBALANCED:
+            words = cancelling(system, np.hstack((solution.q, solution.q_dot))) or words
+        raise SolverError(f"stopped at t = {run.time:.9g} s of {duration:g} s: {words}", solution)
     run.engine.release()
     return solution
 

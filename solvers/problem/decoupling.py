@@ -38,10 +38,12 @@ def decouple(M: Array, C: Array, K: Array, G: Array | None) -> Blocks:
     G = np.zeros((n, n)) if G is None else G
     damping, turning = phi.T @ C @ phi, phi.T @ G @ phi if np.any(G) else G
     spread = damping - np.diag(np.diag(damping))
-    if not np.any(G) and np.abs(spread).max(initial=0.0) <= 1e-12 * np.abs(damping).max(initial=0.0):
+    sums = _terms(phi, C)
+    rounding = np.maximum(1e-12 * np.abs(damping).max(initial=0.0), 4.0 * np.finfo(float).eps * sums)
+    if not np.any(G) and np.all(np.abs(spread) <= rounding):
         zero = np.zeros((n, n))
         inverse = phi.T @ M
-        terms = np.sqrt(np.abs(k)) + np.diag(_terms(phi, C))
+        terms = np.sqrt(np.abs(k)) + np.diag(sums)
         return Blocks(
             k,
             _without_rounding(np.diag(damping), terms),

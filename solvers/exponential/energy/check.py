@@ -158,6 +158,21 @@ def unbalanced(record: Record, rtol: float) -> bool:
     return not residual <= allowed
 
 
+def cancelling(system: System, motion: Array) -> str:
+    """Why no setting lets the energy of motions [q, q̇] (k, 2n) balance, in words; empty where one may.
+
+    That is where `ROUNDED` roundings of the terms that cancel in it are more than `CANCELLED` of it.
+    """
+    told, size = _told(system, motion), float(system.energy_of(motion).max())
+    if not ROUNDED * np.finfo(float).eps * told > CANCELLED * size:
+        return ""
+    return (
+        f"the energy does not balance, and no setting helps: it is a sum of terms up to {told / max(size, 1e-300):.0e} "
+        "times as large, so that M, C and K have too few digits for it; take coordinates in which soft and stiff "
+        "motions are not mixed, such as modes, and alike in size"
+    )
+
+
 @lru_cache(maxsize=64)
 def _signs(count: int) -> Any:
     """(2 + 2m,) what a work adds to the energy: input, damping, then work and impulse of every contact."""
