@@ -243,6 +243,14 @@ def test_what_is_pressed_at_the_start_swings_in_any_time(law):
     assert run.q_dot[-1, 0] == pytest.approx(-1e-6 * omega * np.sin(0.9), rel=1e-6)
 
 
+@pytest.mark.parametrize("omega", [8e8, 1e9, 1.3e9, 1.5e9])
+def test_what_is_pressed_at_the_start_leaves_in_any_time(omega):
+    """In 1.5e-9 s and more, by a single landing: it was up to 3e-5 too fast."""
+    stiffness = omega**2 * 1e-3 / 1.5 / 1e-6**0.5
+    run = integrate(System([[1e-3]], [[0.0]], [[0.0]], [Contact([1.0], Hertz(stiffness))]), [-1e-6], [0.0], 1e-3)
+    assert run.q_dot[-1, 0] == pytest.approx(np.sqrt(0.8 * stiffness * 1e-6**2.5 / 1e-3), rel=1e-7)
+
+
 def test_a_slider_far_beyond_its_limit_slips_at_once_however_stiff():
     """From 3e15 N/m on it stuck first: 1 g was thrown at 3590 m/s."""
     system = System([[1e-3]], [[0.0]], [[1e3]], [Contact([-1.0], Jenkins(3e15, 1e-3), -1e-5, always=True)])

@@ -107,6 +107,8 @@ _SHARE_SINCE_ENTRY = 0.016  # the same of one from the entry on
 _NEAR_SURFACE = 1e-6  # δ, in units of its peak, below which its rounding may hide a border
 _LEAST_MARGIN = 0.1  # part of a margin's error that counts, in units of the tolerance of δ̇
 _ANY_ERROR = 1e300  # but NaN
+_TURNED = 0.01  # change of δ̇ in a landing, relative, that shorter steps are to resolve
+TOO_LONG = 2  # in `Scratch.last_resort`: the landing taken errs, which shorter steps would not
 _LEAST_RATE = 0.5  # δ̇ at the end of a landing, in units of that at its start, below which it is too long
 _LEAST_RATE_FOURTH_ROOT = 0.8  # the same with u = δ^{1/4}: under constant deceleration the difference is zero at 0.65
 _LAST_STEP = 0.09  # indentation, in units of the deepest, below which a landing on δ = 0 is tried
@@ -466,16 +468,19 @@ def _is_resolved(problem, tables, state, scratch, variable, stop):
 
     A stop that turns soon after it has left is near a pole of 1/δ̇. The embedded difference changes its sign there: it
     may be zero where the step errs by 1e-3 of the rate. As the last resort a landing of any error is taken: a step
-    across the border errs by more.
+    across the border errs by more. It is `TOO_LONG` where it has turned the motion: shorter steps resolve that.
     """
     before, after = scratch.start_motion[stop, 1], indentation_rate(problem, stop, scratch.stages[LANDED])
     share = _error_share(problem, tables, state, scratch, variable, stop)
     least = _LEAST_RATE_FOURTH_ROOT if _in_fourth_root(tables, variable, stop) else _LEAST_RATE
-    return (
-        _time_increases(scratch, state.x.size)
-        and before * after >= least * before * before
-        and _rate_error(problem, scratch, share) <= (_ANY_ERROR if scratch.last_resort[0] > 0 else 1.0)
-    )
+    if not (_time_increases(scratch, state.x.size) and before * after >= least * before * before):
+        return False
+    error = _rate_error(problem, scratch, share)
+    if scratch.last_resort[0] == 0 or not error <= _ANY_ERROR:
+        return error <= 1.0
+    fast = _TURNED * max(abs(after), scratch.reference_speed[stop])
+    scratch.last_resort[0] = TOO_LONG if error > 1.0 and abs(after - before) > fast else 1
+    return True
 
 
 @inlined

@@ -73,7 +73,7 @@ from solvers.exponential.contact.first_step import (
     level_of,
 )
 from solvers.exponential.contact.kinks import land_on_kink_or_limit
-from solvers.exponential.contact.landing import may_land
+from solvers.exponential.contact.landing import TOO_LONG, may_land
 from solvers.exponential.contact.node_response import (
     BORDER,
     ELEMENT,
@@ -388,7 +388,7 @@ def advance_contact(problem, tables, energy_tables, state, scratch):
         return RUNNING
     landed, longest = _try_landing_now(problem, tables, state, scratch, stop, direction, time_to_knot)
     if landed:
-        return RUNNING
+        return STEP_TOO_SMALL if scratch.last_resort[0] == TOO_LONG else RUNNING
     node_set, wanted = control[NODE_SET] if control[NEW] else 0, control[NEXT_LEVEL]
     if problem.table_dt.size:
         allowed = land_on_kink_or_limit(problem, tables, state, scratch, wanted)
