@@ -13,6 +13,7 @@ import numpy as np
 from drawn import Scene, draw_law
 from own_memory_laws import draw_own
 
+import fembeam as fb
 from contacts import Iwan, KelvinVoigt, Polynomial, WaltonBraun
 from contacts.custom import CustomLaw
 from solvers import Contact, DormandPrince, System, integrate
@@ -61,17 +62,43 @@ def _law_of_stops(rng: np.random.Generator, mass: float, speed: float, low: floa
     return _law_of_stops(rng, mass, speed, low) if isinstance(law, CustomLaw) else law
 
 
-def in_other_coordinates(rng: np.random.Generator, scene: Scene) -> Scene:
-    """The same system in other coordinates x = T q: full matrices."""
+def in_other_coordinates(rng: np.random.Generator, scene: Scene, widest: float = 0.3) -> Scene:
+    """The same system in other coordinates x = T q, stretched by 10^-``widest`` to 10^``widest``: full matrices."""
     n, system = scene.system.size, scene.system
     turned = [np.linalg.qr(rng.standard_normal((n, n)))[0] for _ in range(2)]
-    T = turned[0] * 10.0 ** rng.uniform(-0.3, 0.3, n) @ turned[1]
+    T = turned[0] * 10.0 ** rng.uniform(-widest, widest, n) @ turned[1]
     M, C, K = (T.T @ matrix @ T for matrix in (system.M, system.C, system.K))
     contacts = [_in_coordinates(T, contact) for contact in system.contacts]
     loads = [(T.T @ vector, signal) for vector, signal in system.loads]
     q0, q_dot0 = np.linalg.solve(T, scene.q0), np.linalg.solve(T, scene.q_dot0)
     M, C, K = (0.5 * (matrix + matrix.T) for matrix in (M, C, K))
     return replace(scene, system=System(M, C, K, contacts, loads), q0=q0, q_dot0=q_dot0)
+
+
+def with_coincidences(seed: int, scene: Scene) -> Scene:
+    """A scene of `drawn` with what numbers by chance do not do, in coordinates stretched by up to 1e3 to each other.
+
+    Modes of one frequency, tones and constants that begin at 0 or a peak, at frequencies of modes, and damping of modes
+    that drives by itself, beside what damps them.
+    """
+    rng, system, words = np.random.default_rng([seed, 26]), scene.system, scene.words
+    C, K, size = system.C, system.K.copy(), system.size
+    if rng.random() < 0.3:
+        same = rng.random(size) < 0.5
+        K[same, same] = K[size - 1, size - 1]
+        words += " equal"
+    omega = np.sqrt(np.linalg.eigvalsh(K).clip(0.0))
+    tones = [fb.Harmonic(1.0, float(rng.choice([*omega, 0.0])), float(rng.choice([0.0, np.pi / 2]))) for _ in omega]
+    loads = [
+        (vector * np.abs(signal(np.linspace(0.0, scene.duration, 9))).max(), tones[rng.integers(size)])
+        for vector, signal in system.loads
+    ]
+    row = rng.standard_normal(size)
+    driven = C - np.outer(row, row) * rng.uniform(0.0, 0.3) * np.diag(C).mean() / (row @ row)
+    if rng.random() < 0.3 and System(system.M, driven, K).blocks.c.min() > 0.0:
+        C, words = driven, words + " driven"
+    scene = replace(scene, system=System(system.M, C, K, system.contacts, loads), words=words)
+    return in_other_coordinates(rng, scene, rng.uniform(0.0, 1.5)) if rng.random() < 0.7 else scene
 
 
 def _in_coordinates(T: Any, contact: Contact) -> Contact:
