@@ -1,5 +1,8 @@
 """Units of what turns, and parts that cannot act: bodies whose places have rotations."""
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -107,3 +110,35 @@ def test_friction_in_per_cent_and_radii_in_mm_are_told():
         "stops[0]: mu = 20 looks like per cent",
         "stops[0]: a radius of 10 m on a frame of 1 m: is it in mm?",
     ]
+
+
+def test_statistics_of_a_torsional_train_are_in_rad(tmp_path):
+    noise = fb.BandNoise(5.0, (10.0, 200.0), seed=1)
+    parts = {"forces": [fb.PointMoment("wheel", noise, direction="rz")], "damping": fb.ModalDamping(0.1)}
+    free, met = (
+        fb.Scene(TRAIN, stops=stops, **parts).reduce("all")
+        for stops in ([], [fb.Stop("wheel", LAW, gap=1e-3, direction="rz", name="peg")])
+    )
+    found = fb.study.stationary(met, 10.0, 1e-3, discard=0.1)
+    rows = {row["name"]: row["unit"] for row in found.table()}
+    assert {rows[name] for name in ("δ mean", "δ std")} == {"rad"}
+    assert [rows[f"peg {name}"] for name in ("peak_force", "entry_speed", "power")] == ["N m", "rad/s", "W"]
+    assert "δ std / rad " in str(found)
+    assert found.figure().axes[0].get_xlabel() in ("δ / rad", "δ / mrad")
+    many = fb.study.ensemble(free, 2, partial(fb.study.characteristics, duration=10.0, dt=1e-3, discard=0.1))
+    many.save(tmp_path / "many.csv")
+    head = (tmp_path / "many.csv").read_text().splitlines()[0]
+    assert head.startswith("seed,")
+    assert "rz u std [rad]" in head
+    assert "rz u crossing_rate [1/s]" in head
+    assert many.figure().axes[0].get_ylabel() == "PSD / rad² s rad⁻¹"
+    for figure in (fb.plot.spectrum, fb.plot.densities):
+        assert "rad" in figure(free.simulate(2.0, 1e-3)).axes[0].get_ylabel().partition(" s ")[0]
+
+
+def test_units_of_what_is_watched_are_not_known():
+    model = fb.Scene(TRAIN, forces=[replace(TURNED, signal=fb.BandNoise(5.0, (10.0, 200.0), seed=1))],
+                     damping=fb.ModalDamping(0.1)).reduce("all")  # fmt: skip
+    found = fb.study.stationary(model, 5.0, 1e-3, {"speed": lambda run: run.q_dot[:, 0]}, discard=0.1, segment=64)
+    assert [row["unit"] for row in found.table()] == ["", "", "", "", "1/s"]
+    assert found.figure().axes[0].get_xlabel() == "speed"

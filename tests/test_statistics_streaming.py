@@ -368,6 +368,27 @@ def test_hertz_stop_under_wide_band_noise_has_the_exact_density():
     within(found.impacts[0].rate, np.interp(0.0, delta, p) * rate / math.sqrt(2 * math.pi), bias)
 
 
+def test_contacts_of_further_bodies_count_as_those_of_the_run():
+    """In the order of the log: what the scene itself meets, its impactor, then what its body meets."""
+    law, beam = Hertz(1e8), fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+    other = fb.Scene(beam, [fb.Clamped(0.0)], stops=[fb.Stop(0.5, law, name="ground")], damping=fb.ModalDamping(0.05),
+                     forces=[fb.PointForce(0.3, fb.Harmonic(4.0, 230.0))])  # fmt: skip
+    ball = fb.Impactor(0.2, mass=0.01, velocity=0.0, law=law, gap=1e-5, stiffness=300.0, damping=0.5)
+    scene = fb.Scene(beam, [fb.Clamped(0.0)], damping=fb.ModalDamping(0.05), base=fb.Harmonic(1e-4, 160.0),
+                     stops=[fb.Stop(0.5, law)], elements=[fb.Element(0.3, Jenkins(1e5, 1.0))], impactors=[ball],
+                     bodies=[other])  # fmt: skip
+    model = scene.reduce(modes=1)
+    found, log = stationary(model, 4.0, 1e-3, discard=0.0), model.simulate(4.0, 1e-3).contacts
+    assert found.touching == (0, 2, 3)
+    numbers = found.numbers()
+    for stop, name in ((0, "stop 0"), (2, "stop 2"), (3, "ground")):
+        mine = (log.stop == stop) & (log.t_in > 0.0)
+        assert numbers[f"{name} rate"].value == pytest.approx(np.count_nonzero(mine) / found.duration, rel=0.02)
+        forces = log.peak_force[mine & np.isfinite(log.t_out)]
+        assert numbers[f"{name} peak_force"].value == pytest.approx(forces.mean(), rel=0.02)
+        assert len(forces) > 20
+
+
 def test_tones_go_on_through_the_segments(monkeypatch):
     model = cantilever(2, base=fb.Harmonic(2e-4, 160.0), stops=[fb.Stop(0.5, law=Hertz(1e8))])
     whole = stationary(model, 8.0, 1e-3, discard=1.0)

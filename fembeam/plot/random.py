@@ -23,7 +23,7 @@ from fembeam.plot.style import (
     styled,
     verbatim,
 )
-from fembeam.plot.units import length_for
+from fembeam.plot.units import density_label, signal_for
 from fembeam.statistics import Spectrum
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def random_spectra(
 
     Parameters
     ----------
-    panels : title -> label -> spectrum (m² per rad/s), or the signal it is of.
+    panels : title -> label -> spectrum, or the signal it is of.
     omega_max : rad/s, end of the axes.
     bands : title -> excited band in rad/s, marked on top of its panel.
     branches : title -> branches of periodic motion along ω, drawn beside the panel of that title.
@@ -68,7 +68,8 @@ def random_spectra(
         fit_levels(axis, list(lines.values()), omega_max)
         if bands and title in bands:
             axis.axvspan(*bands[title], ymin=0.96, color=GREY, alpha=0.6, linewidth=0)
-        axis.set(title=verbatim(title), xlim=(0, omega_max), ylabel="PSD / m² s rad⁻¹")
+        level = density_label(line.unit for line in lines.values())
+        axis.set(title=verbatim(title), xlim=(0, omega_max), ylabel=level)
         if len(lines) > 1:
             _legend(axis, beside=axes is None)
         if branches:
@@ -86,7 +87,7 @@ def random_densities(signals: Mapping[str, Signal], axes: Axes | Sequence[Axes] 
 
     Parameters
     ----------
-    signals : name -> signal, m, such as those of `fembeam.study.stationary`.
+    signals : name -> signal, such as those of `fembeam.study.stationary`.
     axes : to draw into, one per signal; None makes a figure.
 
     Examples
@@ -113,10 +114,10 @@ def _legend(axis: Axes, beside: bool) -> None:
 
 def density_panels(axes: Sequence[Axes], signals: Mapping[str, Signal]) -> None:
     """One density each, with its confidence where it is known, against its Gaussian."""
-    said = ""
+    said: str | None = None
     for axis, (name, signal) in zip(axes, signals.items(), strict=True):
         density = signal.pdf
-        scale, unit = length_for(density.x)
+        scale, unit = signal_for(signal.unit, density.x)
         mean, std = scale * float(signal.mean.value), scale * float(signal.std.value)
         x, p = scale * density.x, density.density / scale
         sure = density.estimate is not None and density.estimate.batches > 1
@@ -128,11 +129,11 @@ def density_panels(axes: Sequence[Axes], signals: Mapping[str, Signal]) -> None:
         axis.plot(wide, normal, color=RED, linestyle="--", label="Gaussian")
         shape = f"skewness\xa0{_rounded(signal.skewness)}", f"kurtosis {_rounded(signal.kurtosis)}"
         axis.set_title(",\n".join((_filled(f"{name}: {shape[0]}"), shape[1])))
-        axis.set_xlabel(_filled(f"{name}\xa0/\xa0{unit}"))
+        axis.set_xlabel(_filled(f"{name}\xa0/\xa0{unit}" if unit else name))
         axis.locator_params(axis="x", nbins=TICKS)
         axis.set(xlim=(wide[0], wide[-1]), ylim=(0, ROOM * max(p.max(), normal.max())))
         if unit != said:
-            axis.set_ylabel(f"probability density / {unit}⁻¹")
+            axis.set_ylabel(f"probability density / {unit}⁻¹" if unit else "probability density")
         said = unit
     axes[0].legend(loc="upper left", fontsize=8)
 

@@ -9,7 +9,7 @@ import numpy as np
 from fembeam.model import places
 from fembeam.plot.axis_names import coordinate_name
 from fembeam.plot.style import Vector
-from fembeam.scene import persistent_drive
+from fembeam.scene import persistent_drive, turns_at
 from fembeam.scene.places import unsigned
 from fembeam.statistics import Signal, pdf
 from fembeam.support import is_finite, require
@@ -136,11 +136,12 @@ def estimated(run: Run, discard: float, segment: int) -> dict[str, Signal]:
     ----------
     segment : samples of a Welch segment; a part holds two of them at least.
     """
-    found = {}
+    found, at = {}, places(run.shapes)
     for name, x in responses(run, discard).items():
         # the last edge lies beyond the samples
         bins = np.linspace(x.min(), x.max() + 1e-9 * np.ptp(x), len(pdf(x).x) + 1)
-        found[name] = signal = Signal(x, sampling_of(run), segment, bins=bins)
+        unit = "rad" if turns_at(at.get(name.removesuffix(" u"))) else "m"  # δ is that of a displacement
+        found[name] = signal = Signal(x, sampling_of(run), segment, bins=bins, unit=unit)
         parts = min(batches(run, discard), len(x) // segment)
         for part in np.array_split(x, parts if parts >= FEWEST_BATCHES else 1):
             signal.add(part)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,7 @@ from fembeam.plot.run_signals import (
     signal_name,
 )
 from fembeam.plot.style import BLUE, CYCLE, GREEN, GREY, Vector, curve, drawable, entry, fit_levels, short, styled
+from fembeam.plot.units import density_label
 from fembeam.response import frame_motion
 from fembeam.scene import signals_of
 from fembeam.statistics import Spectrum, psd
@@ -79,7 +81,7 @@ def spectrum(
             curve(axis, spectra[name], top, color=colours[name], label=entry(signal_name(run, name)))
         for line in behind:  # thin, and in front: where both agree both are seen
             curve(axis, line, top, color="black", linestyle="--", linewidth=0.7, label="linear, no contact")
-        axis.set_ylabel("PSD / m² s rad⁻¹")
+        axis.set_ylabel(density_label(spectra[name].unit for name in names))
         axis.legend(loc="upper right")
         fit_levels(axis, [spectra[name] for name in names if name not in BASES], top, behind)
     _mark_peaks(upper, spectra[main], top)
@@ -114,7 +116,7 @@ def spectra_of(run: Run, discard: float = 0.0) -> Mapping[str, Spectrum]:
             along = direction_of(direction, "base")
             moved = frame_motion(run, 0, along)[run.t >= discard]
             found[f"base {direction}"] = psd(moved, dt, segment_for(len(t), dt))
-    return found
+    return found | {name: replace(found[name], unit="rad") for name in found if name in BASES[3:]}
 
 
 def _linear(run: Run) -> dict[str, Spectrum]:

@@ -48,6 +48,19 @@ def length_for(shown: Any) -> tuple[float, str]:
     return (1.0, "m") if largest(shown) > 1.0 else unit_for(shown, "m", usual=-3)
 
 
+def signal_for(unit: str, shown: Any) -> tuple[float, str]:
+    """Of a signal with this unit, which is empty where it is not known.
+
+    Examples
+    --------
+    >>> signal_for("m", 2e-3), signal_for("rad", 2e-3), signal_for("", 2e-3)
+    ((1000.0, 'mm'), (1000.0, 'mrad'), (1.0, ''))
+    """
+    if not unit:
+        return 1.0, ""
+    return length_for(shown) if unit == "m" else unit_for(shown, unit)
+
+
 def motion_for(z: Any, shown: Any) -> tuple[float, str]:
     """Of what a place does: of a rotation rad, else as lengths.
 
@@ -56,7 +69,19 @@ def motion_for(z: Any, shown: Any) -> tuple[float, str]:
     >>> motion_for(("lever", "rx"), 2e-3), motion_for(("lever", "x"), 2e-3)
     ((1000.0, 'mrad'), (1000.0, 'mm'))
     """
-    return unit_for(shown, "rad") if turns_at(z) else length_for(shown)
+    return signal_for("rad" if turns_at(z) else "m", shown)
+
+
+def density_label(units: Iterable[str]) -> str:
+    """What the axis of power spectral densities of signals in these units is called; without units where one has none.
+
+    Examples
+    --------
+    >>> density_label(["m", "m"]), density_label(["m", "rad"]), density_label(["m", ""])
+    ('PSD / m² s rad⁻¹', 'PSD / m² or rad² s rad⁻¹', 'PSD')
+    """
+    known = dict.fromkeys(units)
+    return f"PSD / {' or '.join(f'{unit}²' for unit in known)} s rad⁻¹" if all(known) else "PSD"
 
 
 def largest(shown: Any) -> float:

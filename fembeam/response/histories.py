@@ -17,7 +17,7 @@ from fembeam.response.contact_log import PlacedLog
 from fembeam.response.mean_force import mean_force
 from fembeam.response.readout import Readout
 from fembeam.response.section_forces import extremes, frame_forces_of, rows_of
-from fembeam.scene import loads_of_order, split, unit_of
+from fembeam.scene import loads_of_order, made_key, split, unit_of
 from fembeam.structures import COMPONENTS, UP, Six
 from fembeam.support import is_whole, numbers, require
 from solvers.problem import FrictionLog, Losses
@@ -298,8 +298,7 @@ class Histories:
         stop = self._stop(stop) % len(self.stops)
         if self.name_given[stop]:
             return self.names[stop]
-        kind = "element" if self.always_acting[stop] else "stop"
-        made = f"{kind} {stop}" + " (rotation)" * bool(self.rotational[stop])
+        made = made_key(stop, bool(self.always_acting[stop]), bool(self.rotational[stop]))
         return made + " (2)" * (made in compress(self.names, self.name_given))
 
     def number(self, stop: int | str) -> int:

@@ -16,6 +16,7 @@ from fembeam.scene.contact_rows import (
     load_signals,
     loaded,
     loads,
+    made_key,
     static_rows,
     support_loads,
     watched,

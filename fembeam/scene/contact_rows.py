@@ -110,11 +110,20 @@ class ContactRow:
         """How many numbers it latches: those of its law, code and place of the slider of friction."""
         return len(getattr(self.law, "memory", ())) + (0 if self.friction is None else 2)
 
+    def key(self, number: int) -> str:
+        """What files call it, which other places and gaps leave as it is: the given name, else one of its number."""
+        return self.name if self.given else made_key(number, self.always, self.rotation)
+
     def force(self, delta: Any, rate: Any = 0.0, entry_rate: Any = 1.0) -> Any:
         """Force on arrays: of an element at both signs of δ, of others zero where δ <= 0."""
         if self.always:
             return force_both_ways(self.law, delta, rate)
         return self.law.force(delta, rate, entry_rate)
+
+
+def made_key(number: int, always: bool, rotation: bool) -> str:
+    """What files call a contact without a name: "stop 0", "element 2 (rotation)"."""
+    return f"{'element' if always else 'stop'} {number}" + " (rotation)" * rotation
 
 
 def contact_rows(scene: Scene, matrices: Matrices) -> list[ContactRow]:

@@ -36,6 +36,8 @@ class Spectrum:
         Of the density, where it was estimated from batches of a long run.
     estimate : Estimate, optional
         The density with what its intervals are made from.
+    unit : str
+        Of the signal, "" where it is not known.
     """
 
     omega: NDArray[np.float64]
@@ -43,6 +45,7 @@ class Spectrum:
     n_segments: int
     standard_error: NDArray[np.float64] | None = None
     estimate: Estimate | None = None
+    unit: str = "m"
 
     def __repr__(self) -> str:
         return f"<spectrum of {self.omega.size} lines to {self.omega[-1]:.6g} rad/s, {self.n_segments} segments>"

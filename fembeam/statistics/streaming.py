@@ -33,6 +33,7 @@ class Signal:
     segment : samples of a Welch segment, at least 8.
     level : the level whose up-crossings are counted.
     bins : increasing edges of the histogram; what falls outside is counted in `outside`.
+    unit : of the signal, "" where it is not known.
 
     Examples
     --------
@@ -44,8 +45,10 @@ class Signal:
     (0.5, 1.0)
     """
 
-    def __init__(self, first: Vector, dt: float, segment: int, level: float = 0.0, bins: Vector | None = None) -> None:
-        self.dt, self.level, self.origin = dt, level, float(np.mean(first))
+    def __init__(
+        self, first: Vector, dt: float, segment: int, level: float = 0.0, bins: Vector | None = None, unit: str = "m"
+    ) -> None:
+        self.dt, self.level, self.origin, self.unit = dt, level, float(np.mean(first)), unit
         self.edges = _edges_around(first) if bins is None else np.asarray(bins, dtype=np.float64)
         self._equal = bins is None  # by multiplication, several times quicker than by search
         self.welch = Welch(segment, dt)
@@ -64,10 +67,10 @@ class Signal:
         return {"edges": self.edges, "numbers": np.array(numbers), **self.batches.arrays()}
 
     @classmethod
-    def of_arrays(cls, arrays: Mapping[str, Vector], dt: float, level: float) -> Signal:
+    def of_arrays(cls, arrays: Mapping[str, Vector], dt: float, level: float, unit: str) -> Signal:
         """The one that these `arrays` are of, to go on with another stretch."""
         origin, equal, segment, smallest, largest = (float(one) for one in arrays["numbers"])
-        found = cls(np.array([origin]), dt, int(segment), level, arrays["edges"])
+        found = cls(np.array([origin]), dt, int(segment), level, arrays["edges"], unit)
         found._equal, found.smallest, found.largest = bool(equal), smallest, largest
         found.batches.take(arrays)
         return found
@@ -151,7 +154,7 @@ class Signal:
         """One-sided power spectral density per rad/s; `.per_hz` converts."""
         found = self._of(lambda s: self.welch.density(s[self._welch_at :], s[FIRST] / s[N]), LEVEL)
         count = int(self.batches.total[self._welch_at])
-        return Spectrum(self.welch.omega, found.value, count, found.standard_error, found)
+        return Spectrum(self.welch.omega, found.value, count, found.standard_error, found, self.unit)
 
     def power(self, lo: ArrayLike, hi: ArrayLike) -> Estimate:
         """Part of the variance carried by lo <= ω <= hi (rad/s): of one band, or of several (k,)."""

@@ -9,7 +9,7 @@ import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -23,7 +23,8 @@ from fembeam.statistics import Estimate, Spectrum
 from fembeam.study.execution.checkpoint import Checkpoint, Values, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.realisations import Seed, child, noises, realisation, seed_key
-from fembeam.study.result import Result
+from fembeam.study.result import Result, with_units
+from fembeam.study.stationary import characteristics, units_of_characteristics
 from fembeam.support import Part, is_whole, note, number, require, warn
 from solvers.problem import counted
 
@@ -52,6 +53,8 @@ class Ensemble(Result):
         has the name "".
     failures : realisations that failed, with seed and reason.
     enough : whether the standard error asked for by `until` was reached; None when none was.
+    units : name -> SI unit of the values of `characteristics`, of densities that of their signals; of other quantities
+        none are known.
     """
 
     seeds: tuple[Seed, ...]
@@ -59,6 +62,7 @@ class Ensemble(Result):
     failures: tuple[Failure, ...] = ()
     enough: bool | None = None
     title: str = ""  # of the figure
+    units: Mapping[str, str] = field(default_factory=dict)
     INDEX: ClassVar[str] = "seed"
 
     def __len__(self) -> int:
@@ -86,7 +90,12 @@ class Ensemble(Result):
     def _parts(self) -> list[Part]:
         """Means and standard errors of the named numbers, one a line."""
         head = counted(len(self), "realisation") + (f", {len(self.failures)} failed" if self.failures else "")
-        return [head, (("", "mean ± standard error"), [(name, repr(self[name])) for name in self._numbers])]
+        names = with_units(self._numbers, [self.units.get(name, "") for name in self._numbers])
+        rows = [(shown, repr(self[name])) for shown, name in zip(names, self._numbers, strict=True)]
+        return [head, (("", "mean ± standard error"), rows)]
+
+    def _units(self) -> dict[str, str]:
+        return dict(self.units)
 
     def table(self) -> list[dict[str, Any]]:
         """One realisation a row: its seed and the named numbers."""
@@ -114,7 +123,10 @@ class Ensemble(Result):
         require(bool(lines), "the values must hold spectra", list(self.values), "Ensemble.figure",
                 "use characteristics as the quantity")  # fmt: skip
         omega = self.values["omega"][0]
-        spectra = {n: Spectrum(omega, self[n].value, 0, np.asarray(self[n].standard_error)) for n in lines}
+        spectra = {
+            n: Spectrum(omega, self[n].value, 0, np.asarray(self[n].standard_error), unit=self.units.get(n, ""))
+            for n in lines
+        }
         return plot.random_spectra({self.title or counted(len(self), "realisation"): spectra}, float(omega[-1]))
 
     @property
@@ -183,7 +195,7 @@ def ensemble(
     for count in _rounds(len(chosen), until):
         missing = [seed for seed in chosen[:count] if seed_key(seed) not in {*kept.values, *failed}]
         _compute(partial(_value, model, quantity), missing, kept, failed, executor, progress)
-        found = _collected(chosen[:count], kept, failed, until)
+        found = replace(_collected(chosen[:count], kept, failed, until), units=_units_of(quantity, model))
         note("%r, %d of them computed now", found, len(missing))
         if found.enough:
             break
@@ -192,6 +204,13 @@ def ensemble(
         message = f"{len(found.failures)} of {count} realisations failed; seed {seed_key(first.seed)}: {first.reason}"
         warn(message)
     return found
+
+
+def _units_of(quantity: Callable[[Model], Any], model: Model) -> dict[str, str]:
+    """Units of the values of a quantity: those of `characteristics` are known."""
+    if not (isinstance(quantity, partial) and quantity.func is characteristics):
+        return {}
+    return units_of_characteristics(model, quantity.keywords.get("watch"))
 
 
 def _compute(

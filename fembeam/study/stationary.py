@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
@@ -27,19 +27,21 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam import plot
 from fembeam.model import Model, Run, places
-from fembeam.scene import signals_of
+from fembeam.scene import signals_of, turns_at, unit_of
 from fembeam.statistics import Batches, Estimate, Impacts, Signal
 from fembeam.statistics.initial_transient import Settling, settling
 from fembeam.statistics.spectra import FEWEST_OF_SLOW, FINEST_RESOLUTION
 from fembeam.study.decay import correlation_time
 from fembeam.study.execution.checkpoint import Checkpoint, model_identity
-from fembeam.study.result import Result
+from fembeam.study.result import Result, with_units
 from fembeam.study.segments import FEWEST_SAMPLES, SHORTEST, Segment, Segments, check_duration
 from fembeam.support import Part, bar, is_whole, note, number, numbers, require, warn
 from fembeam.support.fingerprint import fingerprint
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from fembeam.scene.contact_rows import ContactRow
 
 Vector = NDArray[np.float64]
 Watch = Callable[[Run], Any]
@@ -57,13 +59,14 @@ class Response(Result):
     ----------
     signals : name -> `statistics.Signal`: mean, variance, std, skewness, kurtosis, crossing_rate, pdf, psd; also
         ``response["δ"]``.
-    impacts : one `statistics.Impacts` per stop of the scene itself, not of its bodies: rate, probability,
-        mean(quantity).
+    impacts : one `statistics.Impacts` for each of `touching`: rate, probability, mean(quantity).
     duration : s the statistics use. discarded : s left out, lead-ins included.
     settling : end of the transient; None when `discard` was given.
     enough : whether the standard error asked for by `until` was reached; None when none was.
     seconds : wall seconds of integration.
     names : of stops, elements and impactors, in the order of `power`. rubbing : which of them have friction.
+        rotations : which act on a rotation.
+    touching : numbers in `names` of those that `impacts` are of: all but elements.
     """
 
     signals: dict[str, Signal]
@@ -76,6 +79,8 @@ class Response(Result):
     names: tuple[str, ...] = ()
     work: Batches = field(default_factory=lambda: Batches(1), repr=False)
     rubbing: tuple[bool, ...] = ()
+    rotations: tuple[bool, ...] = ()
+    touching: tuple[int, ...] = ()
     INDEX: ClassVar[str] = "name"
 
     def __getitem__(self, name: str) -> Signal:
@@ -88,14 +93,25 @@ class Response(Result):
 
     def _parts(self) -> list[Part]:
         """Every number with its standard error and 95 % interval."""
-        rows = [(name, repr(one), *map(float, one.interval())) for name, one in self.numbers().items()]
+        found, units = self.numbers(), self.units
+        heads = with_units(list(found), [units.get(name, "") for name in found])
+        rows = [(h, repr(one), *map(float, one.interval())) for h, one in zip(heads, found.values(), strict=True)]
         return [repr(self), (("", "value ± standard error", "95 % from", "to"), rows)]
 
     def table(self) -> list[dict[str, Any]]:
-        """Every number by name: value, standard error and 95 % interval."""
-        columns = "value", "standard_error", "low", "high"
+        """Every number by name: its unit, value, standard error and 95 % interval."""
+        columns, units = ("value", "standard_error", "low", "high"), self.units
         rows = {k: (one.value, one.standard_error, *one.interval()) for k, one in self.numbers().items()}
-        return [{"name": k} | dict(zip(columns, map(float, row), strict=True)) for k, row in rows.items()]
+        return [
+            {"name": k, "unit": units.get(k, "")} | dict(zip(columns, map(float, row), strict=True))
+            for k, row in rows.items()
+        ]
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the `numbers`, of those that have one."""
+        signals = {name: signal.unit for name, signal in self.signals.items()}
+        return units_of_numbers(signals, dict(zip(self.names, self.rotations, strict=True)))
 
     def figure(self) -> Figure:
         """Probability densities of the signals against the Gaussian."""
@@ -132,12 +148,29 @@ class Response(Result):
         """Every number with its standard error, by names such as "δ std", "stop 0 rate" or "valve rate"."""
         names = ("mean", "std", "skewness", "kurtosis", "crossing_rate")
         found = {f"{key} {name}": getattr(s, name) for key, s in self.signals.items() for name in names}
-        for stop, impacts in zip(self.names, self.impacts, strict=False):
+        for stop, impacts in zip((self.names[i] for i in self.touching), self.impacts, strict=True):
             found |= {f"{stop} {name}": getattr(impacts, name) for name in ("rate", "probability")}
             found |= {f"{stop} {name}": impacts.mean(name) for name in impacts.largest}
         found |= {f"{name} power": self.power(i) for i, name in enumerate(self.names)}
         rubs = (i for i, has in enumerate(self.rubbing) if has)
         return found | {f"{self.names[i]} wear": self.wear(i) for i in rubs}
+
+
+def units_of_numbers(signals: Mapping[str, str], contacts: Mapping[str, bool]) -> dict[str, str]:
+    """Units of `Response.numbers`: of signals with these units, and of contacts, which may act on a rotation.
+
+    Examples
+    --------
+    >>> units_of_numbers({"δ": "m"}, {"stop 0": False})["stop 0 peak_force"]
+    'N'
+    """
+    found = {f"{name} {kind}": unit for name, unit in signals.items() for kind in ("mean", "std") if unit}
+    found |= {f"{name} crossing_rate": "1/s" for name in signals}
+    for name, turns in contacts.items():
+        units = {"rate": "1/s", "duration": "s", "peak_force": unit_of("force", [turns]), "energy_loss": "J"}
+        units |= {"entry_speed": unit_of("speed", [turns]), "power": "W", "wear": "W"}
+        found |= {f"{name} {kind}": unit for kind, unit in units.items()}
+    return found
 
 
 def stationary(
@@ -165,8 +198,8 @@ def stationary(
         `discard` at least 32 correlation times of the structure.
     dt : output sampling in s; ten samples to the shortest period that matters.
     watch : name -> function of a `Run` that returns samples (k,), or (samples, rates): then crossings between two
-        samples are counted too, those of the cubics through them. None: δ of every stop (the tip when there is
-        none) and mid-beam.
+        samples are counted too, those of the cubics through them. None: δ of every stop of the scene itself (the tip
+        when there is none) and mid-beam.
     until : stop when the relative standard error falls below it, in (0, 1).
     of : function of the `Response` giving the `Estimate`, or several, that `until` is about; None: every variance.
     discard : s to leave out at the start; None: until the transient has died out, at least ten correlation times.
@@ -216,8 +249,10 @@ def stationary(
     segment = segment or default_segment(dt)
     solver = solver or solvers.Exponential(1e-8, ledger=False)
     plan = Segments.of(model, duration, dt, discard, start, solver, segment)
-    watched = dict(watch) if watch else watched_by_default(model)
-    sums = Sums(watched, dt, segment, dict(bins or {}), dict(levels or {}), len(model.scene.stops))
+    known = {name: (look, "") for name, look in watch.items()} if watch else watched_by_default(model)
+    watched = {name: look for name, (look, _) in known.items()}
+    units = {name: unit for name, (_, unit) in known.items()}
+    sums = Sums(watched, units, model.contact_rows, dt, segment, dict(bins or {}), dict(levels or {}))
     kept = Checkpoint(checkpoint, partial(_identity, plan, sums, discard, start))
     settled, enough = _resumed(kept, plan, sums), None if until is None else False
     if until is not None and plan.taken >= FEWEST_BATCHES:  # as it was asked before the end of an earlier call
@@ -303,17 +338,28 @@ def characteristics(model: Model, duration: float, dt: float, **options: Any) ->
     return values
 
 
-def watched_by_default(model: Model) -> dict[str, Watch]:
-    """δ of every stop (the tip when there is none) and mid-beam, with rates."""
+def units_of_characteristics(model: Model, watch: Mapping[str, Watch] | None = None) -> dict[str, str]:
+    """Units of the values of `characteristics` that have one; of densities those of their signals."""
+    known = {} if watch else {name: unit for name, (_, unit) in watched_by_default(model).items()}
+    signals = known or dict.fromkeys(watch or (), "")
+    contacts = {row.key(i): row.rotation for i, row in enumerate(model.contact_rows)}
+    return units_of_numbers(signals, contacts) | {f"{name} psd": unit for name, unit in known.items()}
+
+
+def watched_by_default(model: Model) -> dict[str, tuple[Watch, str]]:
+    """δ of every stop (the tip when there is none) and mid-beam, with rates; each with its unit."""
     count, at = len(model.scene.stops), places(model.shapes)
     names = ["δ"] if count == 1 else [f"δ {stop.name or i}" for i, stop in enumerate(model.scene.stops)]
-    found: dict[str, Watch] = {name: partial(indentation, stop=i) for i, name in enumerate(names)}
-    if not count and "tip" in at:
-        found["tip u"] = partial(displacement, shape=model.shapes(at["tip"]))
+    units = [unit_of("indentation", [row.rotation]) for row in model.contact_rows]
+    found: dict[str, tuple[Watch, str]] = {
+        name: (partial(indentation, stop=i), units[i]) for i, name in enumerate(names)
+    }
     if model.scene.named:
-        beside = [(name, z) for name, z in at.items() if np.any(model.shapes(z))]
-        return found or {f"{name} u": partial(displacement, shape=model.shapes(z)) for name, z in beside[:1]}
-    found["mid-beam u"] = partial(displacement, shape=model.shapes(at["mid-beam"]))
+        beside = [] if found else [(name, z) for name, z in at.items() if np.any(model.shapes(z))][:1]
+    else:
+        beside = [(name, z) for name, z in at.items() if name != "tip" or not found]
+    for name, z in beside:
+        found[f"{name} u"] = partial(displacement, shape=model.shapes(z)), "rad" if turns_at(z) else "m"
     return found
 
 
@@ -437,16 +483,16 @@ class Sums:
     """Sums over the segments taken so far."""
 
     watched: Mapping[str, Watch]
+    units: Mapping[str, str]  # of what is watched
+    contacts: Sequence[ContactRow]
     dt: float
     segment: int
     bins: dict[str, ArrayLike]
     levels: dict[str, float]
-    stops: int
     signals: dict[str, Signal] = field(default_factory=dict)
     impacts: list[Impacts] = field(default_factory=list)
-    names: tuple[str, ...] = ()  # of all contacts
-    work: Batches = field(default_factory=lambda: Batches(1))  # rows: seconds, work on each contact, loss by friction
-    rubbing: tuple[bool, ...] = ()
+    touching: tuple[int, ...] = ()  # contacts that begin and end
+    work: Batches = field(init=False)  # rows: seconds, work on each contact, loss by friction
 
     def __post_init__(self) -> None:
         for option, given in (("bins", self.bins), ("levels", self.levels)):
@@ -455,7 +501,9 @@ class Sums:
                     raise ValueError(
                         f"{option} names {name!r}, which is not watched; there are {', '.join(self.watched)}"
                     )
-        self.impacts = [Impacts() for _ in range(self.stops)]
+        self.touching = tuple(i for i, row in enumerate(self.contacts) if not row.always)
+        self.impacts = [Impacts() for _ in self.touching]
+        self.work = Batches(1 + 2 * len(self.contacts))
 
     def add(self, piece: Segment, seen: Mapping[str, tuple[Vector, Vector | None]]) -> float:
         """Take in a segment, batch by batch; returns its seconds."""
@@ -467,7 +515,7 @@ class Sums:
             self.signals[name].cut()
             for a, b in pairwise(borders):
                 self.signals[name].add(x[a:b], None if rate is None else rate[a:b])
-        for stop, impacts in enumerate(self.impacts):
+        for stop, impacts in zip(self.touching, self.impacts, strict=True):
             for a, b in pairwise(borders):
                 impacts.add(piece.run.contacts, stop, a * self.dt, b * self.dt)
         self._add_work(piece.run, borders)
@@ -475,30 +523,25 @@ class Sums:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """All sums by name, to be kept in a file."""
-        found: dict[str, NDArray[Any]] = {"names": np.array(self.names, dtype=str), "rubbing": np.array(self.rubbing)}
         parts: dict[str, Batches | Impacts | Signal] = {"work": self.work}
         parts |= {f"impacts {i}": one for i, one in enumerate(self.impacts)}
         parts |= {f"signal {name}": one for name, one in self.signals.items()}
-        return found | {f"{part} {key}": array for part, one in parts.items() for key, array in one.arrays().items()}
+        return {f"{part} {key}": array for part, one in parts.items() for key, array in one.arrays().items()}
 
     def take(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Go on from these sums."""
-        self.names, self.rubbing = tuple(map(str, arrays["names"])), tuple(map(bool, arrays["rubbing"]))
         self.work.take(_part(arrays, "work"))
         for i, one in enumerate(self.impacts):
             one.take(_part(arrays, f"impacts {i}"))
         for name in self.watched:
             level = self.levels.get(name, 0.0)
-            self.signals[name] = Signal.of_arrays(_part(arrays, f"signal {name}"), self.dt, level)
+            self.signals[name] = Signal.of_arrays(_part(arrays, f"signal {name}"), self.dt, level, self.units[name])
 
     def _add_work(self, run: Run, borders: Any) -> None:
         """Take in what each contact took between samples."""
-        if not self.names:
-            self.names = tuple(run.key(i) for i in range(len(run.stops)))
-            self.work = Batches(1 + 2 * len(self.names))
-            self.rubbing = tuple((run.rubs[:, 1] > 0.0).tolist())
-        lost = run.friction_loss if any(self.rubbing) else np.zeros((len(run.t), len(self.names)))
-        for a, b in pairwise(borders) if self.names else ():
+        rubs = np.any(run.rubs[:, 1] > 0.0)
+        lost = run.friction_loss if rubs else np.zeros((len(run.t), len(self.contacts)))
+        for a, b in pairwise(borders) if self.contacts else ():
             changes = (part[b] - part[a] for part in (run.losses.history, lost))
             self.work.add([(b - a) * self.dt, *np.concatenate(list(changes))])
 
@@ -507,12 +550,15 @@ class Sums:
         segment = min(self.segment, max(8, x.size // 2 if batches > 1 else x.size - 1))
         bins = self.bins.get(name)
         edges = None if bins is None else np.asarray(bins, dtype=np.float64)
-        return Signal(x, self.dt, segment, self.levels.get(name, 0.0), edges)
+        return Signal(x, self.dt, segment, self.levels.get(name, 0.0), edges, self.units[name])
 
     def response(self, plan: Segments, settled: Settling | None, enough: bool | None) -> Response:
         """The statistics so far."""
         seen = self.signals, self.impacts, plan.kept, plan.discarded, settled, enough, plan.seconds
-        return Response(*seen, self.names, self.work, self.rubbing)
+        names = tuple(row.key(i) for i, row in enumerate(self.contacts))
+        rubbing = tuple(row.rub[1] > 0.0 for row in self.contacts)
+        rotations = tuple(row.rotation for row in self.contacts)
+        return Response(*seen, names, self.work, rubbing, rotations, self.touching)
 
 
 def _part(arrays: Mapping[str, NDArray[Any]], name: str) -> dict[str, NDArray[Any]]:
