@@ -24,6 +24,7 @@ import solvers
 from contacts import Hertz, Hysteretic, law
 from fembeam.statistics import Estimate
 from fembeam.study import Ensemble, characteristics, ensemble
+from fembeam.support import warn
 
 HERE = Path(__file__).parent
 
@@ -115,6 +116,18 @@ def test_statistics_by_threads_are_those_computed_here(tmp_path):
         first = ensemble(model, 2, quantity, pool, tmp_path / "kept.npz")
         assert same(ensemble(model, 6, quantity, pool, tmp_path / "kept.npz"), here)
     assert np.array_equal(first.values["δ psd"], here.values["δ psd"][:2])
+
+
+def telling(model):
+    """A number, of which something is to be said."""
+    warn("the same words of all realisations")
+    return 1.0
+
+
+def test_processes_warn_where_they_were_asked_once():
+    with ProcessPoolExecutor(2) as pool, pytest.warns(UserWarning, match="the same words") as told:
+        ensemble(small_model(), 6, telling, pool)
+    assert [one.filename for one in told] == [__file__]
 
 
 def test_a_model_that_was_run_can_be_sent_to_another_process():

@@ -6,15 +6,20 @@ Any `concurrent.futures.Executor` will do: threads, processes, `dask.distributed
 
 from __future__ import annotations
 
+import os
+import warnings
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, as_completed
-from typing import TypeVar
+from itertools import chain
+from threading import current_thread, main_thread
+from typing import Any, TypeVar
 
-from fembeam.support import counting, interrupts, require
+from fembeam.support import counting, interrupts, require, warn
 from solvers.problem.whole_runs import whole_runs
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+_SAID: dict[Any, Any] = {}  # warnings of a user's code that this process has shown
 
 
 def spread(
@@ -61,17 +66,35 @@ def spread(
                 tell(index, results[-1])
                 bar.update()
             return results
-        futures = [executor.submit(_named, function, index, item) for index, item in enumerate(work)]
+        here = os.getpid()
+        futures = [executor.submit(_away, function, index, item, here) for index, item in enumerate(work)]
         places = {future: index for index, future in enumerate(futures)}
         try:
             for done in as_completed(futures):
-                tell(places[done], done.result())
+                tell(places[done], done.result()[0])
                 bar.update()
         except BaseException:
             for future in futures:
                 future.cancel()
             raise
-        return [future.result() for future in futures]
+        for message in dict.fromkeys(chain.from_iterable(future.result()[1] for future in futures)):
+            warn(message)
+        return [future.result()[0] for future in futures]
+
+
+def _away(function: Callable[[Item], Result], index: int, item: Item, caller: int) -> tuple[Result, list[str]]:
+    """The result, and what another process than the caller's warned of, which knows no line of a user to name.
+
+    Threads share the caller's warnings already, and those of one process may not collect theirs at the same time.
+    """
+    if os.getpid() == caller or current_thread() is not main_thread():
+        return _named(function, index, item), []
+    with warnings.catch_warnings(record=True) as found:
+        result = _named(function, index, item)
+    for one in found:
+        if one.category is not UserWarning:  # of a user's own code: its line tells more
+            warnings.warn_explicit(one.message, one.category, one.filename, one.lineno, registry=_SAID)
+    return result, [str(one.message) for one in found if one.category is UserWarning]
 
 
 def _named(function: Callable[[Item], Result], index: int, item: Item) -> Result:
