@@ -151,7 +151,8 @@ def ensemble(
     ----------
     model : with at least one `BandNoise` among base motion, forces and feet; noises of one seed stay one realisation.
     seeds : how many, or the seeds themselves, none twice. A number spawns them from the noise's own seed
-        (`numpy.random.SeedSequence`), so that a longer ensemble contains a shorter one.
+        (`numpy.random.SeedSequence`), so that a longer ensemble contains a shorter one. Noise number j of the model
+        takes child j of a seed: of ``seeds=[5]`` the first is ``BandNoise(…, seed=SeedSequence(5, spawn_key=(0,)))``.
     quantity : of the model under one realisation: a number, an array, or a mapping of names to these, None for a number
         that a realisation does not have, such as the mean over contacts where there was none. For example
         ``partial(fb.study.characteristics, duration=100.0, dt=1e-3)`` or
