@@ -402,6 +402,8 @@ test_signals_that_are_no_signals_are_refused = refused_by(
     (lambda t: np.exp(1j * t), "the signal of load 0 must be real"),
     (lambda t: np.where(t > 0.3, 1.0, 0.0), r"the signal of load 0 jumps at t = 0.3 s"),  # took up to 90 s
     (lambda t: 10.0 * np.sin(7.0 * t) + 1e-2 * (t > 0.3), r"the signal of load 0 jumps at t = 0.3 s"),
+    (lambda t: np.abs(np.sin(7.0 * t - 1.0)), r"the signal of load 0 has a kink at t = 0.142857 s"),  # 90 s, 3.3 GB
+    (lambda t: np.interp(t, [0.0, 0.1, 0.5], [0.0, 1.0, 0.0]), r"load 0 has a kink at t = 0.1 s, where no spline"),
     (lambda t: np.ones(65), r"the signal of load 0 must broadcast: \(4096,\) times gave \(65,\) values"),
     (Tone(1.0, np.nan), r"tones\(\) of the signal of load 0 must be finite"),
     (Tone(np.inf, 31.0), r"tones\(\) of the signal of load 0 must be finite"),

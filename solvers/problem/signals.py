@@ -9,7 +9,7 @@ A signal is any callable t -> value that broadcasts. It becomes exactly one of
   ends;
 * nothing of either: sampled here by a quintic spline, refined until it agrees between its nodes at 4096 places or more.
   What is shorter than duration/4096, such as a pulse, may hide between these and needs ``nodes``. Where the signal or
-  its slope jumps, no spline agrees to a small tolerance, and the signal is refused, with the time of a jump.
+  its slope jumps, no spline agrees to a small tolerance, and the signal is refused, with the time of a jump or kink.
 
 What is made of signals that are frozen dataclasses, their arrays read-only, is kept for other runs of the system; all
 other signals are asked anew by every run.
@@ -34,6 +34,7 @@ from solvers.problem.system import Signal
 _MOST_NODES = 20_000_000
 _FEWEST_PLACES = 4096  # where a plain callable is compared with its spline
 _JUMP_ROUNDS = 5  # each looks at a 64th of the interval before
+_KINK_ROUNDS = 3  # each looks at a 32nd
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,6 +221,25 @@ def _refuse_jumps(signal: Signal, t: Array, values: Array, rtol: float, load: in
         )
 
 
+def _refuse_kinks(signal: Signal, around: float, cell: float, error: float, duration: float, load: int) -> None:
+    """ValueError where a signal's slope changes within 1e-4 of a cell by half as much as within six, or more.
+
+    So much that it explains the error of the spline: otherwise it is rounding.
+    """
+    t = np.linspace(max(around - 3.0 * cell, 0.0), min(around + 3.0 * cell, duration), 65)
+    changes, at = [], around
+    for _ in range(1 + _KINK_ROUNDS):
+        slopes = np.diff(_values(signal, t, load)) / (t[1] - t[0])
+        sharpest = int(np.argmax(np.abs(np.diff(slopes))))
+        changes.append(float(np.ptp(slopes)))
+        at, t = t[sharpest + 1], np.linspace(t[sharpest], t[sharpest + 2], 65)
+    if max(0.5 * changes[0], error / cell) < changes[-1] < 2.0 * changes[0]:  # of a jump it grows
+        raise ValueError(
+            f"the signal of load {load} has a kink at t = {at:g} s, where no spline agrees: give it nodes() that tell "
+            "both sides, such as those of a record joined by straight lines, or loosen rtol"
+        )
+
+
 def _sample(signal: Signal, duration: float, rtol: float, load: int) -> tuple[float, Array]:
     """Nodes of a plain callable: double a quintic spline's grid until it agrees to ``rtol`` between its nodes."""
     from scipy.interpolate import make_interp_spline
@@ -232,11 +252,14 @@ def _sample(signal: Signal, duration: float, rtol: float, load: int) -> tuple[fl
         # thirds rather than midpoints, so that no period of the signal hides between the samples
         places = np.arange(max(cells, _FEWEST_PLACES))
         between = (places + np.where(places % 2, 1 / 3, 0.58)) * (duration / len(places))
-        error = np.abs(spline(between) - _values(signal, between, load)).max()
-        if error <= rtol * np.abs(values).max():
+        errors = np.abs(spline(between) - _values(signal, between, load))
+        error, allowed = errors.max(), rtol * np.abs(values).max()
+        if error <= allowed:
             return duration / cells, np.stack([values, spline(t, 1), spline(t, 2)], axis=1)
         if cells >= _FEWEST_PLACES:
             _refuse_jumps(signal, t, values, rtol, load)
+            if error * cells > allowed * _MOST_NODES:  # too much at a kink for all nodes there may be
+                _refuse_kinks(signal, between[errors.argmax()], t[1], error, duration, load)
         cells *= 2
     raise ValueError(
         f"the signal of load {load} is too rough to sample to {rtol:g}; give it tones() or nodes(), or loosen rtol"
