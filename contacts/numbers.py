@@ -50,6 +50,9 @@ def reals(values: Any, what: str) -> NDArray[np.float64]:
     except ValueError:
         raise ValueError(f"{what} must be numbers in rows of equal length, got {values!r}") from None
     with np.errstate(over="ignore"):  # beyond the largest float: inf, which is refused where it may not be
+        if given.dtype.kind in "iuf" and not isinstance(values, np.ndarray):  # NumPy takes True among numbers for 1
+            told = np.asarray(values, dtype=object)
+            given = told if any(isinstance(one, (bool, np.bool_)) for one in told.ravel().tolist()) else given
         if given.dtype.kind in "iuf":
             return given.astype(float)
         return np.array([_float(value, what) for value in given.ravel().tolist()]).reshape(given.shape)

@@ -385,7 +385,7 @@ test_bad_noise = refused(
     (lambda: BandNoise(1.0, BROAD, seed=None), "seed must be an integer of at least 0 .* got None"),
     (lambda: BandNoise(1.0, BROAD, seed=-1), "seed must be an integer of at least 0 .* got -1"),
     (lambda: BandNoise(1.0, BROAD, period=0.0), r"period \(s\) must be finite above 0, got 0.0"),
-    (lambda: BandNoise(1.0, BROAD, period=1e300), r"takes at most 1e\+08 lines in the band, got 1\.\d+e\+302 in"),
+    (lambda: BandNoise(1.0, BROAD, period=1e40), r"takes at most 1e\+08 lines in the band, got 1\.\d+e\+42 in"),
     (lambda: BandNoise(1.0, BROAD, period=0.01), "at least 8 lines in the band, got 1 in"),
     (lambda: BandNoise(1.0, BROAD).derivative(1.5), "order of the derivative .* got 1.5"),
     (lambda: BandNoise(1.0, BROAD).nodes(1.0, 0.0), r"rtol must lie in \[1e-13, 1\), got 0.0"),
@@ -612,5 +612,5 @@ NO_NUMBERS = [True, np.True_, "1", None, 1j, np.complex64(1), np.complex128(1), 
 def test_what_is_no_number_is_refused_in_words(bad):
     with pytest.raises(ValueError, match=r"amplitude must be (a number|finite), got"):
         Harmonic(bad, 100.0)
-    with pytest.raises(ValueError, match=r"mass must be (a number|finite and not negative), got"):
+    with pytest.raises(ValueError, match=r"mass must be (a number|finite and not negative)"):
         LumpedMass(0.1, bad)

@@ -123,7 +123,7 @@ test_refused = refused(
     (lambda: fb.Frame(SPACE_L, [*members(), fb.Member("C", "B", BARE)]), "'C-B' must know I2 and J in space"),
     (lambda: fb.Frame.straight(1.0, BARE, bending_only=True), "must know I2 in space"),
     (lambda: fb.Frame(SPACE_L, members(), bending_only=True), "along the z axis"),
-    (lambda: fb.Frame.straight(1.0, STEEL, bending_only="false"), "bending_only must be true or false, got 'false'"),
+    (lambda: fb.Frame.straight(1.0, STEEL, bending_only="false"), "bending_only must be True or False, got 'false'"),
     (lambda: fb.Frame(SPACE_L, members(release=1.0)), "release must be 'start' or 'end' and one of .* got 1.0"),
     (lambda: fb.Frame.straight(1.0, STEEL, spin=10.0), "must be round to spin"),
     (lambda: fb.Frame(SPACE_L, members(), spin=10.0), "spin is for a straight shaft"),

@@ -327,3 +327,9 @@ def test_numbers_beyond_the_floats_are_refused():
             Hertz(big)
         with pytest.raises(ValueError, match="coefficients of Polynomial must be finite"):
             Polynomial([1.0, big])
+
+
+@pytest.mark.parametrize("switch", [True, np.False_])
+def test_a_switch_among_numbers_is_none_of_them(switch):
+    with pytest.raises(ValueError, match="coefficients of Polynomial must be a number, got "):
+        Polynomial([1.0, switch])

@@ -81,6 +81,9 @@ def test_bad_numbers_of_a_search_for_attractors_are_refused(model):
         for value in (0, -1, 3.0, True, None):
             with pytest.raises(ValueError, match=rf"{name} must be a .*, got {value} in Model.attractors; ask for"):
                 model.attractors(**{"starts": 1, name: value})
+    for seed in (-1, 1.0, None):
+        with pytest.raises(ValueError, match=f"seed must be a whole number of at least 0, got {seed} in Model.attrac"):
+            model.attractors(starts=2, seed=seed)
 
 
 def test_a_search_from_nothing_tells_how_far_it_is(monkeypatch):

@@ -144,3 +144,24 @@ def test_a_number_of_a_body_within_a_place():
     with pytest.raises(ValueError, match=re.escape(said)):
         run.displacement((1, 33), "x")
     assert run.displacement(33, "x", body=1).shape == (11,)
+
+
+@pytest.mark.parametrize("make", [
+    lambda: fb.Structure.of_modes([True, 2.0], np.eye(2), [("A", "x"), ("B", "x")]),
+    lambda: fb.response_spectrum([0.0, 1.0], [0.0, 1.0], [1.0, True]),
+])  # fmt: skip
+def test_a_switch_among_numbers_is_none_of_them(make):
+    with pytest.raises(ValueError, match=r"must be (real )?numbers, got \[.*True"):
+        make()
+
+
+@pytest.mark.parametrize(("name", "call"), [
+    ("absolute", lambda run: run.displacement("N35", "z", absolute="no")),
+    ("mean", lambda run: run.force(0, mean="no")),
+    ("progress", lambda run: run.model.simulate(0.1, progress="no")),
+    ("progress", lambda run: fb.study.vary(run.model.scene, {"stops[0].gap": [0.0]}, "rms", duration=0.1, dt=1e-3,
+                                           modes=1, progress="no")),
+])  # fmt: skip
+def test_text_is_no_switch(run, name, call):
+    with pytest.raises(ValueError, match=f"{name} must be True or False, got 'no' in"):
+        call(run)

@@ -238,8 +238,6 @@ def test_a_law_that_is_not_finite_stops_the_run(bad, method):
     assert re.search(r"t = [\d.]+", str(caught.value))
 
 
-def test_loads_that_overflow_stop_the_run():
-    scene = scaled(1.0)
-    scene = fb.Scene(scene.beam, scene.supports, base=fb.Harmonic(amplitude=1e300, omega=195.0))
+def test_motion_that_overflows_stops_the_run():
     with np.errstate(all="ignore"), pytest.raises(solvers.SolverError, match="not finite any more"):
-        scene.reduce(2).simulate(0.5)
+        scaled(1.0).reduce(2).simulate(0.5, start=[1e306, 0.0, 0.0, 0.0])

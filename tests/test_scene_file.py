@@ -251,6 +251,9 @@ test_mistakes_are_named = refused_files(
     ("duration = 600", "duration = 600 s", r"not valid TOML: .*line \d+"),
     ("z = 0.24445", "z = 0.3", r"z must lie on the beam.*LumpedMass"),
     ("length = 0.2599", "length = 1" + 400 * "0", r"length must be a number"),
+    ("E = 1.9e11", "E = 1e300", r"\[beam\] section: E must be finite and positive and at most 1e\+50 in size"),
+    ("E = 1.9e11", "E = 1e-300", r"\[beam\] section: E must be at least 1e-50, got 1e-300"),
+    ("zeta = [0.02", "zeta = [1e300", r"zeta\[0\] must be finite and not negative and at most 1e\+50 in size"),
     ("[beam]", "[beam]\nspans = 3\n#", r"spans must be a list|unknown key"),
     error=SceneFileError,
 )

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.excitation.record import Interpolation, Record
 from fembeam.excitation.samples import checked_samples, read_rows
+from fembeam.support import require_switch
 
 Vector = NDArray[np.float64]
 Unit = Literal["g", "m/s2", "cm/s2"]
@@ -78,8 +79,7 @@ def earthquake(
     >>> earthquake(path, baseline=False).derivative(2)(0.08) / 9.80665  # g
     np.float64(0.099957)
     """
-    if not isinstance(baseline, (bool, np.bool_)):
-        raise ValueError(f"baseline must be True or False, got {baseline!r} in earthquake")
+    require_switch("baseline", baseline, "earthquake")
     path = Path(path)
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     found = _peer(text, path) or _cosmos(text, path)

@@ -30,7 +30,7 @@ from fembeam.excitation.samples import (
     padded,
     read_rows,
 )
-from fembeam.support import number
+from fembeam.support import number, require_switch
 
 Quantity = Literal["displacement", "acceleration", "force"]
 Interpolation = Literal["spectral", "linear"]
@@ -129,8 +129,7 @@ class Record:
             if getattr(self, name) not in choices:
                 said = " or ".join(map(repr, choices))
                 raise ValueError(f"Record {name} must be {said}, got {getattr(self, name)!r}")
-        if not isinstance(self.detrend, (bool, np.bool_)):
-            raise ValueError(f"Record detrend must be True or False, got {self.detrend!r}")
+        require_switch("detrend", self.detrend, "Record")
         if self.order and self.quantity == "force":
             raise ValueError("Record of a force has no derivatives, got quantity='force' as a motion; give "
                              "quantity='displacement' or 'acceleration'")  # fmt: skip

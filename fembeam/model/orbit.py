@@ -22,7 +22,7 @@ from fembeam.model.equations import load_period
 from fembeam.model.extremes import extremes_of
 from fembeam.response import PlacedLog
 from fembeam.scene import signals_of, with_signals
-from fembeam.support import Part, Printed, counting, is_whole, numbers, require, warn
+from fembeam.support import Part, Printed, counting, is_whole, numbers, require, require_seed, warn
 from solvers import orbits
 from solvers.problem import counted
 from solvers.problem.whole_runs import whole_runs
@@ -331,6 +331,7 @@ def _given(model: Model, starts: Any) -> list[Vector]:
 def _drawn(model: Model, count: int, seed: int) -> list[Vector]:
     """Rest, and random states of the size that the motion from rest has."""
     require(count >= 1, "starts must be a count above 0 or a list of states", count, WHERE, "ask for 12")
+    require_seed(seed, WHERE)
     n, T = len(model.omega), load_period(model.scene)
     method = solvers.Exponential(1e-6, ledger=False)
     with whole_runs():

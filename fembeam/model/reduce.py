@@ -28,7 +28,7 @@ from fembeam.scene import (
 )
 from fembeam.scene.rigid_motions import carried_away
 from fembeam.structures import COMPONENTS
-from fembeam.support import is_finite, is_whole, require, warn
+from fembeam.support import is_finite, is_whole, require, require_switch, warn
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -390,8 +390,7 @@ def _numbers(modes: Any, interface: bool) -> tuple[int, ...]:
 def _check_static(scene: Scene, residual: bool, interface: bool) -> None:
     """Raise ValueError when static shapes are asked for twice, or have no place to be loaded at."""
     for name, choice in (("residual", residual), ("interface", interface)):
-        known = isinstance(choice, (bool, np.bool_))
-        require(known, f"{name} must be True or False", choice, "Scene.reduce", "without quotes")
+        require_switch(name, choice, "Scene.reduce")
     require(not (residual and interface), "residual and interface exclude each other", True, "Scene.reduce",
             "keep one: either makes the model exact for slow loads at its places")  # fmt: skip
     places = [bool(loaded(scene, body)) for body in range(1 + len(scene.bodies))]

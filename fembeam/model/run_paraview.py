@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fembeam.response import rows_of
 from fembeam.structures import FrameForces
-from fembeam.support import is_whole, require, written_beside
+from fembeam.support import is_whole, require, require_switch, written_beside
 from solvers.problem import optional
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ def to_xdmf(run: Run, path: str | os.PathLike[str], stride: int = 1, hdf5: bool 
     """
     from meshio.xdmf import TimeSeriesWriter
 
+    require_switch("hdf5", hdf5, "Run.to_xdmf")
     h5py = optional("h5py", "XDMF with HDF5 data") if hdf5 else None
     samples, points, cells, values = _samples(run, stride), *_geometry(run), _fields(run)
     target = _target(Path(path), ".xdmf")

@@ -19,7 +19,7 @@ from fembeam.response.readout import Readout
 from fembeam.response.section_forces import extremes, frame_forces_of, rows_of
 from fembeam.scene import loads_of_order, made_key, split, unit_of
 from fembeam.structures import COMPONENTS, UP, Six
-from fembeam.support import is_whole, numbers, require
+from fembeam.support import is_whole, numbers, require, require_switch
 from solvers.problem import FrictionLog, Losses
 from solvers.problem.event_list import NO_EVENTS
 
@@ -151,6 +151,7 @@ class Histories:
         """u, u̇ or ü at z (k,) or (k, j) from q, q̇ or q'' (k, n), with that of the frame's motion if absolute."""
         if is_whole(direction):  # (z, body, absolute) by position, as where places are numbers
             direction, body, absolute = None, direction, absolute or body is True
+        require_switch("absolute", absolute, "Run")
         shapes = self._beam(body)
         at = shapes.place(z)
         if shapes.named:
@@ -388,6 +389,7 @@ class Histories:
         to the last sample and, from sample to sample, of what always acts. Between two samples the law is evaluated on
         a cubic to divide the impulse at their middle. ValueError for a run without samples.
         """
+        require_switch("mean", mean, "Run.force")
         if mean:
             return mean_force(self, self._stop(stop))
         number = self._stop(stop)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.scene import loads_of_dof, signals_of, split, unit_of
 from fembeam.structures import COMPONENTS, turns
-from fembeam.support import is_finite, require, vector
+from fembeam.support import is_finite, require, require_switch, vector
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -77,7 +77,7 @@ def frequency_response(
     shapes = model.body_shapes(body, WHERE)
     output, driven = shapes.place(output), _named_input(model, driven)
     for name, flag in (("absolute", absolute), ("slipping", slipping)):
-        require(isinstance(flag, (bool, np.bool_)), f"{name} must be True or False", flag, WHERE, "leave it out")
+        require_switch(name, flag, WHERE, "leave it out")
     moved = isinstance(driven, str) and driven.split(".")[0] == "base"
     require(not absolute or moved, "absolute is for the input 'base'", driven, WHERE, "leave it out")
     if model.scene.named and isinstance(output, np.ndarray):

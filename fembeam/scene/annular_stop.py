@@ -17,7 +17,7 @@ from fembeam.scene.places import Second, quoted
 from fembeam.scene.rotors import carrier
 from fembeam.scene.rubbing import ACROSS, Friction, check_round, check_spin, completed
 from fembeam.structures import COMPONENTS, Direction, Frame, direction_of, turns
-from fembeam.support import is_finite, require, require_positive
+from fembeam.support import is_finite, require, require_positive, require_switch
 
 USUAL = ("x", "y")
 
@@ -85,8 +85,7 @@ class AnnularStop(ScenePart):
         pair = isinstance(given, (list, tuple)) and len(given) == 2 and all(map(is_finite, given))
         require(pair, "centre must be two finite numbers", self.centre, where, "give m along the two directions")
         object.__setattr__(self, "centre", (float(given[0]), float(given[1])))
-        require(isinstance(self.outer, (bool, np.bool_)), "outer must be True or False", self.outer, where,
-                "True is a post beside the place")  # fmt: skip
+        require_switch("outer", self.outer, where, "True is a post beside the place")
         local_coordinate(self.z, "displacement", self.on, where, "on", "x")
         check_law(self.law, where)
         require(not getattr(self.law, "memory", ()), "law must have no memory", self.law, where,

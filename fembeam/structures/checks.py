@@ -12,7 +12,7 @@ from scipy.sparse import linalg as sparse_linalg
 
 from fembeam.structures.assembled import COMPONENTS
 from fembeam.structures.directions import nearest
-from fembeam.support import is_finite, require
+from fembeam.support import LARGEST, has_switches, is_finite, require
 
 if TYPE_CHECKING:
     from fembeam.structures.structure import Structure
@@ -51,7 +51,11 @@ def real(name: str, values: Any, where: str) -> Any:
         kind: str = np.asarray(given).dtype.kind
     except ValueError:  # rows of unequal length
         kind = "O"
-    require(kind in "iufc", f"{name} must be numbers", values, where, "give an array of them")
+    right = kind in "iufc" and not has_switches(given)
+    require(right, f"{name} must be numbers", values, where, "give an array of them")
+    size = np.abs(np.asarray(given))
+    largest = float(size[np.isfinite(size)].max(initial=0.0))
+    require(largest <= LARGEST, f"{name} must be finite", largest, where, "check units and the export")
     if kind != "c":
         return values
     turned = float(np.abs(np.imag(given)).max(initial=0.0))

@@ -16,7 +16,16 @@ from fembeam.beams import SAME_PLACE, Section
 from fembeam.structures.assembled import COMPONENTS
 from fembeam.structures.directions import nearest
 from fembeam.structures.members import Member, axes_of
-from fembeam.support import in_mm, is_finite, is_pair, is_whole, require, require_finite, require_positive
+from fembeam.support import (
+    in_mm,
+    is_finite,
+    is_pair,
+    is_whole,
+    require,
+    require_finite,
+    require_positive,
+    require_switch,
+)
 
 if TYPE_CHECKING:
     from fembeam.structures.frame_mesh import FrameMatrices
@@ -80,8 +89,7 @@ class Frame:
         require(listed, "members must be a list", self.members, "Frame", "give [Member(a, b, section), …]")
         object.__setattr__(self, "members", tuple(self.members))
         require_finite("spin", self.spin, "Frame", "give rad/s")
-        known = isinstance(self.bending_only, (bool, np.bool_))
-        require(known, "bending_only must be true or false", self.bending_only, "Frame", "without quotes")
+        require_switch("bending_only", self.bending_only, "Frame")
         check_frame(self)
 
     @classmethod

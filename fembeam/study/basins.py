@@ -25,7 +25,7 @@ from fembeam.scene import Place, directed_words
 from fembeam.study.execution.checkpoint import Checkpoint, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.result import Result
-from fembeam.support import Part, is_finite, is_whole, require
+from fembeam.support import Part, is_finite, is_whole, require, titled
 from solvers.orbits import delayed
 from solvers.orbits import run as run_from
 
@@ -187,7 +187,7 @@ def basins(
     known = _found(model, _coarse(starts), longest, T)
     missing = [row for row in range(rows) if str(row) not in kept.values]
     task = partial(_settled, model, starts, known, settle, T, threads)
-    spread(task, missing, None, "basins" if progress else None, lambda i, v: kept.add(str(missing[i]), {"state": v}))
+    spread(task, missing, None, titled(progress, "basins"), lambda i, v: kept.add(str(missing[i]), {"state": v}))
     states = np.array([kept.values[str(row)]["state"] for row in range(rows)])
     label, known = _labelled(model, states.reshape(-1, states.shape[-1]), known, longest, T)
     return _sorted(across, up, origin, label.reshape(rows, columns), known)

@@ -25,7 +25,7 @@ from fembeam.study.execution.executors import spread
 from fembeam.study.realisations import Seed, child, noises, realisation, seed_key
 from fembeam.study.result import Result, with_units
 from fembeam.study.stationary import characteristics, units_of_characteristics
-from fembeam.support import Part, is_whole, note, number, require, warn
+from fembeam.support import Part, is_whole, note, number, require, titled, warn
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -233,7 +233,7 @@ def _compute(
             kept.add(key, result)
 
     try:
-        spread(task, seeds, executor, "realisations" if progress else None, seen)
+        spread(task, seeds, executor, titled(progress, "realisations"), seen)
     except (ValueError, OSError):
         raise
     except Exception as error:  # failures of a realisation do not come this way

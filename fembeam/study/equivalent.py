@@ -22,7 +22,7 @@ from contacts.path import walk
 from contacts.sums import Gated
 from fembeam import plot
 from fembeam.study.result import Result
-from fembeam.support import Part, by_rows, number, require, vector
+from fembeam.support import Part, by_rows, number, require, require_switch, vector
 
 Vector = NDArray[np.float64]
 WHERE = "study.equivalent"
@@ -130,6 +130,7 @@ def equivalent(
     >>> found.energy.round(6).tolist(), found.stiffness.round().tolist()
     ([0.0, 0.02], [20000.0, 10000.0])
     """
+    require_switch("stop", stop, WHERE)
     require(isinstance(law, Law), "law must be a contact law", law, WHERE, "give one of `contacts`, such as Jenkins")
     X = vector("amplitudes", amplitudes, WHERE, "give them in m", "must be above 0 and finite, (k,)",
                lambda x: np.isfinite(x) & (x > 0.0))  # fmt: skip

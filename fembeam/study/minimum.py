@@ -33,7 +33,7 @@ from fembeam.study.quantities import Quantity, label, named
 from fembeam.study.result import Result
 from fembeam.study.trial import Maker, Trial
 from fembeam.study.variation import Variation, collected, computed, identity_of
-from fembeam.support import Part, is_finite, is_whole, note, number, require
+from fembeam.support import Part, is_finite, is_whole, note, number, require, titled
 from solvers.problem import counted
 
 Vector = NDArray[np.float64]
@@ -199,7 +199,7 @@ def minimise(
         gradients = has_gradients(trial, insist=gradients is True)
     kept = Checkpoint(checkpoint, partial(identity_of, trial))
     search = _Search(trial, box, np.array([bound for _, bound in limits]), kept)
-    search.look(first, executor, WHERE if progress else None)
+    search.look(first, executor, titled(progress, WHERE))
     converged = search.descend(tolerance, most, gradients)
     return _found(search, tolerance, converged)
 

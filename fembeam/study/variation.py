@@ -20,7 +20,7 @@ from fembeam.study.execution.executors import spread
 from fembeam.study.measure import Plan, Start
 from fembeam.study.result import Result, with_units
 from fembeam.study.trial import Asked, Maker, Refused, Trial
-from fembeam.support import Part, is_whole, require, warn
+from fembeam.support import Part, is_whole, require, require_seed, titled, warn
 from solvers.problem import counted
 
 Vector = NDArray[np.float64]
@@ -202,7 +202,7 @@ def vary(
     names, points, axes = points_of(parameters, samples, seed)
     trial = Trial.of(scene, names, quantity, plan, reduction).prepared(points)
     kept = Checkpoint(checkpoint, partial(identity_of, trial))
-    failures = computed(trial, points, kept, executor, WHERE if progress else None)
+    failures = computed(trial, points, kept, executor, titled(progress, WHERE))
     if failures:
         i, reason = failures[0]
         message = f"{len(failures)} of {len(points)} points failed; {trial.words(points[i])}: {reason}"
@@ -322,7 +322,7 @@ def _shares(samples: Any, seed: int, parameters: int) -> Vector:
     """(n, d) numbers in [0, 1]: those given, or that many drawn."""
     if is_whole(samples):
         require(samples > 0, "samples must be at least 1", samples, WHERE, "e.g. 64")
-        require(is_whole(seed) and seed >= 0, "seed must be a whole number of at least 0", seed, WHERE, "e.g. 1")
+        require_seed(seed, WHERE)
         return np.random.default_rng(int(seed)).random((int(samples), parameters))
     given = np.asarray(np.nan if samples is None else samples, dtype=float)
     shape = given.ndim == 2 and given.shape[1] == parameters and len(given) > 0

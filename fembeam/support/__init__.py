@@ -6,7 +6,9 @@ Imports nothing of ours.
 from fembeam.support.cards import Block, Card, abaqus_blocks, check_abaqus, nastran_cards, real
 from fembeam.support.changes import changes
 from fembeam.support.checks import (
+    LARGEST,
     frozen,
+    has_switches,
     in_mm,
     is_finite,
     is_name,
@@ -21,12 +23,14 @@ from fembeam.support.checks import (
     require_non_negative,
     require_place,
     require_positive,
+    require_seed,
+    require_switch,
     tuples,
     vector,
 )
 from fembeam.support.files import DRAFT, read_with, write_rows, written_beside, written_whole
 from fembeam.support.notes import note, warn
 from fembeam.support.printed import Part, Printed, html_table
-from fembeam.support.progress import bar, counting
+from fembeam.support.progress import bar, counting, titled
 from fembeam.support.text_tables import aligned, by_rows
 from fembeam.support.versions import versions

@@ -9,6 +9,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+LARGEST = 1e50  # size of a number, its inverse the least of a positive one: works stay floats, as in `contacts`
 LONG = 5.0  # lengths of a body, from where on a place off it looks like one in mm
 
 
@@ -18,9 +19,9 @@ def is_number(value: object) -> TypeGuard[float]:
 
 
 def is_finite(value: object) -> bool:
-    """Whether value is a real, finite number."""
+    """Whether value is a real number that can be computed with: finite and at most `LARGEST` in size."""
     try:
-        return is_number(value) and math.isfinite(value)
+        return is_number(value) and math.fabs(value) <= LARGEST
     except OverflowError:  # a whole number beyond the floats
         return False
 
@@ -34,11 +35,14 @@ def require(valid: bool, rule: str, got: object, where: str, advice: str) -> Non
     """Raise ValueError as `what, got, where; do` unless valid."""
     if not valid:
         shown = got if is_finite(got) or isinstance(got, float) else repr(got)
-        raise ValueError(f"{rule}, got {shown} in {where}; {advice}")
+        given = got if isinstance(got, (tuple, list)) else [got]
+        large = any(is_number(one) and not is_finite(one) and abs(one) < math.inf for one in given)
+        size = f" and at most {LARGEST:g} in size" if large else ""
+        raise ValueError(f"{rule}{size}, got {shown} in {where}; {advice}")
 
 
 def require_finite(name: str, value: Any, where: str, advice: str, bound: str = "", valid: bool = True) -> None:
-    """Raise ValueError unless value is a number, finite, and valid by a bound told in words."""
+    """Raise ValueError unless value is a number, finite and at most `LARGEST`, and valid by a bound told in words."""
     require(is_number(value), f"{name} must be a number", value, where, advice)
     require(is_finite(value) and valid, f"{name} must be finite{bound}", value, where, advice)
 
@@ -46,11 +50,22 @@ def require_finite(name: str, value: Any, where: str, advice: str, bound: str = 
 def require_positive(name: str, value: Any, where: str, advice: str) -> None:
     """Raise ValueError unless value is finite and > 0."""
     require_finite(name, value, where, advice, " and positive", is_finite(value) and value > 0)
+    require(float(value) >= 1.0 / LARGEST, f"{name} must be at least {1.0 / LARGEST:g}", value, where, advice)
 
 
 def require_non_negative(name: str, value: Any, where: str, advice: str) -> None:
     """Raise ValueError unless value is finite and >= 0."""
     require_finite(name, value, where, advice, " and not negative", is_finite(value) and value >= 0)
+
+
+def require_switch(name: str, value: Any, where: str, advice: str = "without quotes") -> None:
+    """Raise ValueError unless value is True or False: "no" counts as true in Python."""
+    require(isinstance(value, (bool, np.bool_)), f"{name} must be True or False", value, where, advice)
+
+
+def require_seed(value: Any, where: str) -> None:
+    """Raise ValueError unless value is a seed of random numbers."""
+    require(is_whole(value) and value >= 0, "seed must be a whole number of at least 0", value, where, "e.g. 1")
 
 
 def in_mm(value: Any, most: float) -> str:
@@ -110,6 +125,9 @@ def number(name: str, value: Any, above: float = -math.inf, least: float = -math
     if not (math.isfinite(result) and result > above and result >= least):
         bound = f" above {above:g}" if above > -math.inf else f" of at least {least:g}"
         raise ValueError(f"{name} must be finite{bound if max(above, least) > -math.inf else ''}, got {value!r}")
+    if abs(result) > LARGEST or (above == 0.0 and result < 1.0 / LARGEST):
+        bound = f"at most {LARGEST:g} in size" if abs(result) > LARGEST else f"at least {1.0 / LARGEST:g}"
+        raise ValueError(f"{name} must be {bound}, got {value!r}")
     return result
 
 
@@ -119,8 +137,22 @@ def numbers(name: str, values: Any, where: str, advice: str) -> NDArray[np.float
         given = np.asarray(values)
     except ValueError:  # rows of unequal length
         given = np.asarray(None)
-    require(given.dtype.kind in "iuf", f"{name} must be real numbers", values, where, advice)
+    right = given.dtype.kind in "iuf" and not has_switches(values)
+    require(right, f"{name} must be real numbers", values, where, advice)
     return given.astype(np.float64)
+
+
+def has_switches(values: Any) -> bool:
+    """Whether True or False stand among numbers, in rows of equal length, which NumPy takes for 1 and 0.
+
+    Examples
+    --------
+    >>> has_switches([[0.5, True], [1, 2]]), has_switches([0.5, 1])
+    (True, False)
+    """
+    if isinstance(values, np.ndarray) and values.dtype != object:
+        return values.dtype == bool
+    return any(isinstance(one, (bool, np.bool_)) for one in np.asarray(values, dtype=object).ravel().tolist())
 
 
 def vector(
@@ -130,6 +162,8 @@ def vector(
     found = np.atleast_1d(numbers(name, values, where, advice))
     right = found.ndim == 1 and found.size > 0 and bool(np.all(valid(found)))
     require(right, f"{name} {rule}", values, where, advice)
+    largest = float(np.abs(found).max())
+    require(largest <= LARGEST, f"{name} must be finite", largest, where, advice)
     return found
 
 

@@ -7,6 +7,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from fembeam.support.checks import require_switch
+
+WHERE = "a run or study"
 SIMULATED = "{percentage:3.0f}%|{bar}| {n:.4g}/{total:.4g} s simulated [{elapsed}<{remaining}]"
 
 
@@ -15,6 +18,7 @@ def bar(duration: float, wanted: bool) -> Iterator[Callable[[float], None]]:
     """A progress bar over simulated seconds; where signals that waited are handled."""
     from fembeam.support import interrupts
 
+    require_switch("progress", wanted, WHERE)
     if not wanted:
         yield lambda _: interrupts.check()
         return
@@ -27,8 +31,15 @@ def bar(duration: float, wanted: bool) -> Iterator[Callable[[float], None]]:
         yield report
 
 
+def titled(wanted: bool, title: str) -> str | None:
+    """The name of a bar that is shown elsewhere, None for no bar."""
+    require_switch("progress", wanted, WHERE)
+    return title if wanted else None
+
+
 def counting(wanted: bool, *items: Any, **options: Any) -> Any:
     """The bar of tqdm, with its arguments: of widgets in a notebook that has them, else of text."""
+    require_switch("progress", wanted, WHERE)
     if not wanted:
         from tqdm import tqdm
 
