@@ -70,6 +70,9 @@ if TYPE_CHECKING:
 # Python objects, what [reduce] says of the mesh, and what the folder of results has
 NOT_IN_A_FILE = "scene", "start", "solver", "executor", "elements", "checkpoint"
 MOST_SEEDS = 100_000
+MOST_POINTS = 100_000  # of an axis
+MOST_WORKERS = 1000  # processes
+MOST_PERIOD = 1000  # load periods of an orbit
 
 
 @dataclass(frozen=True)
@@ -89,10 +92,13 @@ class ModeStudy:
         asked = self.arguments
         if "counts" in asked:
             checked_counts(asked["counts"])
+            if is_whole(asked.get("reference")):
+                checked_counts([asked["reference"]], "reference")
         else:
             check_goal(asked["tolerance"], asked.get("most", MOST))
         runs = {name: asked[name] for name in ("duration", "dt", "discard") if name in asked}
         Plan(**runs, seeds=self.seeds).check(scene, named(asked["quantity"]))
+        _check_place(scene, getattr(named(asked["quantity"]), "z", None))
 
     def check_run(self, file: SceneFile, model: Model) -> None:
         """Raise ValueError for more modes than there are."""
@@ -201,9 +207,8 @@ class EnsembleTable:
     def __post_init__(self) -> None:
         require_positive("duration", self.duration, "ensemble", "give s")
         require_positive("dt", self.dt, "ensemble", "give the output sampling in s")
-        for name, least in (("realisations", 2), ("workers", 1)):
-            if getattr(self, name) < least:
-                raise ValueError(f"{name} must be at least {least}, got {getattr(self, name)}")
+        require(self.realisations >= 2, "realisations must be at least 2", self.realisations, "[ensemble]", "e.g. 20")
+        _check_workers(self.workers)
         if self.until is not None:
             require(0.0 < self.until < 1.0, "until must lie in (0, 1)", self.until, "[ensemble]", "e.g. 0.05")
         if self.discard is not None:
@@ -419,7 +424,13 @@ class BranchTable:
 
     def __post_init__(self) -> None:
         low, high = self.span
-        require(low < high, "span must be two values, ascending", self.span, "[branch]", "give [lowest, highest]")
+        require(
+            -np.inf < low < high < np.inf,
+            "span must be two values, ascending",
+            self.span,
+            "[branch]",
+            "give [lowest, highest]",
+        )
         within = self.at is None or low <= self.at <= high
         require(within, f"at must lie in the span of {low:g} to {high:g}", self.at, "[branch]", "or leave it out")
         require(0.0 < self.step <= 1.0, "step must lie in (0, 1]", self.step, "[branch]", "e.g. 0.04")
@@ -491,7 +502,7 @@ class FoundBranch(Result):
 
 def _check_period(period: int, where: str) -> None:
     """A whole number of load periods."""
-    require(period >= 1, "period must be at least 1", period, where, "2 is a 1/2 subharmonic")
+    require(1 <= period <= MOST_PERIOD, f"period must be 1 to {MOST_PERIOD}", period, where, "2 is a 1/2 subharmonic")
 
 
 @dataclass(frozen=True)
@@ -547,7 +558,8 @@ class CampbellTable:
     def __post_init__(self) -> None:
         low, high = self.spins
         require(low < high, "spins must be two values, ascending", self.spins, "[campbell]", "give [lowest, highest]")
-        require(self.points > 1, "points must be at least 2", self.points, "[campbell]", "e.g. 41")
+        require(1 < self.points <= MOST_POINTS, f"points must be 2 to {MOST_POINTS}", self.points, "[campbell]",
+                "e.g. 41")  # fmt: skip
         check_modes(self.modes)
 
     def check(self, scene: Scene) -> None:
@@ -591,8 +603,8 @@ class FloorSpectraTable:
         checked_oscillators(self.omega, self.periods)
         checked_damping(self.zeta)
         ends = self.periods or self.omega or ()
-        between = self.points is None or (self.points > 1 and len(ends) == 2)
-        require(between, "points must be at least 2, between two periods or frequencies", self.points, where,
+        between = self.points is None or (1 < self.points <= MOST_POINTS and len(ends) == 2)
+        require(between, f"points must be 2 to {MOST_POINTS}, between two periods or frequencies", self.points, where,
                 "write periods = [0.02, 1.0] and points = 50, or list all")  # fmt: skip
 
     def check(self, scene: Scene) -> None:
@@ -802,14 +814,22 @@ def _drawn(path: str, table: Mapping[str, Any]) -> Any:
 
 def _plan_of(table: VaryTable | MinimiseTable) -> dict[str, Any]:
     """The arguments of a table that say how points are run."""
-    require(table.workers >= 1, "workers must be at least 1", table.workers, "study", "e.g. 2")
+    _check_workers(table.workers)
     names = "duration", "dt", "discard", "solver"
     return {name: getattr(table, name) for name in names} | {"seeds": _seeds(table.seeds)}
 
 
 def _check_trials(table: VaryTable | MinimiseTable, scene: Scene, names: list[str], asked: Any, points: Any) -> None:
     """Raise ValueError unless the scene can be made and run at these points."""
-    Trial.of(scene, names, asked, Plan(**_plan_of(table)), {}).check(points)
+    trial = Trial.of(scene, names, asked, Plan(**_plan_of(table)), {})
+    trial.check(points)
+    for _, quantity in trial.asked.parts:
+        _check_place(scene, getattr(quantity, "z", None))
+
+
+def _check_workers(workers: int) -> None:
+    """Raise ValueError for a number of processes that no machine has."""
+    require(1 <= workers <= MOST_WORKERS, f"workers must be 1 to {MOST_WORKERS}", workers, "study", "e.g. 2")
 
 
 @contextmanager

@@ -30,6 +30,7 @@ from solvers.orbits import delayed
 from solvers.orbits import run as run_from
 
 Vector = NDArray[np.float64]
+MOST_POINTS = 100_000_000  # starts of a plane
 WHERE = "basins"
 NEAR = 1e-3
 FIRST = 25  # periods of the shortest runs
@@ -322,6 +323,8 @@ def checked_points(points: Any) -> tuple[int, int]:
     both = (points, points) if isinstance(points, (int, np.integer)) else tuple(np.ravel(points).tolist())
     whole = len(both) == 2 and all(is_finite(k) and k == int(k) and k >= 2 for k in both)
     require(whole, "points must be one or two whole numbers of at least 2", points, WHERE, "e.g. (100, 100)")
+    require(both[0] * both[1] <= MOST_POINTS, f"points must be at most {MOST_POINTS} in all", points, WHERE,
+            "e.g. (100, 100)")  # fmt: skip
     return int(both[0]), int(both[1])
 
 

@@ -247,7 +247,7 @@ def mode_count(
     if reference == "full":
         arguments.append({"modes": "all", "elements": scene.matrices(elements, max(chosen)).elements})
     elif reference is not None:
-        chosen = checked_counts([*chosen, reference])
+        chosen = sorted({*chosen, *checked_counts([reference], "reference")})
         arguments.append({"modes": reference, "residual": kinds[-1], **mesh})
     check_mode_count(scene, max(chosen), elements)
     arguments = [a for i, a in enumerate(arguments) if a not in arguments[:i]]
@@ -331,7 +331,7 @@ def observed_rate(rows: Sequence[Row]) -> float:
     return -float(np.polyfit(modes, errors, 1)[0])
 
 
-def checked_counts(counts: Iterable[int]) -> list[int]:
+def checked_counts(counts: Iterable[int], name: str = "counts") -> list[int]:
     """Checked counts, ascending, each once."""
     listed = hasattr(counts, "__iter__")
     require(listed, "counts must be a list of numbers of modes", counts, "study", "e.g. [1, 2, 3, 5, 10]")
@@ -339,5 +339,5 @@ def checked_counts(counts: Iterable[int]) -> list[int]:
     require(len(chosen) > 0, "counts must hold a number of modes", chosen, "study", "e.g. [1, 2, 3, 5, 10]")
     for count in chosen:
         whole = is_whole(count)
-        require(whole and count > 0, "counts must be whole numbers above 0", count, "study", "e.g. [1, 2, 3]")
+        require(whole and count > 0, f"{name} must be whole numbers above 0", count, "study", "e.g. [1, 2, 3]")
     return sorted({int(count) for count in chosen})
