@@ -123,6 +123,8 @@ def test_bad_input_is_one_line_and_exit_code_two(tmp_path, capsys):
     assert "needs a study, such as a table [simulate]" in refused(capsys, "run", no_study, *out)
     path = scene(tmp_path, ("std = 2.5e-4", "std = 1e300"))
     assert "std must be at most 1e+50 in size, got 1e+300" in refused(capsys, "run", path, *out, "--quiet")
+    said = refused(capsys, "draw", EXAMPLE, "--out", tmp_path / "none" / "rig.png")
+    assert f"fembeam: error: {tmp_path / 'none'}: no such folder to write rig.png to; make it first" in said
     (tmp_path / "file").write_text("")
     path = scene(tmp_path, duration="1e7")
     assert "is not writable" in refused(capsys, "run", path, "--out", tmp_path / "file")

@@ -45,7 +45,9 @@ def show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 
 def one_line(message: object) -> str:
-    """A message without line breaks."""
+    """A message without line breaks, of the system without its number."""
+    if isinstance(message, OSError) and message.filename is not None and message.strerror:
+        message = f"{message.filename}: {message.strerror}"
     return " ".join(str(message).split()) or type(message).__name__
 
 
