@@ -445,6 +445,15 @@ def test_rtol_out_of_range(rtol):
         Exponential(rtol)
 
 
+@pytest.mark.parametrize("make", [Exponential, DormandPrince])
+def test_a_tolerance_that_is_no_number_and_a_ledger_that_is_no_switch(make):
+    for bad in ("1e-8", None, True):
+        with pytest.raises(TypeError, match=f"rtol must be a number, got {bad!r}"):
+            make(rtol=bad)
+    with pytest.raises(ValueError, match="ledger must be True or False, got 'no'"):
+        Exponential(ledger="no")
+
+
 def test_buckled_structure_is_refused():
     system = System([[1.0]], [[0.0]], [[-4.0]])
     with pytest.raises(ValueError, match="positive semi-definite"):

@@ -61,6 +61,7 @@ from solvers.exponential.energy.flight_tables import ENERGY_TABLES, NO_ENERGY_TA
 from solvers.exponential.preparation import SCRATCH, TABLES, Prepared, prepare_run, shorten
 from solvers.exponential.safe_steps import fly
 from solvers.problem import Array, Forcing, Status, System
+from solvers.problem.matrices import number
 
 _problem, _planar_problem, _tables = unpacker(PROBLEM), unpacker(PLANAR_PROBLEM), unpacker(TABLES)
 _state, _scratch, _energy_tables = unpacker(STATE), unpacker(SCRATCH), unpacker(ENERGY_TABLES)
@@ -160,8 +161,10 @@ class Exponential:
     takes_friction: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        if not 1e-12 <= self.rtol <= 1e-2:
+        if not 1e-12 <= number(self.rtol, "rtol") <= 1e-2:
             raise ValueError(f"rtol must lie in [1e-12, 1e-2], got {self.rtol!r}")
+        if not isinstance(self.ledger, (bool, np.bool_)):
+            raise ValueError(f"ledger must be True or False, got {self.ledger!r}")
 
     def prepared(self, system: System, forcing: Forcing, duration: float) -> tuple[Forcing, Prepared]:
         """The forcing as it is run, and the tables: what all starts share."""

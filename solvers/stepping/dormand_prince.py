@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 from solvers.compiled.dop853_tableau import E3, E5, EXTENDED, STAGES, A, C, D
 from solvers.compiled.kernels import copy, inner, kernel, rhs
 from solvers.problem import Array, Forcing, System
+from solvers.problem.matrices import number
 from solvers.stepping.events import ATOL, LOCATED, RTOL
 
 
@@ -122,9 +123,9 @@ class DormandPrince:
     step: ClassVar[Any] = staticmethod(step)
 
     def __post_init__(self) -> None:
-        if not 1e-14 <= self.rtol <= 1e-2:
+        if not 1e-14 <= number(self.rtol, "rtol") <= 1e-2:
             raise ValueError(f"rtol must lie in [1e-14, 1e-2], got {self.rtol!r}")
-        if not 0.0 < self.atol < math.inf:
+        if not 0.0 < number(self.atol, "atol") < math.inf:
             raise ValueError(f"atol must be positive and finite, got {self.atol!r}")
 
     def prepared(self, system: System, forcing: Forcing, duration: float) -> tuple[Forcing, None]:
