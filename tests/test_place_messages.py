@@ -155,6 +155,14 @@ def test_a_switch_among_numbers_is_none_of_them(make):
         make()
 
 
+def test_arrays_without_a_row_are_no_list_and_numbers_no_parameter(straight):
+    with pytest.raises(TypeError, match=r"elements must be a list of Element, got array\(3\) in Scene"):
+        fb.Scene(BEAM, elements=np.array(3))
+    for bad in (None, 1.0, ["omega"]):
+        with pytest.raises(ValueError, match="a parameter must be called by its path, got"):
+            straight.branch(bad, (40.0, 60.0))
+
+
 @pytest.mark.parametrize(("name", "call"), [
     ("absolute", lambda run: run.displacement("N35", "z", absolute="no")),
     ("mean", lambda run: run.force(0, mean="no")),

@@ -88,6 +88,7 @@ def path_of(scene: Scene, name: str) -> str:
 
     A part may be called by its name: ``stops[valve].gap``.
     """
+    require(isinstance(name, str), "a parameter must be called by its path", name, "parameter", "e.g. 'omega'")
     known, path = scalars(scene), numbered(scene, name)
     if path in known:
         return path

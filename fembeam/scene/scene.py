@@ -7,10 +7,12 @@ it is made, before anything is computed: positions, signs, conflicts.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
 
 from fembeam.beams import Beam, ModalDamping, Rayleigh
 from fembeam.scene.annular_stop import AnnularStop, directed_stops
@@ -494,7 +496,7 @@ def _fall(gravity: Any, ways: list[str]) -> Any:
 def _listed(name: str, value: Any, kinds: tuple[type, ...]) -> tuple[Any, ...]:
     """The list as a tuple, each entry of one of the kinds."""
     names = " or ".join(kind.__name__ for kind in kinds)
-    if not isinstance(value, Iterable) or isinstance(value, (str, dict)):
+    if not np.iterable(value) or isinstance(value, (str, dict)):  # arrays (,) are an Iterable
         raise TypeError(f"{name} must be a list of {names}, got {value!r} in Scene; put it in brackets")
     entries = tuple(value)
     for index, entry in enumerate(entries):
