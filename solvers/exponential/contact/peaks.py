@@ -139,14 +139,17 @@ def motion_around(problem, tables, state, scratch, node_set, h, s, place):
     known[2 * S] = indentation(problem, s, state.x)
     known[2 * S + 1] = h * indentation_rate(problem, s, state.x)
     combine(tables.local_interpolation[node_set, place], known, 2 * S + 2, None, local_motion[DELTAS])
-    if surface_tolerance(problem, s, state.x) <= _HIDES_RATES * h * largest_size(motion[1]):
+    begin, end = tables.local_interval[node_set, place]
+    of_slopes = tables.time_exponent[node_set] > 1.0 and begin > 0.0  # of δ, see `nodes`
+    if not of_slopes or surface_tolerance(problem, s, state.x) <= _HIDES_RATES * h * largest_size(motion[1]):
         for i in range(S):
             local_motion[RATES, i] = local_motion[DELTAS, S + i] / h
         return
-    begin, end = tables.local_interval[node_set, place]
+    start = indentation_rate(problem, s, state.x)
+    shares = (load8(motion[1], 0) - splat8(start)) / load8(tables.nodes[node_set], 0)
     for i in range(S):
         sigma = begin + 0.5 * (LOCAL[i] + 1.0) * (end - begin)
-        local_motion[RATES, i] = polynomial(tables, node_set, load8(motion[1], 0), sigma)
+        local_motion[RATES, i] = start + sigma * polynomial(tables, node_set, shares, sigma)
 
 
 @merged
