@@ -37,9 +37,7 @@ def _kernels(pieces: Pieces, latched: int, count: int, reach: float) -> dict[str
     width = max(1, *(len(borders) for *_, borders in pieces))
     padded = [border for *_, borders in pieces for border in (*borders, *[None] * width)[:width]]
     force = _chosen([_read(scalar(f)) for f, *_ in pieces])
-    slopes = [
-        _written(scalar(s), several) if s else _written_slopes(scalar(f), several, count, least) for f, s, _ in pieces
-    ]
+    slopes = [_written(scalar(s), several) if s else _written_slopes(scalar(f), several, least) for f, s, _ in pieces]
     value = _chosen([_read(scalar(b[0])) if b else _nowhere() for b in padded])
     renewals = [_written(scalar(b[1]), latched) if b and b[1] else _kept(latched) for b in padded]
     renewal_slopes = _chosen([_jacobian(f, latched, several, count, least) for f in renewals])
@@ -158,12 +156,16 @@ def _jacobian(write: Function, rows: int, columns: int, count: int, least: tuple
 
 
 @lru_cache(maxsize=256)
-def _written_slopes(force: Function, columns: int, count: int, least: tuple[float, ...]) -> Function:
-    """Derivatives of a force by differences, written like given ones."""
-    jacobian = _jacobian(_written(force, 1), 1, columns, count, least)
+def _written_slopes(force: Function, columns: int, least: tuple[float, ...]) -> Function:
+    """Derivatives of a force by central differences, written like given ones."""
+    from numba.cpython.unsafe.tuple import tuple_setitem
 
     def slopes(out, given):  # type: ignore[no-untyped-def]
-        jacobian(out.reshape((1, columns)), given)
+        for c in range(columns):
+            x = given[c]
+            h = RELATIVE * abs(x) + least[min(c, 2)]
+            above, below = force(*tuple_setitem(given, c, x + h)), force(*tuple_setitem(given, c, x - h))
+            out[c] = (float(above) - float(below)) / (2.0 * h)
 
     return inner(slopes)
 
