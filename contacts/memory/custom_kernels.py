@@ -37,10 +37,10 @@ def _kernels(pieces: Pieces, latched: int, count: int, reach: float) -> dict[str
     width = max(1, *(len(borders) for *_, borders in pieces))
     padded = [border for *_, borders in pieces for border in (*borders, *[None] * width)[:width]]
     force = _chosen([_read(scalar(f)) for f, *_ in pieces])
-    slopes = [_written(scalar(s), several) if s else _written_slopes(scalar(f), several, least) for f, s, _ in pieces]
+    slopes = [_floats(scalar(s), several) if s else _slopes(scalar(f), several, least) for f, s, _ in pieces]
     value = _chosen([_read(scalar(b[0])) if b else _nowhere() for b in padded])
-    renewals = [_written(scalar(b[1]), latched) if b and b[1] else _kept(latched) for b in padded]
-    renewal_slopes = _chosen([_jacobian(f, latched, several, count, least) for f in renewals])
+    renewals = [_floats(scalar(b[1]), latched) if b and b[1] else _kept(latched) for b in padded]
+    renewal_slopes = [_jacobian(f, latched, several, least) for f in renewals]
     following = tuple(float(b[2]) if b else 0.0 for b in padded)
     forces, by_point, by_memory, borders = _points(force, _chosen(slopes), value, latched, width)
     return {
@@ -49,7 +49,7 @@ def _kernels(pieces: Pieces, latched: int, count: int, reach: float) -> dict[str
         "memory_gradient": (SIGNATURE, batch_of(by_memory, count)),
         "borders": (SIGNATURE, batch_of(borders, count)),
         "renew": (RENEW, _renew(_chosen(renewals), following, width, latched, count)),
-        "renew_gradient": (RENEW_GRADIENT, _renew_gradient(renewal_slopes, width, latched, count)),
+        "renew_gradient": (RENEW_GRADIENT, _renew_gradient(_chosen(renewal_slopes), width, latched, count)),
     }
 
 
@@ -64,11 +64,11 @@ def _chosen(functions: Sequence[Function]) -> Function:
 
     def either(k: int, function: Function, rest: Function | None) -> Function:
         if rest is None:
-            return inner(lambda s, given: function(*given))
+            return inner(lambda s, given: function(given))
 
         def pick(s, given):  # type: ignore[no-untyped-def]
             if s == k:
-                return function(*given)
+                return function(given)
             return rest(s, given)
 
         return inner(pick)
@@ -94,108 +94,102 @@ def _nowhere() -> Function:
 
 @lru_cache(maxsize=256)
 def _kept(latched: int) -> Function:
-    """A renewal that changes nothing but the segment."""
+    """A renewal that changes nothing but the segment; no number latched counts as one, as in `_floats`."""
+    from numba.cpython.unsafe.tuple import tuple_setitem
 
-    def keep(out, given):  # type: ignore[no-untyped-def]
+    start = (0.0,) * max(1, latched)
+
+    def keep(given):  # type: ignore[no-untyped-def]
+        out = start
         for i in range(latched):
-            out[i] = given[2 + i]
+            out = tuple_setitem(out, i, given[2 + i])
+        return out
 
     return inner(keep)
 
 
 @lru_cache(maxsize=256)
-def _written(function: Function, count: int) -> Function:
-    """A function that writes what another returns, one number or a tuple of several, of any types."""
+def _floats(function: Function, count: int) -> Function:
+    """A user's function of a tuple that returns one number or a tuple of several, of any types: they become floats."""
 
     def entry(i: int, rest: Function | None) -> Function:
-        def last(new, out):  # type: ignore[no-untyped-def]
-            out[i] = float(new[i])
+        def one(new):  # type: ignore[no-untyped-def]
+            return (float(new[i]),)
 
-        def write(new, out):  # type: ignore[no-untyped-def]
-            out[i] = float(new[i])
-            rest(new, out)
+        def more(new):  # type: ignore[no-untyped-def]
+            first = (float(new[i]),)
+            return first + rest(new)
 
-        return inner(last if rest is None else write)
+        return inner(one if rest is None else more)
 
-    if count == 1:
-
-        def one(out, given):  # type: ignore[no-untyped-def]
-            out[0] = float(function(*given))
-
-        return inner(one)
-    fill = None
-    for i in range(count - 1, -1, -1):
-        fill = entry(i, fill)
-
-    def several(out, given):  # type: ignore[no-untyped-def]
-        fill(function(*given), out)
-
-    return inner(several)
+    if count <= 1:
+        return inner(lambda given: (float(function(*given)),))
+    chain = entry(count - 1, None)
+    for i in range(count - 2, -1, -1):
+        chain = entry(i, chain)
+    return inner(lambda given: chain(function(*given)))
 
 
 @lru_cache(maxsize=256)
-def _jacobian(write: Function, rows: int, columns: int, count: int, least: tuple[float, ...]) -> Function:
-    """Derivatives of what `write` writes by its first arguments, (rows, columns), by central differences."""
-    from numba.np.unsafe.ndarray import to_fixed_tuple
-
-    size = count + 1  # δ, its rate and a row without its segment
-
-    def fill(table, given):  # type: ignore[no-untyped-def]
-        at, ends = np.array(given), np.empty((2, rows))
-        for c in range(columns):
-            x = at[c]
-            h = RELATIVE * abs(x) + least[min(c, 2)]
-            for side in range(2):
-                at[c] = x + (2 * side - 1) * h
-                write(ends[side], to_fixed_tuple(at, size))
-            at[c] = x
-            for i in range(rows):
-                table[i, c] = (ends[1, i] - ends[0, i]) / (2.0 * h)
-
-    return inner(fill)
-
-
-@lru_cache(maxsize=256)
-def _written_slopes(force: Function, columns: int, least: tuple[float, ...]) -> Function:
-    """Derivatives of a force by central differences, written like given ones."""
+def _slopes(force: Function, columns: int, least: tuple[float, ...]) -> Function:
+    """Derivatives of a force by its first arguments by central differences; without arrays, which are counted."""
     from numba.cpython.unsafe.tuple import tuple_setitem
 
-    def slopes(out, given):  # type: ignore[no-untyped-def]
+    start = (0.0,) * columns
+
+    def slopes(given):  # type: ignore[no-untyped-def]
+        out = start
         for c in range(columns):
             x = given[c]
             h = RELATIVE * abs(x) + least[min(c, 2)]
             above, below = force(*tuple_setitem(given, c, x + h)), force(*tuple_setitem(given, c, x - h))
-            out[c] = (float(above) - float(below)) / (2.0 * h)
+            out = tuple_setitem(out, c, (float(above) - float(below)) / (2.0 * h))
+        return out
 
     return inner(slopes)
 
 
+@lru_cache(maxsize=256)
+def _jacobian(function: Function, rows: int, columns: int, least: tuple[float, ...]) -> Function:
+    """Writes derivatives of what a function of a tuple returns by its first entries, by central differences."""
+    from numba.cpython.unsafe.tuple import tuple_setitem
+
+    def fill(to):  # type: ignore[no-untyped-def]
+        table, given = to
+        for c in range(columns):
+            x = given[c]
+            h = RELATIVE * abs(x) + least[min(c, 2)]
+            above, below = function(tuple_setitem(given, c, x + h)), function(tuple_setitem(given, c, x - h))
+            for i in range(rows):
+                table[i, c] = (above[i] - below[i]) / (2.0 * h)
+
+    return inner(fill)
+
+
 def _points(force: Function, slopes: Function, value: Function, latched: int, width: int) -> tuple[Function, ...]:
     """Force, its derivatives by the motion and by the latched numbers, and borders, at n points."""
-    room, given = 2 + latched, inner(_given)
+    given = inner(_given)
 
     def forces(n, delta, delta_dot, entry_rate, row, out):  # type: ignore[no-untyped-def]
         for i in range(n):
-            out[i] = force(row[0], (given(delta[i], delta_dot[i], row),))
+            out[i] = force(row[0], given(delta[i], delta_dot[i], row))
 
     def by_point(n, delta, delta_dot, entry_rate, row, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
-        out = np.empty(room)
         for i in range(n):
-            slopes(row[0], (out, given(delta[i], delta_dot[i], row)))
-            by_delta[i], by_rate[i], by_entry[i] = out[0], out[1], 0.0
+            found = slopes(row[0], given(delta[i], delta_dot[i], row))
+            by_delta[i], by_rate[i], by_entry[i] = found[0], found[1], 0.0
 
     def by_memory(n, delta, delta_dot, entry_rate, row, rows):  # type: ignore[no-untyped-def]
-        out = np.empty(room)
         for i in range(n):
-            slopes(row[0], (out, given(delta[i], delta_dot[i], row)))
+            found = slopes(row[0], given(delta[i], delta_dot[i], row))
             rows[i] = 0.0
             for k in range(latched):
-                rows[(1 + k) * n + i] = out[2 + k]
+                rows[(1 + k) * n + i] = found[2 + k]
 
     def borders(n, delta, delta_dot, entry_rate, row, values):  # type: ignore[no-untyped-def]
         for j in range(width):
             for i in range(n):
-                values[j * n + i] = value(row[0] * width + j, (given(delta[i], delta_dot[i], row),))
+                values[j * n + i] = value(row[0] * width + j, given(delta[i], delta_dot[i], row))
 
     return tuple(inner(f) for f in (forces, by_point, by_memory, borders))
 
@@ -205,15 +199,15 @@ def _renew(renewal: Function, following: tuple[float, ...], width: int, latched:
     from numba import carray
     from numba.np.unsafe.ndarray import to_fixed_tuple
 
-    given = inner(_given)
+    given, unknown = inner(_given), (math.nan,) * max(1, latched)
 
     def renew(j, delta, delta_dot, entry_rate, parameters):  # type: ignore[no-untyped-def]
-        row, out = to_fixed_tuple(carray(parameters, (count,)), count), np.full(latched, math.nan)
+        row, out = to_fixed_tuple(carray(parameters, (count,)), count), unknown
         place = int(row[0]) * width + j
         try:
-            renewal(place, (out, given(delta, delta_dot, row)))
+            out = renewal(place, given(delta, delta_dot, row))
         except Exception:
-            out[:] = math.nan
+            out = unknown
         for k in range(latched):
             parameters[1 + k] = out[k]
         parameters[0] = following[place]
