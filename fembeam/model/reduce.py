@@ -83,7 +83,9 @@ def reduced(
 
 
 def signed_like(model: Model, near: Model) -> Model:
-    """The same model with the signs of shapes that one near it has."""
+    """The same model with the signs of shapes that one near it has; as it is where that has another number of them."""
+    if len(model.omega) != len(near.omega):
+        return model
     own, other = _motions(model, near)
     signs = np.where(np.sum(own * other, axis=0) < 0.0, -1.0, 1.0)
     if np.all(signs > 0.0):
@@ -95,6 +97,8 @@ def signed_like(model: Model, near: Model) -> Model:
 
 def likeness(model: Model, near: Model) -> float:
     """Least |cos| of the angles between the shapes of two models: 1 where all are the same but for signs."""
+    if len(model.omega) != len(near.omega):  # which is refused where their states are compared
+        return 1.0
     own, other = _motions(model, near)
     sizes = np.linalg.norm(own, axis=0) * np.linalg.norm(other, axis=0)
     moving = sizes > 0.0  # those of impactors do not
