@@ -42,7 +42,7 @@ from solvers.problem.run_arguments import (
     latched_at_start,
     output_times,
 )
-from solvers.problem.signals import sampled_values
+from solvers.problem.signals import sampled_values, sampling_tolerance
 from solvers.problem.whole_runs import must_be_whole, whole_runs
 
 _SAMPLES = 64  # of a run that is made again for its balance
@@ -212,7 +212,7 @@ def prepared_once(system: System, method: Any, duration: float) -> tuple[Forcing
         check_maps(system, method)
         check_laws(system)
         fixed = all(_is_fixed(signal) for _, signal in system.loads)
-        forcing = _forcing(system, duration, min(max(method.rtol, 1e-12), 1e-6), fixed)
+        forcing = _forcing(system, duration, sampling_tolerance(method.rtol), fixed)
         known = method.prepared(system, forcing, duration)
         if fixed and forcing.table.nbytes <= _MOST_KEPT:
             system.kept.store(key, known)

@@ -475,6 +475,13 @@ def test_several_resonant_tones_of_one_load():
     np.testing.assert_allclose(ours.q, theirs.q, atol=1e-9 * np.abs(theirs.q).max())
 
 
+def test_a_resonant_tone_is_as_exact_as_other_sampled_loads_whatever_the_tolerance():
+    """q'' + ω² q = cos ωt from rest: q = t sin ωt/(2ω)."""
+    system = System.modal([2.0], [0.0], loads=[([1.0], fb.Harmonic(1.0, 2.0))])
+    found = integrate(system, [0.0], [0.0], 100.0, 0.1, Exponential(rtol=1e-2))
+    np.testing.assert_allclose(found.q[:, 0], 0.25 * found.t * np.sin(2.0 * found.t), atol=1e-6 * 25.0)
+
+
 def test_a_resonant_tone_is_sampled_once_for_all_starts():
     system = free_mass(Hertz(1e5), gap=0.01, loads=[([-1.0], fb.Harmonic(1.0, 1e-3))])
     forcing, _ = prepared_once(system, Exponential(), 0.4)

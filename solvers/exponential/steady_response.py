@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from solvers.problem import Array, Forcing, System, tones_as_nodes
+from solvers.problem.signals import sampling_tolerance
 
 
 def without_resonance(system: System, forcing: Forcing, duration: float, rtol: float) -> Forcing:
-    """The forcing with tones near resonance replaced by samples.
+    """The forcing with tones near resonance replaced by samples, as exact as other sampled signals.
 
     A tone is replaced if it is at the frequency of a hardly damped block, or if its steady response l/|k - Ω² + iΩc| is
     a thousand times the motion it can cause within the duration, l duration²/2: the difference would lose its digits.
@@ -20,7 +21,7 @@ def without_resonance(system: System, forcing: Forcing, duration: float, rtol: f
     tones = zip(forcing.tone_omega, forcing.tone_load, strict=True)
     found = system.kept.get(key, lambda: [_distance(system, omega, load) for omega, load in tones])
     resonant = [i for i, (absolute, relative) in enumerate(found) if relative <= 1e-6 or absolute * duration**2 < 2e-3]
-    return tones_as_nodes(forcing, resonant, duration, rtol) if resonant else forcing
+    return tones_as_nodes(forcing, resonant, duration, sampling_tolerance(rtol)) if resonant else forcing
 
 
 def _distance(system: System, omega: float, load: int) -> tuple[float, float]:

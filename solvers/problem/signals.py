@@ -55,6 +55,11 @@ class Forcing:
         return sum(int(array.nbytes) for array in vars(self).values())
 
 
+def sampling_tolerance(rtol: float) -> float:
+    """Tolerance to which a method of some ``rtol`` takes signals that are sampled: at most 1e-6, at least 1e-12."""
+    return min(max(rtol, 1e-12), 1e-6)
+
+
 def forcing_of(signals: list[Signal], duration: float, rtol: float) -> Forcing:
     """Arrays of all signals on [0, duration]."""
     tones: list[tuple] = []

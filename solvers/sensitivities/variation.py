@@ -18,6 +18,7 @@ from solvers.problem import Array, ContactLog, Solution, SolverError, Status, Sy
 from solvers.problem import event_list as at
 from solvers.problem.friction import tell_sliders
 from solvers.problem.matrices import number
+from solvers.problem.signals import sampling_tolerance
 from solvers.problem.whole_runs import whole_runs
 from solvers.sensitivities.elements import motion_of
 from solvers.sensitivities.events import GRAZING, NoDerivativeError, called, cross, knot_shift
@@ -229,7 +230,7 @@ class _Request:
     @cached_property
     def sampled(self) -> SampledLoads:
         """Loads that are no tones, as the run takes them."""
-        return SampledLoads(self.system, self.duration, min(max(self.method.rtol, 1e-12), 1e-6))
+        return SampledLoads(self.system, self.duration, sampling_tolerance(self.method.rtol))
 
     def replayed(self, times: Array) -> tuple[Solution, Array]:
         """The run, sampled at times, with its list of events (k, 14), a row an event."""
