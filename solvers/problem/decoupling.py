@@ -135,16 +135,11 @@ def _state_blocks(phi: Array, k: Array, damping: Array, turning: Array, size: Ar
     if turns:  # of rigid-body modes: two zeros are one mode that drifts, and not to be told apart
         values[np.abs(values) <= 10 * values.size * np.finfo(float).eps * scale] = 0.0
     complex_ones = np.flatnonzero(values.imag > 1e-12 * scale)
-    real_ones = np.flatnonzero(np.abs(values.imag) <= 1e-12 * scale)
-    half = real_ones.size // 2
     pairs = [_complex_pair(values[i], vectors[:, i], n) for i in complex_ones]
     if turns:
         shares = [_dissipation(vectors[:, i], k, damping) for i in complex_ones]
         pairs = [(pair[0], share, *pair[2:]) for pair, share in zip(pairs, shares, strict=True)]
-    pairs += [
-        _real_pair(values[i].real, values[j].real, vectors[:, i].real, vectors[:, j].real)
-        for i, j in zip(real_ones[:half], real_ones[half:], strict=True)
-    ]
+    pairs += _real_pairs(values.real, vectors.real, np.flatnonzero(np.abs(values.imag) <= 1e-12 * scale))
     columns = np.array([p[2] for p in pairs] + [p[3] for p in pairs]).T
     if len(pairs) != n or np.linalg.cond(columns) > 1e12:
         raise ValueError(_INSEPARABLE_TURNING if turns else _INSEPARABLE)
@@ -152,12 +147,30 @@ def _state_blocks(phi: Array, k: Array, damping: Array, turning: Array, size: Ar
     loss = np.zeros((2 * (free + n), 2 * (free + n)))
     places = np.concatenate((free + np.arange(n), 2 * free + n + np.arange(n)))
     loss[np.ix_(places, places)] = columns[n:].T @ damping @ columns[n:]
-    sizes = np.block([[np.zeros((n, n)), np.eye(n)], [np.diag(np.abs(k)), _terms(phi, size)]])
-    errors = np.sum(np.abs(np.linalg.inv(vectors)) @ sizes * np.abs(vectors).T, axis=1)  # of λ, in units of eps
-    terms = np.concatenate((np.zeros(free), errors[complex_ones], np.zeros(half)))
+    terms = np.zeros(free + n)
+    terms[free : free + complex_ones.size] = _errors_of_values(k, vectors, _terms(phi, size))[complex_ones]
     none = [0.0] * free
     c = _without_rounding(np.array(none + [p[1] for p in pairs]), terms)
     return Blocks(np.array(none + [p[0] for p in pairs]), c, T, np.linalg.inv(T), loss)
+
+
+def _real_pairs(values: Array, vectors: Array, real_ones: Any) -> list[tuple[float, float, Array, Array]]:
+    """`_real_pair` of each of the slower half of the real eigenvalues with one of the other half."""
+    half = real_ones.size // 2
+    return [
+        _real_pair(values[i], values[j], vectors[:, i], vectors[:, j])
+        for i, j in zip(real_ones[:half], real_ones[half:], strict=True)
+    ]
+
+
+def _errors_of_values(k: Array, vectors: Any, terms: Array) -> Array:
+    """Bounds of the errors of the eigenvalues of the state matrix, in units of the machine precision.
+
+    They are sums of the sizes of all terms; ``terms`` (n, n) are those of damping and turning.
+    """
+    n = k.size
+    sizes = np.block([[np.zeros((n, n)), np.eye(n)], [np.diag(np.abs(k)), terms]])
+    return np.sum(np.abs(np.linalg.inv(vectors)) @ sizes * np.abs(vectors).T, axis=1)
 
 
 def _states_of_blocks(rigid: Array, phi: Array, columns: Array) -> Array:

@@ -178,24 +178,32 @@ class Contact:
         object.__setattr__(self, "centre", tuple(centre.tolist()))
 
     def _check_friction(self, direction: Array) -> None:
-        """Friction has what it needs, and nothing is given for it where there is none."""
-        size = direction.shape[-1]
+        """Friction has what it needs, and nothing is given for it where there is none; it becomes a part of the law."""
         if self.friction is None and self.map == "oblique":
             raise ValueError('map="oblique" is that of friction: give friction=Friction(mu, stiffness)')
-        wanted = {"tangent": "oblique", "rotation": "annulus", "radius": "annulus", "spin": "annulus"}
-        for name, of in wanted.items():
-            given: Any = getattr(self, name)
-            if given is None or (name == "spin" and given == 0.0):
-                continue
-            if self.map != of or self.friction is None:
-                raise ValueError(f'{name} of a Contact belongs to map="{of}" with friction, got {given!r}')
-            if name in ("tangent", "rotation"):
-                object.__setattr__(self, name, row_of(name, given, size))
-            elif not math.isfinite(given) or (name == "radius" and given <= 0.0):
-                least = "positive and finite (m)" if name == "radius" else "finite (rad/s)"
-                raise ValueError(f"{name} of a Contact must be {least}, got {given!r}")
+        for name, of in {"tangent": "oblique", "rotation": "annulus", "radius": "annulus", "spin": "annulus"}.items():
+            self._check_way_of_friction(name, of, direction.shape[-1])
         if self.friction is None:
             return
+        self._check_tangent_and_law(direction)
+        arm = 0.0 if self.radius is None else -self.radius if self.outer else self.radius
+        object.__setattr__(self, "law", Rubbing(self.law, self.friction, float(arm), float(self.spin)))
+
+    def _check_way_of_friction(self, name: str, of: str, size: int) -> None:
+        """One of the numbers that say along which way friction acts belongs to the map ``of``; rows become arrays."""
+        given: Any = getattr(self, name)
+        if given is None or (name == "spin" and given == 0.0):
+            return
+        if self.map != of or self.friction is None:
+            raise ValueError(f'{name} of a Contact belongs to map="{of}" with friction, got {given!r}')
+        if name in ("tangent", "rotation"):
+            object.__setattr__(self, name, row_of(name, given, size))
+        elif not math.isfinite(given) or (name == "radius" and given <= 0.0):
+            least = "positive and finite (m)" if name == "radius" else "finite (rad/s)"
+            raise ValueError(f"{name} of a Contact must be {least}, got {given!r}")
+
+    def _check_tangent_and_law(self, direction: Array) -> None:
+        """A contact with friction has a map with a way to rub along, and a law without memory."""
         if not isinstance(self.friction, Friction):
             raise TypeError(f"friction of a Contact must be a Friction(mu, stiffness), got {self.friction!r}")
         if self.map == "line":
@@ -208,8 +216,6 @@ class Contact:
             raise ValueError(f"friction takes laws without memory that act for delta > 0, got {self.law!r}")
         if self.radius is None and (self.rotation is not None or self.spin != 0.0):
             raise ValueError("radius (m) of a Contact is missing: rotation and spin rub at a radius")
-        arm = 0.0 if self.radius is None else -self.radius if self.outer else self.radius
-        object.__setattr__(self, "law", Rubbing(self.law, self.friction, float(arm), float(self.spin)))
 
     @property
     def memory(self) -> list[int]:
