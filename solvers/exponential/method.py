@@ -11,7 +11,7 @@ Limitations
   polynomials through 8 nodes per step: of 16 000 contacts 1e-4 to 1e-1 of the amplitude deep none was missed
   (`python tests/bench/second_contacts.py 100`), but this is not proven.
 * A contact begins where δ becomes positive; δ = 0 alone is no contact. An entry with δ̇ = 0 counts if δ̈ > 0; where
-  the force of another stop causes such an entry, it is found one shortest step (1e-9 s) late.
+  the force of another stop causes such an entry, it is found one shortest step (at most 1e-9 s) late.
 * A law with a kink elsewhere than at its declared knots and its `bend` is integrated with smaller steps, at lower
   order; so is the start of a contact whose law has powers of δ that are no multiples of 1/4. The tolerance is kept.
 * K must be positive semi-definite (no buckled modes), and no damped mode may grow (C may be indefinite; a contact law

@@ -142,9 +142,9 @@ def _set_accuracy(problem, tables, state, scratch, h):
 
 @inlined
 def _is_last(change, before):
-    """Whether the changes still to come add up to less than the tolerance, 1.
+    """Whether the changes of the forces still to come add up to less than the tolerance, 1.
 
-    With r the ratio of the last two changes, within [1/20, 0.9], the sum is change r/(1 - r).
+    They are a geometric series with the sum change r/(1 - r), r = change/before, taken as 0.9 where it is larger.
     """
     return change * change <= max(before - change, change / 9.0)
 
@@ -174,9 +174,10 @@ def solve_forces(problem, tables, state, scratch, node_set, level):
             break
         if iteration == 0:
             before = change / 0.09  # a usual ratio of two changes, 0.3, squared
+        # squares; a change above 20 tolerances is not the last one, as if no ratio r were below 1/21
         if change <= 1e-27 * largest or (change <= 400.0 and _is_last(math.sqrt(change), math.sqrt(before))):
             return True
-        if iteration > 2 and change > 0.36 * before:
+        if iteration > 2 and change > 0.36 * before:  # r > 0.6
             break
         before = change
     for r in range(problem.gap.size):

@@ -715,7 +715,8 @@ def _rounding_there(problem, tables, state, scratch, search, stop, slope):
 def _locate(problem, tables, state, scratch, stop, border, search):
     """Locate a zero of the event function by the secant rule, safeguarded by a bracket; returns a `Zero`.
 
-    Trials that differ little are short steps from the last one.
+    Trials that differ little are short steps from the last one. ``promised`` tells that the slope is that of the
+    polynomial of a step, which the first trial tests; ``slope_there`` is the slope of the `Zero`.
     """
     largest, slope, sign, length = search.largest, search.slope, search.sign, search.first
     x, begin, end = scratch.stages[LANDED], scratch.margin_begin[stop], scratch.margin_end[stop]
@@ -731,7 +732,7 @@ def _locate(problem, tables, state, scratch, stop, border, search):
         take_step(problem, tables, state, scratch, search.variable, stop, search.forward * last_length)
         last_value, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
     low, high = last_length if last_value > 0.0 else 0.0, search.longest
-    promised, known, rounding = slope != 0.0, slope, 0.0
+    promised, slope_there, rounding = slope != 0.0, slope, 0.0
     for _ in range(_MOST_BORDER_TRIALS):
         is_near = _try_length(problem, tables, state, scratch, search, stop, length, last_length)
         value, sign = _event_function(problem, tables, state, scratch, stop, border, x, sign, end)
@@ -741,12 +742,12 @@ def _locate(problem, tables, state, scratch, stop, border, search):
             promised = False  # the step was too long for its polynomial
         if not promised:
             slope = (value - last_value) / (length - last_length)
-            known = slope if is_near else 0.0
+            slope_there = slope if is_near else 0.0
         promised, rounding = False, _rounding_there(problem, tables, state, scratch, search, stop, slope)
         following = length - value / slope
         stagnates = abs(following - length) <= 1e-15 * length and border >= 0
         if stagnates or abs(value) <= search.tolerance or 0.5 * abs(last_value) <= abs(value) <= rounding:
-            return Zero(length, value, rounding, known)
+            return Zero(length, value, rounding, slope_there)
         low, high = (length, high) if value > 0.0 else (low, length)
         if (high < search.longest or search.forward < 0.0) and not low < following < high:
             following = _bisect(low, high)
@@ -756,7 +757,7 @@ def _locate(problem, tables, state, scratch, stop, border, search):
             break
         last_length, last_value, length = length, value, following
     else:
-        return Zero(last_length, last_value, rounding, known)
+        return Zero(last_length, last_value, rounding, slope_there)
     return Zero(length, np.nan, rounding, 0.0)
 
 

@@ -198,9 +198,12 @@ def _predict(problem, tables, state, scratch, level):
 
 
 class Attempt(NamedTuple):
-    """What one contact step tried has shown."""
+    """What one contact step tried has shown.
 
-    error: float  # in units of the tolerance; inf if the forces are not found, or the step crosses a bend or border
+    A step with an error above 1 is not taken: a shorter one is tried, or a landing on the border it crosses.
+    """
+
+    error: float  # in units of the tolerance; inf if the forces are not found, or a bend or border is crossed
     time: float  # s, after the start of the step, of the first bend or border crossed; inf if there is none
     element: int  # whose bend or border it is; -1 if there is none
     border: int  # its number; -1 of a bend
@@ -209,9 +212,10 @@ class Attempt(NamedTuple):
 
 @merged
 def _attempt(problem, tables, state, scratch, node_set, level):
-    """Attempt one contact step.
+    """Attempt one contact step from the present state, which stays; the end goes to ``scratch.x_new``.
 
-    One on the shortest level counts as within the tolerance if its forces are found: what is at rest has none.
+    On the shortest level the error is cut to 1, as no step is shorter, where the forces are found and it is told what
+    the step crosses.
     """
     shortest = level == tables.contact_step.size - 1
     time, element, border, slope = np.inf, -1, -1, 0.0
