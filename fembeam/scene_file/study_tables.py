@@ -309,16 +309,20 @@ def check_named(body: Any, places: Sequence[Any] | None, quantities: Sequence[st
     require(not sections or bool(own), "section forces need places", sections, "simulate",
             'write places = [["A-B", 0.4]], a member and a distance in m')  # fmt: skip
     for at in own if sections else ():
-        number, place = body.located(at, "places") if hasattr(body, "located") else (0, at)
-        one = body.bodies[number] if hasattr(body, "bodies") else body
-        site = one.site(place, "places") if hasattr(one, "site") else None
-        require(isinstance(site, tuple), "section forces must be asked for on a member of a frame", at, "places",
-                'write ["A-B", 0.4], a member and a distance in m')  # fmt: skip
-        assert site is not None
-        known = "stress" not in sections or one.members[site[0]].section.fibre is not None
-        require(
-            known, "stress needs the outer fibre of sections", at, "places", "give fibre in m, or a shape that knows it"
-        )
+        _check_section(body, at, "stress" in sections)
+
+
+def _check_section(body: Any, at: Any, stress: bool) -> None:
+    """Raise ValueError for a place that has no section forces, or with ``stress`` none of these."""
+    number, place = body.located(at, "places") if hasattr(body, "located") else (0, at)
+    one = body.bodies[number] if hasattr(body, "bodies") else body
+    site = one.site(place, "places") if hasattr(one, "site") else None
+    require(isinstance(site, tuple), "section forces must be asked for on a member of a frame", at, "places",
+            'write ["A-B", 0.4], a member and a distance in m')  # fmt: skip
+    assert site is not None
+    known = not stress or one.members[site[0]].section.fibre is not None
+    require(known, "stress needs the outer fibre of sections", at, "places",
+            "give fibre in m, or a shape that knows it")  # fmt: skip
 
 
 def _check_places(scene: Scene, places: list[Any], name: str) -> None:

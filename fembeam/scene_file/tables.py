@@ -127,21 +127,9 @@ class TableReader:
                 return value
             self.fail("the file", f"gravity must be a number, or three, got {shown(value)}")
         if name == "damping":
-            if "zeta" in value and {"alpha", "beta"} & set(value):
-                self.fail("[damping]", "give either zeta, or alpha and beta, not both")
-            if {"alpha", "beta"} & set(value):
-                return self.build(Rayleigh, value, "[damping]")
-            return self.build(ModalDamping, value, "[damping]", "alpha", "beta")
+            return self.damping(value)
         if name == "base":
-            if self.named and not value:
-                self.fail("[base]", "must have a table for each direction, such as [base.y]")
-            ways = [key for key, one in value.items() if isinstance(one, dict) or key in COMPONENTS]
-            if not self.named and "kind" not in value and ways:
-                self.fail(f"[base.{ways[0]}]", "the base of a beam moves along y alone: write [base] with kind = … and "
-                          "the keys of that signal; tables for each direction are for frames")  # fmt: skip
-            if self.named and len(ways) == len(value):
-                return {direction: self.chosen(SIGNAL, one, f"[base.{direction}]") for direction, one in value.items()}
-            return self.chosen(SIGNAL, value, "[base]")
+            return self.base(value)
         kinds: Constructors = {kind_name(kind.__name__): MAKERS.get(kind, kind) for kind in FEATURES[name]}
         if not self.named:  # a straight beam has Clamped, Pinned and Guided
             kinds = {key: kind for key, kind in kinds.items() if kind not in MAKERS.values()}
@@ -152,6 +140,26 @@ class TableReader:
             usual = next((kind for kind in kinds if kind in USUAL), "")
             made.append(self.build(only, table, where) if only else self.choose(kinds, table, where, default=usual))
         return made
+
+    def damping(self, table: Table) -> Any:
+        """Ratios of the modes, or Rayleigh's two numbers."""
+        if "zeta" in table and {"alpha", "beta"} & set(table):
+            self.fail("[damping]", "give either zeta, or alpha and beta, not both")
+        if {"alpha", "beta"} & set(table):
+            return self.build(Rayleigh, table, "[damping]")
+        return self.build(ModalDamping, table, "[damping]", "alpha", "beta")
+
+    def base(self, table: Table) -> Any:
+        """The motion of the frame: a signal; of bodies with named places also one for each direction."""
+        if self.named and not table:
+            self.fail("[base]", "must have a table for each direction, such as [base.y]")
+        ways = [key for key, one in table.items() if isinstance(one, dict) or key in COMPONENTS]
+        if not self.named and "kind" not in table and ways:
+            self.fail(f"[base.{ways[0]}]", "the base of a beam moves along y alone: write [base] with kind = … and "
+                      "the keys of that signal; tables for each direction are for frames")  # fmt: skip
+        if self.named and len(ways) == len(table):
+            return {direction: self.chosen(SIGNAL, one, f"[base.{direction}]") for direction, one in table.items()}
+        return self.chosen(SIGNAL, table, "[base]")
 
     def beam(self, table: Table) -> Beam:
         """A beam of one section, of `spans`, or of a `mesh`."""
