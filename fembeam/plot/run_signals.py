@@ -90,7 +90,10 @@ def samples_in(run: Run, window: tuple[float, float] | None, where: str, advice:
     """Numbers of the samples in a window (s), all without one; ValueError below two."""
     pair = window is None or (isinstance(window, (tuple, list)) and len(window) == 2 and all(map(is_finite, window)))
     require(pair, "the window must be two numbers", window, where, "give (from, to) in s")
-    lo, hi = window or (float(run.t[0]), float(run.t[-1]))
+    first, last = float(run.t[0]), float(run.t[-1])
+    lo, hi = window or (first, last)
+    if not (lo < last and hi > first):
+        advice = f"samples lie from {first:g} to {last:g} s"
     inside = np.flatnonzero((run.t >= lo) & (run.t <= hi))
     require(len(inside) >= 2, "the window must hold at least 2 samples", (lo, hi), where, advice)
     return inside

@@ -89,7 +89,7 @@ class Reaction:
 
     def _history(self, quantity: str) -> Vector:
         """What `extremes` are those of, (k,)."""
-        require(quantity in ("force", "moment"), "quantity must be 'force' or 'moment'", quantity, "Reaction.extremes",
+        require(quantity in ("force", "moment"), "quantity must be 'force' or 'moment'", quantity, "Reaction",
                 "choose one")  # fmt: skip
         return np.asarray(getattr(self, quantity))
 
