@@ -69,6 +69,16 @@ def test_stops_whose_law_opens_have_no_angles(law):
     assert not {"angle_in", "angle_out"} & set(log.named_arrays())
 
 
+def test_a_contact_over_the_end_of_a_period_has_the_angles_of_its_begin_and_of_its_end():
+    """It is cut there into a part that has not ended and a rest that begins at t = 0."""
+    rest = [0.0, 0.0, 0.1, 0.3, 0.5, 2.0, 7.0, 0.4, 0.2, 0.0, 1.5, 1.8]
+    part = [0.0, 0.8, np.nan, 0.9, np.nan, 1.0, 3.0, 0.6, -0.1, 0.0, 1.2, 1.5]
+    whole = [0.0, 0.8, 1.1, 0.9, 0.5, 2.0, 7.0, 1.0, 0.1, 0.0, 1.2, 1.8]
+    log = solvers.ContactLog.of_period([solvers.ContactLog.of_rows(np.array([rest, part]))], [0.0], period=1.0)
+    np.testing.assert_allclose(np.array([*log.arrays().values()], dtype=float)[:, 0], whole)
+    assert len(log) == 1
+
+
 def test_by_name_place_and_direction():
     two = fb.Scene(NAMED, [fb.Clamped("root")], stops=[fb.Stop("tip", LAW, direction="-y"),
                                                       fb.Stop(4, LAW, direction="y")],

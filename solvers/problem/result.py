@@ -214,7 +214,7 @@ def _make_whole(row: Array, rest: Array, later: float) -> None:
     row[2], row[4] = later + rest[2], rest[4]
     row[5:7] = np.maximum(row[5:7], rest[5:7])
     row[7:9] += rest[7:9]
-    row[10] = rest[10]
+    row[11] = rest[11]
 
 
 @dataclass(frozen=True, eq=False)
