@@ -91,6 +91,17 @@ def test_of_a_settled_friction_damper():
     np.testing.assert_allclose(gradient(trial, x), differences(trial, x), rtol=5e-3)
 
 
+def test_of_the_energy_of_modes_that_turn_among_themselves():
+    """Those of the two planes of a round rod, by a spring across neither."""
+    bar = fb.Frame.straight(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01), bending_only=True)
+    oblique = fb.Spring("B", 20.0, direction=(0.6, 0.8, 0.0))
+    scene = fb.Scene(bar, [fb.Clamped("A")], springs=[oblique], damping=fb.ModalDamping(0.05),
+                     forces=[fb.PointForce("B", fb.Harmonic(3.0, 150.0), direction="x")])  # fmt: skip
+    trial, x = trial_of(scene, ("springs[0].stiffness",), ("energy",), TRANSIENT)
+    by_differences = jacobian(lambda x: np.mean(trial(x), axis=0), x, 0.1 * x)
+    np.testing.assert_allclose(gradient(trial, x), by_differences, rtol=1e-5)
+
+
 def test_of_a_settled_oscillator_in_closed_form():
     """Rms of u at the tip: F φ²/(√2 |ω₀² - ω² + 2iζω₀ω|), by ω, of which the period is a part, and by F."""
     scene = rod(forces=[fb.PointForce(0.5, fb.Harmonic(3.0, 150.0))], damping=fb.ModalDamping([0.1]))

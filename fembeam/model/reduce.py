@@ -86,7 +86,7 @@ def signed_like(model: Model, near: Model) -> Model:
     """The same model with the signs of shapes that one near it has; as it is where that has another number of them."""
     if len(model.omega) != len(near.omega):
         return model
-    own, other = _motions(model, near)
+    own, other = motions(model, near)
     signs = np.where(np.sum(own * other, axis=0) < 0.0, -1.0, 1.0)
     if np.all(signs > 0.0):
         return model
@@ -99,13 +99,13 @@ def likeness(model: Model, near: Model) -> float:
     """Least |cos| of the angles between the shapes of two models: 1 where all are the same but for signs."""
     if len(model.omega) != len(near.omega):  # which is refused where their states are compared
         return 1.0
-    own, other = _motions(model, near)
+    own, other = motions(model, near)
     sizes = np.linalg.norm(own, axis=0) * np.linalg.norm(other, axis=0)
     moving = sizes > 0.0  # those of impactors do not
     return float(np.min(np.abs(np.sum(own * other, axis=0))[moving] / sizes[moving], initial=1.0))
 
 
-def _motions(model: Model, near: Model) -> tuple[Vector, Vector]:
+def motions(model: Model, near: Model) -> tuple[Vector, Vector]:
     """Shapes (k, n) of both at the same places: of bodies at all dofs of one mesh, else at places that both have."""
     pairs = list(zip((model.shapes, *model.others), (near.shapes, *near.others), strict=True))
     beams = any(isinstance(one, Shapes) for pair in pairs for one in pair)

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from fembeam.model.equations import load_period
 from fembeam.model.extremes import of_top, time_of_top
 from fembeam.model.reduce import signed_like
+from fembeam.model.turned import angle, turned_like
 from fembeam.response import PlacedLog, directed
 from fembeam.scene import called, changes_structure, path_of, replaced, value_of
 from fembeam.scene.signals import is_of_signal
@@ -49,6 +50,7 @@ FELT = 1e-4  # relative change of frequencies or shapes that the step of a zero 
 FIRST = 1e-6  # SI unit: the step of such a zero that is tried first
 LEAST, MOST = 1e-30, 2e6  # SI unit: the smallest and the largest step of such a zero
 ROUGH = 1e-2  # relative difference of the derivatives by one and by two steps, above which modes do not change smoothly
+MIXED = 1e-2  # sine of the angle by which close modes turn among themselves, above which they are turned back
 SINGLE = 1e-6  # least |1 - μ| of an orbit with a derivative; Φ is known to some 1e-8, also at a fold that was located
 CHAOS = 1e6  # growth of small changes above which a derivative says little
 LONGEST = 60  # contacts that are printed
@@ -243,6 +245,10 @@ class _Varied:
         found = self._near(self._model, step)
         for one in found.systems:
             self._check_size(one)
+        turned = found.map(lambda one: turned_like(one, self.model))
+        if max(map(angle, turned.systems)) > MIXED:
+            _check_turned(turned, self.called, self.model.omega)
+            return turned
         _check_smooth(found, self.called)
         return found
 
@@ -307,8 +313,9 @@ class _Varied:
         require(len(there.system.loads) == len(here.system.loads), "it must not bring a load that is not there yet",
                 step, self.called, "begin from a small value, such as gravity=1e-6")  # fmt: skip
         self._check_size(there)
-        vectors = [np.array([vector for vector, _ in one.system.loads]) for one in (here, there)]
-        pairs = (here.directions, there.directions), (here.zeta, there.zeta), vectors
+        turned = turned_like(there, here)
+        vectors = [np.array([vector for vector, _ in one.system.loads]) for one in (here, turned)]
+        pairs = (here.directions, turned.directions), (here.zeta, there.zeta), vectors
         sizes = [(np.abs(b - a).max(initial=0.0), np.abs(a).max(initial=0.0)) for a, b in pairs]
         own, changed = here.omega**2, np.abs(there.omega**2 - here.omega**2)
         sizes += zip(changed, np.where(own > 0.0, own, own.max()), strict=True)  # each: others may be far stiffer
@@ -354,10 +361,20 @@ def _is_knot(path: str) -> bool:
 
 
 def _check_smooth(models: Nearby, path: str) -> None:
-    """ValueError where frequencies jump between the values: the mesh or the order of modes changes."""
+    """ValueError where frequencies or shapes jump between the values: the mesh or the order of modes changes."""
     rough = max(models.disagreement(lambda one: one.omega**2), models.disagreement(lambda one: one.directions))
     require(rough <= ROUGH, "modes must change smoothly with the parameter", path, "sensitivity",
-            "give elements, or other modes: two may change places here")  # fmt: skip
+            "give elements, or other modes")  # fmt: skip
+
+
+def _check_turned(models: Nearby, path: str, omega: Vector) -> None:
+    """The same of modes that are turned among themselves, by K and C in units of each mode's frequency."""
+    size = np.where(omega > 0.0, omega, omega.max())
+    scale = np.outer(size, size)
+    of_matrices = (lambda one: one.system.K / scale), (lambda one: one.system.C / np.sqrt(scale))
+    rough = max(map(models.disagreement, (*of_matrices, lambda one: one.directions)))
+    require(rough <= ROUGH, "modes must change smoothly with the parameter", path, "sensitivity",
+            "modes change places here: give them one damping ratio, and keep all of one frequency")  # fmt: skip
 
 
 def of_run(run: Run, parameter: str | None, start: ArrayLike | None, progress: bool = False) -> Sensitivity:

@@ -84,11 +84,10 @@ class Change:
         return np.asarray(getattr(self.found, name)[self.mine])
 
     @cached_property
-    def omega(self) -> Vector:
-        """(n,) of the natural frequencies."""
-        models = self.found.models
-        size = len(self.found.run.readout.model.omega)
-        return np.zeros(size) if models is None else models.derivative(lambda one: one.omega)
+    def stiffness(self) -> Vector:
+        """(n, n) of the matrix K on the coordinates."""
+        size, systems = len(self.found.run.readout.model.omega), self.found.systems
+        return np.zeros((size, size)) if systems is None else systems.derivative(lambda one: one.K)
 
 
 def _periodic_rate(values: Vector, h: float) -> Vector:

@@ -226,7 +226,7 @@ class MeanEnergy:
         assert run.model is not None
         omega = run.model.omega
         energy = np.sum(run.q_dot**2 + (run.q * omega) ** 2, axis=1) / 2
-        potential = run.q * omega * (omega * change.q + run.q * change.omega)
+        potential = run.q * (omega**2 * change.q + 0.5 * run.q @ change.stiffness)
         return change.mean(energy, np.sum(run.q_dot * change.q_dot + potential, axis=1))
 
 
