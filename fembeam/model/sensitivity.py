@@ -243,8 +243,6 @@ class _Varied:
         with self._rewording_refusals():
             step = STRUCTURE * abs(self.value) or self._felt()
         found = self._near(self._model, step)
-        for one in found.systems:
-            self._check_size(one)
         turned = found.map(lambda one: turned_like(one, self.model))
         if max(map(angle, turned.systems)) > MIXED:
             _check_turned(turned, self.called, self.model.omega)
@@ -268,7 +266,9 @@ class _Varied:
 
     def _model(self, value: float) -> Model:
         """At a value near the present one: a mode at rest where the scene's watched place is may have either sign."""
-        return signed_like(self.model.again(self._scene(value)), self.model)
+        made = self.model.again(self._scene(value))
+        self._check_size(made)
+        return signed_like(made, self.model)
 
     def _system(self, value: float) -> Any:
         return self.model.system_like(self._scene(value))
@@ -312,7 +312,6 @@ class _Varied:
         here = self.model
         require(len(there.system.loads) == len(here.system.loads), "it must not bring a load that is not there yet",
                 step, self.called, "begin from a small value, such as gravity=1e-6")  # fmt: skip
-        self._check_size(there)
         turned = turned_like(there, here)
         vectors = [np.array([vector for vector, _ in one.system.loads]) for one in (here, turned)]
         pairs = (here.directions, turned.directions), (here.zeta, there.zeta), vectors
