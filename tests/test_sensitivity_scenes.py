@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fembeam as fb
-from contacts import BoucWen, Coulomb, KelvinVoigt, PiecewiseLinear, Polynomial, Segment, law, memory_law
+from contacts import BoucWen, Coulomb, KelvinVoigt, PiecewiseLinear, Polynomial, Segment, Tabulated, law, memory_law
 from fembeam.scene import value_of, with_value
 from solvers import Exponential
 
@@ -233,6 +233,14 @@ def test_a_place_that_a_shorter_beam_does_not_have():
     assert found.displacement(0.2).any()
     with pytest.raises(ValueError, match=r"no derivative by beam.length of what is at 0.25, which is not there at"):
         found.displacement(0.25)
+
+
+def test_the_first_point_of_a_table():
+    """It is always (0, 0), and moving it adds a point: that ended in the words of NumPy."""
+    run = simulated(rig(Tabulated([0.0, 1e-4, 1e-3], [0.0, 2.0, 50.0])), duration=0.06)
+    assert len(run.contacts)
+    with pytest.raises(ValueError, match="no derivative: the law of contact 0 has more numbers at one value"):
+        run.sensitivity("stops[0].law.indentation[0]")
 
 
 def test_what_is_no_number_is_refused_by_name():

@@ -189,6 +189,11 @@ class Change:
 def _laws(nearby: Nearby, s: int) -> list[Any] | None:
     """The laws of an element in the nearby systems; None if all are equal."""
     laws: list[Any] = [one.contacts[s].law for one in nearby.systems]
+    if len({len(law.parameters) for law in laws}) > 1:
+        raise ValueError(
+            f"no derivative: the law of contact {s} has more numbers at one value of the parameter than at another, "
+            f"as a table that gets one more point: {laws[-1]!r}"
+        )
     same = all(
         law is laws[0] or (law == laws[0] and np.array_equal(law.parameters, laws[0].parameters)) for law in laws
     )
