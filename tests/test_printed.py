@@ -126,7 +126,7 @@ def test_tables_of_pandas_hold_the_numbers(things):
     np.testing.assert_array_equal(frame.index, run.t[::10])
     np.testing.assert_array_equal(frame["displacement tip [m]"], run.displacement(0.5)[::10])
     np.testing.assert_array_equal(frame["force stop 0 [N]"], run.force(0)[::10])
-    assert list(log.to_dataframe().columns) == list(log.arrays())
+    assert list(log.to_dataframe().columns) == list(log.named_arrays())
     np.testing.assert_array_equal(log.to_dataframe()["impulse"], log.impulse)
     rows = {"branch": len(things["branch"].orbits), "modes": 4, "map": 4, "ensemble": 3, "bifurcation": 6}
     for name in ("branch", "ensemble", "response", "bifurcation", "modes", "map", "smallest", "speed"):
