@@ -54,7 +54,13 @@ def pytest_sessionstart(session):
 
 
 def pytest_collection_modifyitems(config, items):
-    """Examples and pages, a third of all the time, run only when asked for: by a mark, or by a file or folder."""
+    """Examples and pages, a third of all the time, run only when asked for: by a mark, or by a file or folder.
+
+    What another rounding or seed changes may warn by chance, of few contacts for instance; nothing else may.
+    """
+    for item in items:
+        if item.get_closest_marker("chaotic") or item.get_closest_marker("drawn"):
+            item.add_marker(pytest.mark.filterwarnings("default::UserWarning"), append=False)
     if config.option.markexpr or config.args_source != pytest.Config.ArgsSource.TESTPATHS:
         return
     examples = [item for item in items if item.get_closest_marker("example")]

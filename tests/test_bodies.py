@@ -212,7 +212,7 @@ def test_indentation_rate_of_a_stop_between_two_beams_is_that_of_both():
     stop = fb.Stop(0.5, HERTZ, gap=1e-4, on=(1, 0.5))
     scene = fb.Scene(fb.Beam(0.5, STEEL), [fb.Clamped(0.0)], stops=[stop], bodies=[other], base=fb.Harmonic(1e-3, 150))
     model = scene.reduce(2)
-    run = model.simulate(0.1, 1e-5, start=model.state(velocity=lambda z: -2.0 * z**2))
+    run = model.simulate(0.1, 1e-5, start=model.state(velocity=lambda z: -0.1 * model.phi(z)[..., 0]))
     assert len(run.contacts)
     delta, rate = quantities.signal(run)
     difference = np.gradient(delta, run.t)[1:-1]

@@ -68,6 +68,7 @@ def test_columns_in_any_unit_and_in_a_scene_file(tmp_path, file_of):
         np.testing.assert_allclose(record.y, factor * QUAKE, rtol=1e-12)
     beam = '[beam]\nlength = 1.0\nsection = { shape = "circle", E = 2e11, rho = 7800, diameter = 0.01 }\n[base]\n'
     text = beam + 'kind = "earthquake"\npath = "quake.csv"\nunit = "g"\npadding = 1\n'
+    text += '[[supports]]\nkind = "clamped"\nz = 0\n'
     base = file_of(text).scene.base
     np.testing.assert_allclose(base.y, without_baseline(T, 9.80665 * QUAKE), rtol=1e-12)
     assert base.padding == 1.0

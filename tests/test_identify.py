@@ -95,6 +95,7 @@ def test_a_record_is_cut_into_its_collisions():
 
 
 @pytest.mark.drawn
+@pytest.mark.filterwarnings("ignore:neighbouring residuals")
 def test_collisions_that_disagree_are_told():
     rng = np.random.default_rng(5)
     soft = collisions(rng, law=Hysteretic(1.8e8, 0.5625), speeds=(0.2, 0.3), noise_force=0.01)
@@ -111,6 +112,7 @@ def test_collisions_that_disagree_are_told():
 
 
 @pytest.mark.drawn
+@pytest.mark.filterwarnings("ignore:collisions disagree")
 def test_a_filtered_channel_is_told_and_widens():
     """Of 300 draws one is less than twice as wide, and one in 300 is widened by chance: three of five once in 3e5."""
     rng = np.random.default_rng(6)
@@ -198,6 +200,7 @@ def test_a_force_that_pulls_is_refused(timed, exponent):
 
 
 @pytest.mark.parametrize("factor", [0.05, 1e3])
+@pytest.mark.filterwarnings("ignore:neighbouring residuals")
 def test_a_force_that_is_mostly_damping_is_no_force_that_pulls(factor):
     found = identify(**loops_of(Hysteretic(2.1e8, factor)))
     assert found.damping_factor.value == pytest.approx(factor, rel=1e-2)

@@ -302,7 +302,7 @@ ENDDATA
         ({"more": ",GGG,+B\n$ pins\n+B,56"}, "CBAR 1 must have no pin flags and no offsets, got ['56']"),
         ({"first": "CBEND,3,1,10,7"}, "cells must be lines, of CBAR, CBEAM, CROD, CTUBE, got {'CBEND': 1}"),
         ({"first": "=,*(1),="}, "all cards must be written out"),
-        ({"first": "CROD,3,1,10,99"}, "GRID 99 must be defined"),
+        ({"first": "CBAR,3,1,10,99,0.,1.,0."}, "GRID 99 must be defined"),
     ],
 )
 def test_what_is_passed_over_in_nastran_files(tmp_path, parts, said):

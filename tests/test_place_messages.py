@@ -24,7 +24,7 @@ def stop(body, place, direction="x"):
 @pytest.fixture(scope="module")
 def run():
     scene = fb.Scene(BENT, [fb.Clamped("33")], stops=[fb.Stop("N35", LAW, direction="z")])
-    return scene.reduce(1).simulate(0.01, 1e-3)
+    return scene.reduce(2).simulate(0.01, 1e-3)
 
 
 @pytest.fixture(scope="module")

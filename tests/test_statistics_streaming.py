@@ -498,7 +498,7 @@ def test_the_same_seed_gives_the_same_bits_and_the_model_is_left_alone():
 
 def test_a_record_is_one_segment():
     t = np.linspace(0.0, 60.0, 60_001)
-    record = fb.Record(t, 1e-5 * coloured(3, t.size), band=(5.0, 600.0))
+    record = fb.Record(t, 1e-5 * np.minimum(t, 1.0) ** 3 * coloured(3, t.size), band=(5.0, 600.0))  # from rest
     found = stationary(cantilever(1, base=record), 60.0, 2e-3)
     assert found.duration + found.discarded == pytest.approx(60.0)
 
@@ -530,7 +530,7 @@ def test_memory_of_many_modes():
 
 
 NOISE = fb.BandNoise(1e-4, (0.0, 600.0))
-RECORD = fb.Record(np.linspace(0.0, 8.0, 801), 1e-5 * coloured(3, 801), band=(5.0, 600.0))
+RECORD = fb.Record(np.linspace(0.0, 8.0, 801), 1e-5 * np.hanning(801) * coloured(3, 801), band=(5.0, 300.0))
 
 
 def watched(duration=10.0, dt=2e-3, damping=0.05, base=NOISE, **options):

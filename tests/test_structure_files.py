@@ -274,12 +274,13 @@ def test_a_scene_is_told_by_what_it_was_made_of():
 
 
 def test_statistics_with_standard_errors():
-    response = study.stationary(noisy_scene().reduce(modes=2), duration=8.0, dt=1e-3)
+    response = study.stationary(noisy_scene().reduce(modes=2), duration=10.0, dt=1e-3)
     assert {"δ std", "stop 0 rate"} <= set(response.numbers())
     free = replace(noisy_scene(), stops=())
-    assert any(name.startswith("middle, y u") for name in study.stationary(free.reduce(modes=2), 8.0, 1e-3).numbers())
+    assert any(name.startswith("middle, y u") for name in study.stationary(free.reduce(modes=2), 10.0, 1e-3).numbers())
 
 
+@pytest.mark.filterwarnings("ignore:.* hold one realisation")
 def test_an_ensemble_resumes_from_its_checkpoint(tmp_path):
     quantity = partial(study.characteristics, duration=0.5, dt=1e-3, discard=0.1)
     model, path = noisy_scene().reduce(modes=2), tmp_path / "ensemble.npz"

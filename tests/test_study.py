@@ -91,6 +91,7 @@ def test_parts_of_a_run_make_the_whole():
     assert QUANTITIES["impact_rate"]()(coarse) == len(coarse.contacts)
 
 
+@pytest.mark.filterwarnings("ignore:contacts last fewer")
 def test_every_quantity_has_a_value_and_a_name():
     run = SCENE.reduce(2).simulate(4.0, dt=1e-3)
     with pytest.raises(ValueError, match="the stop must have friction, got 0 in WearPower"):
@@ -146,6 +147,7 @@ def test_values_of_a_mode_count_have_their_unit(tmp_path):
         assert f",{head.strip().replace('/ m', '[m]')}," in (tmp_path / "modes.csv").read_text().splitlines()[0]
 
 
+@pytest.mark.filterwarnings("ignore:.* of the velocity")
 def test_fast_strike_on_a_stiff_stop():
     study = mode_count(STIFF, [1, 2, 12], "peak_force", duration=0.05, start=swing, reference=24)
     assert study.row(2).error > 0.1
@@ -348,6 +350,7 @@ def test_smallest_model_is_right_afterwards(name):
     assert "integration" in str(found)
 
 
+@pytest.mark.filterwarnings("ignore:.* of the velocity")
 def test_smallest_model_says_when_modes_do_not_suffice():
     with pytest.raises(NotMetError, match=r"peak_force to 0\.01: NOT MET: modes converge too slowly.*up to 2") as error:
         smallest_model(STIFF, "peak_force", 0.01, duration=0.05, start=swing, most=2)
@@ -575,6 +578,7 @@ dt = 1e-3
 """
 
 
+@pytest.mark.filterwarnings("ignore:elements are too coarse")
 def test_studies_of_a_file_use_the_mesh_that_reduce_says(tmp_path, file_of):
     file = file_of(COARSE)
     run = {"quantity": "amplitude", "duration": 0.1, "dt": 1e-3}
