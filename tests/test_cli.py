@@ -258,7 +258,7 @@ def test_an_ensemble_is_written_and_goes_on(tmp_path, capsys):
     assert main(["run", str(path), "--out", str(out), "--quiet"]) == 0
     table = capsys.readouterr().out
     assert table.startswith("3 realisations\n")
-    assert re.search(r"stop 0 rate +4\d(\.\d+)? ± \d", table)
+    assert re.search(r"stop 0 rate / 1/s +4\d(\.\d+)? ± \d", table)
     suffixes = "csv", "json", "npz", "png", "txt"
     named = [*(f"ensemble.{kind}" for kind in suffixes), "report.html", "rig.png", "studies.json"]
     assert sorted(p.name for p in out.iterdir()) == named
