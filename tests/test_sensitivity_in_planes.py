@@ -328,7 +328,7 @@ def test_random_response(friction):
 
     ensemble = fb.study.ensemble(model, 6, mean_square)
     values, watch = ensemble.values[""], {"x": lambda run: run.displacement(0.4, "x")}
-    long = fb.study.stationary(model, 8.0, 1e-3, watch, discard=0.2)
+    long = fb.study.stationary(model, 10.0, 1e-3, watch, discard=0.2)
     power = long.power(0) if friction is None else long.wear(0)
     assert power.value > 0.0
     assert abs(values.mean() - long["x"].variance.value) < 4.0 * values.std(ddof=1)
