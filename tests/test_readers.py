@@ -346,6 +346,7 @@ def test_harwell_boeing(tmp_path, kind, part):
 def test_harwell_boeing_of_scipy(tmp_path):
     io.hb_write(tmp_path / "K.hb", sparse.csc_matrix(K / 3.0))  # fields narrower than its head says
     check(read_matrices(tmp_path / "K.hb"), K / 3.0, labels=None)
+    check(read_matrices(written(tmp_path, "one.matrix", harwell_boeing(K[:1, :1]))), K[:1, :1], labels=None)
 
 
 def test_harwell_boeing_is_refused_in_words(tmp_path):

@@ -374,6 +374,13 @@ def test_smallest_model_says_when_a_quantity_jumps_with_modes():
         smallest_model(FREE, jumping, 0.02, duration=0.02, dt=1e-3, most=4, residual=False)
 
 
+def test_smallest_model_looks_between_the_counts_that_are_tried():
+    """Five modes suffice, and of 4 and 6 only the last."""
+    found = smallest_model(FREE, lambda run: 1.0 if run.q.shape[1] > 4 else 1.5, 0.02,
+                           duration=0.02, dt=1e-3, most=8, residual=False)  # fmt: skip
+    assert len(found.model.omega) == 5
+
+
 def test_smallest_model_says_when_scatter_hides_it():
     noise = replace(SCENE, base=fb.BandNoise(std=2.5e-4, band=(0.0, 1226.6)))
     with pytest.raises(NotMetError, match=r"scatter hides it.*more seeds"):
