@@ -152,16 +152,18 @@ def _checked(basis: Basis, G: Any, x: ArrayLike, y: ArrayLike) -> tuple[Vector, 
 def _turned(omega: Vector, vectors: Any, basis: Basis, places: tuple[Vector, Vector]) -> Whirl:
     """The modes with their sense; those of one frequency combined to circles."""
     vectors = vectors.copy()
+    X, Y = (row @ vectors for row in places)
     first = 0
     for end in range(1, len(omega) + 1):
         if end < len(omega) and omega[end] - omega[first] <= ALIKE * omega[first]:
             continue
         group = slice(first, end)
-        X, Y = (row @ vectors[:, group] for row in places)
-        area = 1j * (X.conj().T @ Y - Y.conj().T @ X)  # Hermitian: -2 Im(X* Y)
-        vectors[:, group] = vectors[:, group] @ np.linalg.eigh(area)[1]
+        if end - first > 1:
+            area = 1j * (X[:, group].conj().T @ Y[:, group] - Y[:, group].conj().T @ X[:, group])
+            combined = np.linalg.eigh(area)[1]  # of a Hermitian matrix: -2 Im(X* Y)
+            for columns in (vectors, X, Y):
+                columns[:, group] = columns[:, group] @ combined
         first = end
-    X, Y = (row @ vectors for row in places)
     area, circle = -2.0 * np.sum((X.conj() * Y).imag, axis=0), np.sum(np.abs(X) ** 2 + np.abs(Y) ** 2, axis=0)
     moved = circle > 1e-20 * circle.max(initial=0.0)
     sense = np.divide(area, circle, out=np.zeros(len(omega)), where=moved)

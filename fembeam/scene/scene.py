@@ -221,7 +221,9 @@ class Scene:
 
         return reduced(self, modes, elements, omega_max, mass_share, residual, interface)
 
-    def campbell(self, spins: ArrayLike, modes: int = 4, elements: int | None = None) -> Campbell:
+    def campbell(
+        self, spins: ArrayLike, modes: int = 4, elements: int | None = None, progress: bool = False
+    ) -> Campbell:
         """Frequencies of a rotor over its spin with the sense of its whirl, and critical speeds; see `study.campbell`.
 
         Examples
@@ -233,7 +235,7 @@ class Scene:
         """
         from fembeam.study import campbell
 
-        return campbell(self, spins, modes, elements)
+        return campbell(self, spins, modes, elements, progress)
 
     def figure(self, axes: Axes | None = None) -> Figure:
         """The rig drawn, `fembeam.plot.rig`: beams to scale along z, all parts with names, gaps enlarged."""

@@ -572,7 +572,8 @@ class CampbellTable:
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.Campbell:
         """The diagram."""
-        return studies.campbell(file.scene, np.linspace(*self.spins, self.points), self.modes, **_mesh_of(file))
+        spins = np.linspace(*self.spins, self.points)
+        return studies.campbell(file.scene, spins, self.modes, **_mesh_of(file), progress=progress)
 
 
 @dataclass(frozen=True)
@@ -619,7 +620,7 @@ class FloorSpectraTable:
         """The spectra."""
         run = file.model().simulate(self.duration, self.dt, solver=self.solver, progress=progress)
         oscillators = {"omega": self._spread(self.omega), "periods": self._spread(self.periods)}
-        return studies.floor_spectra(run, self.places, zeta=self.zeta, **oscillators)
+        return studies.floor_spectra(run, self.places, zeta=self.zeta, **oscillators, progress=progress)
 
     def _spread(self, given: Sequence[float] | None) -> Any:
         """The oscillators, those between the two given ones too."""

@@ -17,7 +17,7 @@ from fembeam import plot
 from fembeam.scene import Scene
 from fembeam.structures import COMPONENTS, Frame
 from fembeam.study.result import Result
-from fembeam.support import Part, is_whole, require, vector
+from fembeam.support import Part, counting, is_whole, require, vector
 from solvers.problem import counted
 
 Vector = NDArray[np.float64]
@@ -78,7 +78,9 @@ class Campbell(Result):
         return [repr(self), f"critical speeds: {found or 'none in this range'}", (head, rows)]
 
 
-def campbell(scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | None = None) -> Campbell:
+def campbell(
+    scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | None = None, progress: bool = False
+) -> Campbell:
     """Frequencies of a rotor over its spin, and its critical speeds.
 
     Parameters
@@ -87,6 +89,7 @@ def campbell(scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | Non
     spins : (k,) rad/s, ascending.
     modes : how many frequencies of each spin, 1 to 64.
     elements : of the mesh; None: as few as make the frequencies right to 1e-6.
+    progress : show a bar (on terminals and in notebooks only).
 
     Returns
     -------
@@ -116,7 +119,7 @@ def campbell(scene: Scene, spins: ArrayLike, modes: int = 4, elements: int | Non
     basis, G, across = _at_unit_spin(scene, int(modes), elements)
     found = [
         (one.omega[:modes], one.turning[:modes])
-        for one in (reduction.whirl(basis, spin * G, *across) for spin in speeds)
+        for one in (reduction.whirl(basis, spin * G, *across) for spin in counting(progress, speeds, unit=" spins"))
     ]
     met = reduction.critical_speeds(basis, G, *across)
     critical = met.signed[_bends(met, across)]
@@ -151,7 +154,10 @@ def _bends(found: reduction.Whirl, across: tuple[Any, Any]) -> NDArray[np.bool_]
 
 
 def _at_unit_spin(scene: Scene, modes: int, elements: int | None) -> tuple[reduction.Basis, Any, tuple[Any, Any]]:
-    """Modes at standstill without rigid motions that do not tilt the shaft, G per rad/s, rows across the shaft."""
+    """Modes at standstill without rigid motions that do not tilt the shaft, G per rad/s and rows across the shaft.
+
+    All in the coordinates of these modes, whose vectors are unit vectors then.
+    """
     body = check_shaft(scene)
     spun = replace(scene, beam=replace(body, spin=1.0), stops=(), elements=(), forces=(), base=None, gravity=0.0)
     wanted = 2 * modes + SPARE
@@ -161,7 +167,9 @@ def _at_unit_spin(scene: Scene, modes: int, elements: int | None) -> tuple[reduc
     basis, G = reduction.modal_basis(matrices.M, matrices.K, count, root=matrices.root), matrices.gyroscopic
     tilts = np.linalg.norm(G @ basis.vectors, axis=0) > STILL * abs(G).max() * np.linalg.norm(basis.vectors, axis=0)
     kept = (basis.omega > 0.0) | tilts
-    return reduction.Basis(basis.vectors[:, kept], basis.omega[kept]), G, _across(matrices, spun.beam)
+    basis = reduction.Basis(basis.vectors[:, kept], basis.omega[kept])
+    x, y = (rows @ basis.vectors for rows in _across(matrices, spun.beam))
+    return reduction.Basis(np.eye(basis.count), basis.omega), basis.project_matrix(G), (x, y)
 
 
 def _across(matrices: Any, body: Frame) -> tuple[Any, Any]:

@@ -16,7 +16,7 @@ from fembeam.response import ResponseSpectrum
 from fembeam.scene import directed_words, is_directed, place_words
 from fembeam.structures import COMPONENTS
 from fembeam.study.result import Result
-from fembeam.support import Part, require
+from fembeam.support import Part, counting, require
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -84,6 +84,7 @@ def floor_spectra(
     zeta: ArrayLike = 0.05,
     *,
     periods: ArrayLike | None = None,
+    progress: bool = False,
 ) -> FloorSpectra:
     """`Run.floor_spectrum` at several places.
 
@@ -93,6 +94,7 @@ def floor_spectra(
     places : of a beam z in m, of other bodies (place, direction), or a place: its motion along x, y and z, as far as it
         has these. Names of parts are places.
     omega, zeta, periods : as for `fembeam.response_spectrum`.
+    progress : show a bar (on terminals and in notebooks only).
 
     Returns
     -------
@@ -114,7 +116,8 @@ def floor_spectra(
     several = hasattr(places, "__len__") and not isinstance(places, str) and len(places) > 0
     require(several, "places must be a list of one or more", places, "floor_spectra", "put it in brackets")
     asked = {name: at for place in places for name, at in _along(run, place).items()}
-    return FloorSpectra({name: run.floor_spectrum(at, omega, zeta, periods=periods) for name, at in asked.items()})
+    each = counting(progress, asked.items(), unit=" places")
+    return FloorSpectra({name: run.floor_spectrum(at, omega, zeta, periods=periods) for name, at in each})
 
 
 def _along(run: Run, place: Any) -> dict[str, Any]:
