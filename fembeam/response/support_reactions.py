@@ -220,9 +220,13 @@ def _of_supports(
     """(part, body) of each support and spring, and its rows (2, c) or (6, c)."""
     each = np.split(acting, np.cumsum([beam.M.shape[0] for beam in full.beams]))
     for body, scene in enumerate((model.scene, *model.scene.bodies)):
-        held, feet = _held(scene, model.matrices.beams[body], full.beams[body], each[body]), iter(columns.feet[body])
+        felt = np.flatnonzero(each[body].any(axis=0))  # the columns that act on this body
+        held = _held(scene, model.matrices.beams[body], full.beams[body], each[body][:, felt])
+        feet = iter(columns.feet[body])
         for part in (*scene.supports, *scene.springs):
-            row = np.array(held.by(part))
+            answer = np.array(held.by(part))
+            row = np.zeros((len(answer), acting.shape[1]))
+            row[:, felt] = answer
             if isinstance(part, Spring):
                 row[:, columns.displacements] -= _with_supports(part, "stiffness", model, body)
             if isinstance(part, Spring) and part.foot is not None:  # a moving foot adds to the force of its spring
