@@ -187,6 +187,17 @@ def test_terminals_get_a_bar_when_asked_and_pipes_none(monkeypatch, recwarn, str
     assert not recwarn.list
 
 
+def test_diagrams_floor_spectra_and_moving_pictures_show_a_bar_when_asked(monkeypatch, things, tmp_path):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    run = things["model"].simulate(0.01, 1e-3)
+    shaft = fb.Frame.straight(0.6, fb.Section.circle(2.1e11, 7850.0, 0.04), bending_only=True)
+    fb.Scene(shaft, [fb.Clamped("A")]).campbell([0.0, 500.0], modes=2, progress=True)
+    fb.study.floor_spectra(run, [0.1, 0.2], periods=[0.1], progress=True)
+    fb.plot.animate(run, tmp_path / "run.gif", frames=2, progress=True)
+    for end in ("2/2 [00:00<00:00", "spins/s", "places/s", "pictures/s"):
+        assert end in sys.stderr.getvalue()
+
+
 def test_work_is_told_to_those_who_listen(things, caplog, capfd):
     model = things["model"]
     model.simulate(0.01, 1e-3)

@@ -15,7 +15,7 @@ from fembeam.plot.run_signals import samples_in
 from fembeam.plot.style import BLUE, GREY, ORANGE, RED, entry, own_colour, styled
 from fembeam.plot.units import length_for, unit_for
 from fembeam.scene import ON
-from fembeam.support import require, written_beside
+from fembeam.support import counting, require, written_beside
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -37,6 +37,7 @@ def animate(
     window: tuple[float, float] | None = None,
     frames: int = 150,
     fps: float = 25.0,
+    progress: bool = False,
 ) -> Path:
     """Write a run as a moving picture: deflected beams, stops, impactors, an arrow for every contact force.
 
@@ -51,6 +52,7 @@ def animate(
     window : (from, to) in s; None: all of it.
     frames : how many pictures, evenly spread over the window's samples; at most 1000.
     fps : pictures per second. The title says how much slower or faster than real time that is.
+    progress : show a bar (on terminals and in notebooks only).
 
     Returns
     -------
@@ -72,8 +74,8 @@ def animate(
     stage = _stage(run, samples, fps)
     film = FuncAnimation(stage.figure, stage.show, frames=len(samples), init_func=lambda: [], blit=False)
     writer = (PillowWriter if target.suffix == ".gif" else FFMpegWriter)(fps=fps)  # type: ignore[arg-type]
-    with written_beside(target) as draft:
-        film.save(draft, writer=writer, dpi=100)
+    with written_beside(target) as draft, counting(progress, total=len(samples), unit=" pictures") as bar:
+        film.save(draft, writer=writer, dpi=100, progress_callback=lambda *_: bar.update())
     return target
 
 
