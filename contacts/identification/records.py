@@ -138,8 +138,8 @@ def _split(record: dict[str, Vector], index: int) -> list[Samples]:
 
 def _extent(delta: Vector, start: int, end: int, step: int) -> int:
     """Last sample from start towards end before which delta stays above a little below the surface."""
-    place = start
-    while place != end and delta[place + step] > -_CORE * delta.max():
+    place, least = start, -_CORE * delta.max()
+    while place != end and delta[place + step] > least:
         place += step
     return place
 
