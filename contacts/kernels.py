@@ -7,17 +7,14 @@ import threading
 from contextlib import suppress
 from functools import partial
 
-from llvmlite import ir
 from numba import carray, cfunc, config, njit, types
 from numba.core.caching import FunctionCache
 from numba.core.ccallback import CFunc
 from numba.core.sigutils import normalize_signature
-from numba.extending import intrinsic
 
 REALS = types.CPointer(types.float64)
 SIGNATURE = types.void(types.int64, REALS, REALS, types.float64, REALS, REALS)
 GRADIENT = types.void(types.int64, REALS, REALS, types.float64, REALS, REALS, REALS, REALS)
-HEAD = 11  # numbers in a sum's parameters before those of each part
 
 if config.DISABLE_JIT:
     raise RuntimeError("NUMBA_DISABLE_JIT is set, but contact laws run as machine code only: unset it")
@@ -224,62 +221,3 @@ def polynomial_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, b
     for i in range(n):
         value, slope = _horner(coefficients, 1, k, delta[i])
         by_delta[i], by_rate[i], by_entry[i] = value + delta[i] * slope, 0.0, 0.0
-
-
-def _call(outputs):
-    """An intrinsic that calls a law at an address for one of its points; returns the outputs as a tuple."""
-
-    @intrinsic
-    def call(typingctx, address, point, delta, delta_dot, entry_rate, parameters, offset):
-        results = types.UniTuple(types.float64, outputs)
-        signature = results(types.int64, types.int64, REALS, REALS, types.float64, REALS, types.int64)
-
-        def codegen(context, builder, sig, args):
-            from numba.core import cgutils
-
-            real, reals = ir.DoubleType(), ir.DoubleType().as_pointer()
-            declared = ir.FunctionType(ir.VoidType(), [ir.IntType(64), reals, reals, real, reals, *[reals] * outputs])
-            function = builder.inttoptr(args[0], declared.as_pointer())
-            out = [cgutils.alloca_once(builder, real) for _ in range(outputs)]
-            delta, delta_dot = (builder.gep(pointer, [args[1]]) for pointer in args[2:4])
-            parameters = builder.gep(args[5], [args[6]])
-            builder.call(function, [ir.Constant(ir.IntType(64), 1), delta, delta_dot, args[4], parameters, *out])
-            return context.make_tuple(builder, results, [builder.load(pointer) for pointer in out])
-
-        return signature, codegen
-
-    return call
-
-
-_force_at = _call(1)
-_gradient_at = _call(3)
-
-
-@_force
-def parallel(n, delta, delta_dot, entry_rate, parameters, force):
-    """Sum of laws by their addresses; parameters as in `contacts.sums.Sum.parameters`."""
-    for i in range(n):
-        force[i] = 0.0
-    at = 1
-    for _ in range(int(parameters[0])):
-        rate = max(entry_rate, parameters[at + 2])
-        for i in range(n):
-            force[i] += _force_at(int(parameters[at]), i, delta, delta_dot, rate, parameters, at + HEAD)[0]
-        at += HEAD + int(parameters[at + 3])
-
-
-@_gradient
-def parallel_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):
-    """Derivatives of `parallel`."""
-    for i in range(n):
-        by_delta[i], by_rate[i], by_entry[i] = 0.0, 0.0, 0.0
-    at = 1
-    for _ in range(int(parameters[0])):
-        rate, address = max(entry_rate, parameters[at + 2]), int(parameters[at + 1])
-        for i in range(n):
-            slopes = _gradient_at(address, i, delta, delta_dot, rate, parameters, at + HEAD)
-            by_delta[i] += slopes[0]
-            by_rate[i] += slopes[1]
-            if entry_rate > parameters[at + 2]:
-                by_entry[i] += slopes[2]
-        at += HEAD + int(parameters[at + 3])

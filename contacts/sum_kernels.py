@@ -1,4 +1,4 @@
-"""Compiled memory of laws in parallel: what each part latches, by the addresses of its own kernels.
+"""Compiled laws in parallel: forces, derivatives and what each part latches, by the addresses of its own kernels.
 
 A law of stops beside one with memory stands behind a gate, open while δ > 0, that latches the rate at entry: parameters
 (code, rate at entry, floor, address, address of its derivatives, its own).
@@ -9,11 +9,12 @@ from numba import cfunc, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from contacts.kernels import GRADIENT, HEAD, REALS, SIGNATURE, compiled
+from contacts.kernels import GRADIENT, REALS, SIGNATURE, compiled
 
 RENEW = types.int64(types.int64, types.float64, types.float64, types.float64, REALS)
 RENEW_GRADIENT = types.void(types.int64, types.float64, types.float64, types.float64, REALS, REALS)
-FLOOR, SIZE, BORDERS, RENEWAL, BY_MEMORY, RENEWAL_SLOPES, BORDER_COUNT, LATCHED, EVENTS = range(2, HEAD)  # of a head
+HEAD = 11  # numbers in a sum's parameters before those of each part, these behind its address:
+SLOPES, FLOOR, SIZE, BORDERS, RENEWAL, BY_MEMORY, RENEWAL_SLOPES, BORDER_COUNT, LATCHED, EVENTS = range(1, HEAD)
 
 
 @intrinsic
@@ -46,7 +47,60 @@ def _call(declared):
     return call
 
 
-_fill, _renew, _renewal_slopes = _call(SIGNATURE), _call(RENEW), _call(RENEW_GRADIENT)
+_fill, _slopes, _renew, _renewal_slopes = _call(SIGNATURE), _call(GRADIENT), _call(RENEW), _call(RENEW_GRADIENT)
+POINTS = 8  # that a part is called for at once, at most
+
+
+@intrinsic
+def _room(typingctx):
+    """A pointer to `POINTS` numbers that last until the function returns."""
+
+    def codegen(context, builder, sig, args):
+        return cgutils.alloca_once(builder, ir.DoubleType(), size=POINTS)
+
+    return REALS(), codegen
+
+
+@compiled(njit)
+def _add(count, more, out):
+    """Add so many numbers to others."""
+    for i in range(count):
+        out[i] += more[i]
+
+
+@compiled(cfunc, SIGNATURE)
+def parallel(n, delta, delta_dot, entry_rate, parameters, force):
+    """Sum of laws by their addresses; parameters as in `contacts.sums.Sum.parameters`."""
+    found = _room()
+    for first in range(0, n, POINTS):
+        count, at = min(POINTS, n - first), 1
+        d, v, out = _from(delta, first), _from(delta_dot, first), _from(force, first)
+        for i in range(count):
+            out[i] = 0.0
+        for _ in range(int(parameters[0])):
+            rate = max(entry_rate, parameters[at + FLOOR])
+            _fill((int(parameters[at]), count, d, v, rate, _from(parameters, at + HEAD), found))
+            _add(count, found, out)
+            at += HEAD + int(parameters[at + SIZE])
+
+
+@compiled(cfunc, GRADIENT)
+def parallel_gradient(n, delta, delta_dot, entry_rate, parameters, by_delta, by_rate, by_entry):
+    """Derivatives of `parallel`."""
+    of_delta, of_rate, of_entry = _room(), _room(), _room()
+    for i in range(n):
+        by_delta[i], by_rate[i], by_entry[i] = 0.0, 0.0, 0.0
+    for first in range(0, n, POINTS):
+        count, at = min(POINTS, n - first), 1
+        d, v = _from(delta, first), _from(delta_dot, first)
+        for _ in range(int(parameters[0])):
+            rate, own = max(entry_rate, parameters[at + FLOOR]), _from(parameters, at + HEAD)
+            _slopes((int(parameters[at + SLOPES]), count, d, v, rate, own, of_delta, of_rate, of_entry))
+            _add(count, of_delta, _from(by_delta, first))
+            _add(count, of_rate, _from(by_rate, first))
+            if entry_rate > parameters[at + FLOOR]:
+                _add(count, of_entry, _from(by_entry, first))
+            at += HEAD + int(parameters[at + SIZE])
 
 
 @compiled(njit)
@@ -121,28 +175,18 @@ def parallel_renew_gradient(j, delta, delta_dot, entry_rate, parameters, out):
 
 
 GATE = 5  # numbers before those of a law behind a gate: code, rate at entry, floor, two addresses
-_force_slopes = _call(GRADIENT)
-
-
-@intrinsic
-def _room(typingctx):
-    """A pointer to one number that lasts until the function returns."""
-
-    def codegen(context, builder, sig, args):
-        return cgutils.alloca_once(builder, ir.DoubleType())
-
-    return REALS(), codegen
 
 
 @compiled(cfunc, SIGNATURE)
 def gated(n, delta, delta_dot, entry_rate, parameters, force):
     """The law behind the gate while that is open, code 1; a little below the surface its force is that at δ = 0."""
     inside, own, rate = _room(), _from(parameters, GATE), max(parameters[1], parameters[2])
-    for i in range(n):
-        force[i] = 0.0
+    for first in range(0, n, POINTS):
+        count, d, out = min(POINTS, n - first), _from(delta, first), _from(force, first)
+        for i in range(count):
+            inside[i], out[i] = max(d[i], 0.0), 0.0
         if parameters[0] != 0.0:
-            inside[0] = max(delta[i], 0.0)
-            _fill((int(parameters[3]), 1, inside, _from(delta_dot, i), rate, own, _from(force, i)))
+            _fill((int(parameters[3]), count, inside, _from(delta_dot, first), rate, own, out))
 
 
 @compiled(njit)
@@ -150,7 +194,7 @@ def _gate_slopes(delta, delta_dot, parameters):
     """Derivatives of the law behind an open gate by δ, its rate, and the rate at entry, which a floor may hide."""
     d, v, by_delta, by_rate, by_entry = _room(), _room(), _room(), _room(), _room()
     d[0], v[0], rate = max(delta, 0.0), delta_dot, max(parameters[1], parameters[2])
-    _force_slopes((int(parameters[4]), 1, d, v, rate, _from(parameters, GATE), by_delta, by_rate, by_entry))
+    _slopes((int(parameters[4]), 1, d, v, rate, _from(parameters, GATE), by_delta, by_rate, by_entry))
     return by_delta[0], by_rate[0], by_entry[0] if parameters[1] > parameters[2] else 0.0
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import reduce
 from itertools import chain, pairwise
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from contacts.law import Law
 
-HEAD = 11  # numbers before those of each part; as in `contacts.kernels`, which is slow to import
+HEAD = 11  # numbers before those of each part; as in `contacts.sum_kernels`, which is slow to import
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,7 @@ class Sum(Law):
         if wrong or not self.parts:
             raise ValueError(f"parts of Sum must be contact laws, at least one, got {wrong[0] if wrong else ()!r}")
 
+    home: ClassVar[str] = "contacts.sum_kernels"
     compiled: ClassVar[str] = "parallel"
     equation: ClassVar[str] = "F = sum of the laws below"
 
@@ -150,12 +151,6 @@ class Sum(Law):
             head += [part.borders, len(part.memory), len(part.events)]
             numbers += [np.array(head, dtype=float), own]
         return np.concatenate(numbers)
-
-    def memory_kernel(self, name: str) -> Any:
-        """The compiled function that asks all parts."""
-        from contacts import sum_kernels
-
-        return getattr(sum_kernels, f"parallel_{name}")
 
     def stored(self, delta: float, parameters: NDArray[np.float64]) -> float:
         """Energy stored by all parts, J."""

@@ -24,8 +24,8 @@ from contacts import (
     Tabulated,
     WaltonBraun,
     bounce,
-    kernels,
     restitution,
+    sum_kernels,
     sums,
 )
 from contacts.sums import Gated, Sum
@@ -309,4 +309,4 @@ def test_a_run_without_memory_loads_none_of_this():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "['contacts.custom_kernels', 'contacts.memory.custom_kernels']"  # no numba in these
-    assert sums.HEAD == kernels.HEAD
+    assert sums.HEAD == sum_kernels.HEAD
