@@ -1,20 +1,24 @@
-"""What a law of one's own costs: run times on the paper's scene relative to the built-in law, timed by turns.
+"""What a law of one's own costs: run times relative to the built-in law, timed by turns.
 
-``python tests/bench/user_law.py`` prints medians over the rounds of ratios within a round.
+``python tests/bench/user_law.py`` prints medians over the rounds of ratios within a round: stops on the paper's scene,
+and a slider beside its beam.
 """
 
 import math
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
+from own_memory_laws import ratchet
 from problems import paper_scene
 
+import fembeam as fb
 import solvers
-from contacts import Hertz, Hysteretic, Tabulated, law
+from contacts import Hertz, Hysteretic, Jenkins, Tabulated, law
 
 K, A, ROUNDS = 2.1e8, 0.5625, 60
 
@@ -41,8 +45,11 @@ laws = {
     "Hertz": Hertz(K),
     "Hertz tabulated at 8 points": Tabulated(depths, K * depths**1.5),
 }
-for method in (solvers.Exponential(1e-8), solvers.DormandPrince(1e-10)):
-    models = {name: paper_scene(law=one).reduce(2) for name, one in laws.items()}
+sliders = {"Jenkins": Jenkins(3e3, 1.0), "the same by memory_law": ratchet(stiffness=3e3, up=1.0, down=1.0)}
+
+
+def compare(models, method):
+    """Print how much longer runs of models take than that of the first."""
     runs = {name: model.simulate(0.2, None, solver=method) for name, model in models.items()}
     times = {name: [] for name in models}
     for _ in range(ROUNDS):
@@ -51,8 +58,18 @@ for method in (solvers.Exponential(1e-8), solvers.DormandPrince(1e-10)):
             for _ in range(5):
                 model.simulate(0.2, None, solver=method)
             times[name].append((time.perf_counter() - start) / 5)
-    first = np.array(times["Hysteretic"])
-    print(f"{type(method).__name__}: Hysteretic takes {1e6 * np.median(first):.0f} µs for 0.2 s")
+    first = np.array(next(iter(times.values())))
+    print(f"{type(method).__name__}: {next(iter(models))} takes {1e6 * np.median(first):.0f} µs for 0.2 s")
     for name, taken in times.items():
         ratio, run = np.median(np.array(taken) / first), runs[name]
         print(f"  {name:30} {ratio:5.2f} times as long, {len(run.contacts)} contacts, {run.cost.law_calls} law calls")
+
+
+for method in (solvers.Exponential(1e-8), solvers.DormandPrince(1e-10)):
+    compare({name: paper_scene(law=one).reduce(2) for name, one in laws.items()}, method)
+scene = paper_scene(law=laws["Hysteretic"])
+for modes in (2, 10):
+    with_slider = {
+        name: replace(scene, stops=(), elements=[fb.Element(scene.stops[0].z, one)]) for name, one in sliders.items()
+    }
+    compare({name: one.reduce(modes) for name, one in with_slider.items()}, solvers.Exponential(1e-8))
