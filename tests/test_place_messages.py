@@ -168,7 +168,7 @@ def test_arrays_without_a_row_are_no_list_and_numbers_no_parameter(straight):
     ("mean", lambda run: run.force(0, mean="no")),
     ("progress", lambda run: run.model.simulate(0.1, progress="no")),
     ("progress", lambda run: fb.study.vary(run.model.scene, {"stops[0].gap": [0.0]}, "rms", duration=0.1, dt=1e-3,
-                                           modes=1, progress="no")),
+                                           modes=2, progress="no")),
 ])  # fmt: skip
 def test_text_is_no_switch(run, name, call):
     with pytest.raises(ValueError, match=f"{name} must be True or False, got 'no' in"):
