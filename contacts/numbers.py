@@ -43,6 +43,15 @@ def check_number(value: Any, what: str, low: float = 0.0, *, strict: bool = Fals
     return result
 
 
+def _has_switch(values: Any) -> bool:
+    """Whether True or False stand in a list."""
+    if not isinstance(values, (list, tuple)):
+        return False
+    kinds = set(map(type, values))
+    nested = not kinds.isdisjoint((list, tuple))
+    return not kinds.isdisjoint((bool, np.bool_)) or (nested and any(map(_has_switch, values)))
+
+
 def reals(values: Any, what: str) -> NDArray[np.float64]:
     """Numbers of any shape as a new array of floats, nan and inf among them, or a clear error."""
     try:
@@ -50,9 +59,8 @@ def reals(values: Any, what: str) -> NDArray[np.float64]:
     except ValueError:
         raise ValueError(f"{what} must be numbers in rows of equal length, got {values!r}") from None
     with np.errstate(over="ignore"):  # beyond the largest float: inf, which is refused where it may not be
-        if given.dtype.kind in "iuf" and not isinstance(values, np.ndarray):  # NumPy takes True among numbers for 1
-            told = np.asarray(values, dtype=object)
-            given = told if any(isinstance(one, (bool, np.bool_)) for one in told.ravel().tolist()) else given
+        if _has_switch(values):  # NumPy takes True among numbers for 1
+            given = np.asarray(values, dtype=object)
         if given.dtype.kind in "iuf":
             return given.astype(float)
         return np.array([_float(value, what) for value in given.ravel().tolist()]).reshape(given.shape)

@@ -33,6 +33,7 @@ from contacts import (
     memory_law,
     restitution,
 )
+from fembeam.support import numbers
 
 TINY, HUGE = sys.float_info.min, sys.float_info.max
 ENDS = [5e-324, TINY, 1e-170, 1e-150, 1e-100, 1e-50, 1e-16, 0.5, 1.0, 2.0, 1e16, 1e50, 1e100, 1e150, HUGE]
@@ -333,3 +334,16 @@ def test_numbers_beyond_the_floats_are_refused():
 def test_a_switch_among_numbers_is_none_of_them(switch):
     with pytest.raises(ValueError, match="coefficients of Polynomial must be a number, got "):
         Polynomial([1.0, switch])
+
+
+def test_arrays_of_other_libraries_are_numbers():
+    """Such as those of HDF5 files: they do not become Python's objects."""
+
+    class Stored:
+        def __array__(self, dtype=None, copy=None):
+            if dtype is not None and np.dtype(dtype).kind == "O":
+                raise TypeError
+            return np.array([0.0, 1e-3, 2e-3])
+
+    np.testing.assert_array_equal(Hertz(1e8, 1.0).force(Stored()), [0.0, 1e5, 2e5])
+    np.testing.assert_array_equal(numbers("z", Stored(), "here", ""), [0.0, 1e-3, 2e-3])

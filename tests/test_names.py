@@ -15,7 +15,7 @@ import solvers
 from contacts import Hertz, Jenkins, KelvinVoigt, Polynomial
 from fembeam.plot.axis_names import axis_name
 from fembeam.results import files, html_page
-from fembeam.scene import path_of, value_of, with_value
+from fembeam.scene import keys_of, path_of, value_of, with_value
 from fembeam.scene_file import SceneFileError, json_schema
 
 STEEL = fb.Section.circle(E=2.1e11, rho=7800.0, diameter=0.01)
@@ -91,7 +91,7 @@ def test_files_tell_a_stop_from_one_that_is_called_as_it_would_be(tmp_path):
     """The made name of the second column took the place of the first one, whose history was lost."""
     stops = [fb.Stop(0.5, Hertz(1e7), name="stop 1"), fb.Stop(0.4, Hertz(1e7))]
     run = cantilever(stops=stops).reduce(modes=1).simulate(1e-3, 1e-3)
-    assert [run.key(i) for i in range(2)] == ["stop 1", "stop 1 (2)"]
+    assert [run.key(i) for i in range(2)] == ["stop 1", "stop 1 (2)"] == list(keys_of(run.model.contact_rows))
     histories, _ = run.to_csv(tmp_path, quantities=["force"])
     head = next(csv.reader(histories.open(encoding="utf-8")))
     assert head[-2:] == ["force stop 1 [N]", "force stop 1 (2) [N]"]

@@ -494,6 +494,14 @@ def test_tables_are_checked_when_read(file_of, old, new, said):
         file_of(FILE.replace(old, new))
 
 
+def test_places_of_quantities_are_those_of_the_scenes_that_run(file_of):
+    """A place beyond the beam of the file was refused, though all that run are longer."""
+    longer = FILE[: FILE.index("[minimise]")].replace("amplitude = [1e-3]", '"beam.length" = [0.6, 0.7]')
+    assert "vary" in file_of(longer.replace("z = 0.5 }]", "z = 0.55 }]")).studies
+    with pytest.raises(scene_file.tables.SceneFileError, match=r"z must lie on the beam, 0 to 0\.6 m, got"):
+        file_of(longer.replace("z = 0.5 }]", "z = 0.65 }]"))
+
+
 # --- bad input --------------------------------------------------------------------------------------------------------
 
 

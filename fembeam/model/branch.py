@@ -59,7 +59,7 @@ class Family:
 
     def _followed(self, parameter: float, model: Model) -> Model:
         """The model with signs followed from the nearest one known, in steps within which shapes stay alike."""
-        at = min(self.known, key=lambda one: abs(one - parameter))
+        at = min(tuple(self.known), key=lambda one: abs(one - parameter))  # other threads may add some
         near, step = self.known[at], parameter - at
         least = SHORTEST * abs(step)
         while likeness(model, near) < ALIKE:

@@ -368,7 +368,7 @@ def _check_smooth(models: Nearby, path: str) -> None:
 
 def _check_turned(models: Nearby, path: str, omega: Vector) -> None:
     """The same of modes that are turned among themselves, by K and C in units of each mode's frequency."""
-    size = np.where(omega > 0.0, omega, omega.max())
+    size = np.where(omega > 0.0, omega, omega.max() or 1.0)
     scale = np.outer(size, size)
     of_matrices = (lambda one: one.system.K / scale), (lambda one: one.system.C / np.sqrt(scale))
     rough = max(map(models.disagreement, (*of_matrices, lambda one: one.directions)))

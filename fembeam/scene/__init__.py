@@ -13,6 +13,7 @@ from fembeam.scene.contact_rows import (
     carried_on,
     contact_rows,
     heights,
+    keys_of,
     load_signals,
     loaded,
     loads,

@@ -11,7 +11,7 @@ With friction there is a further row: along the tangent t of a stop, of the rota
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -124,6 +124,13 @@ class ContactRow:
 def made_key(number: int, always: bool, rotation: bool) -> str:
     """What files call a contact without a name: "stop 0", "element 2 (rotation)"."""
     return f"{'element' if always else 'stop'} {number}" + " (rotation)" * rotation
+
+
+def keys_of(rows: Sequence[ContactRow]) -> tuple[str, ...]:
+    """What files call these contacts, with "(2)" behind a made name that another one was given."""
+    given = {row.name for row in rows if row.given}
+    made = ((row, row.key(i)) for i, row in enumerate(rows))
+    return tuple(key + " (2)" * (not row.given and key in given) for row, key in made)
 
 
 def contact_rows(scene: Scene, matrices: Matrices) -> list[ContactRow]:

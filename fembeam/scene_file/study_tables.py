@@ -98,7 +98,7 @@ class ModeStudy:
             check_goal(asked["tolerance"], asked.get("most", MOST))
         runs = {name: asked[name] for name in ("duration", "dt", "discard") if name in asked}
         Plan(**runs, seeds=self.seeds).check(scene, named(asked["quantity"]))
-        _check_place(scene, getattr(named(asked["quantity"]), "z", None))
+        _check_place_of(named(asked["quantity"]), scene)
 
     def check_run(self, file: SceneFile, model: Model) -> None:
         """Raise ValueError for more modes than there are."""
@@ -338,6 +338,12 @@ def _check_place(scene: Scene, z: Place | None) -> None:
     """Raise ValueError for a place, if one is given, that does not exist."""
     if z is not None:
         _check_places(scene, [z], "z")
+
+
+def _check_place_of(quantity: Any, scene: Scene) -> None:
+    """Raise ValueError where a quantity asks for a place that does not exist; of joined bodies the run tells."""
+    if not scene.joints:
+        _check_place(scene, getattr(quantity, "z", None))
 
 
 @dataclass(frozen=True)
@@ -827,9 +833,9 @@ def _plan_of(table: VaryTable | MinimiseTable) -> dict[str, Any]:
 def _check_trials(table: VaryTable | MinimiseTable, scene: Scene, names: list[str], asked: Any, points: Any) -> None:
     """Raise ValueError unless the scene can be made and run at these points."""
     trial = Trial.of(scene, names, asked, Plan(**_plan_of(table)), {})
-    trial.check(points)
-    for _, quantity in trial.asked.parts:
-        _check_place(scene, getattr(quantity, "z", None))
+    for one in trial.check(points):
+        for _, quantity in trial.asked.parts:
+            _check_place_of(quantity, one)
 
 
 def _check_workers(workers: int) -> None:

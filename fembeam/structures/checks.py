@@ -54,7 +54,7 @@ def real(name: str, values: Any, where: str) -> Any:
     right = kind in "iufc" and not has_switches(given)
     require(right, f"{name} must be numbers", values, where, "give an array of them")
     size = np.abs(np.asarray(given))
-    largest = float(size[np.isfinite(size)].max(initial=0.0))
+    largest = float(size.max(initial=0.0, where=np.isfinite(size)))
     require(largest <= LARGEST, f"{name} must be finite", largest, where, "check units and the export")
     if kind != "c":
         return values

@@ -121,18 +121,16 @@ def bifurcation(
     state = model.rest() if start is None else np.asarray(start, dtype=float)
     require(state.shape == model.rest().shape, f"start must have shape {model.rest().shape}, [q, q_dot]", state.shape,
             "bifurcation", "use model.state(displacement, velocity)")  # fmt: skip
-    task = partial(_settled, model, path, place, settle, keep, state)
+    task = partial(_settled, Family(model, path, 1), place, settle, keep, state)
     results = spread(task, list(values), executor, "bifurcation")
     strobes, peaks = (np.array([result[i] for result in results]) for i in (0, 1))
     told = axis_name(path, model.scene), parameter_unit(path, model.scene)
     return Bifurcation(path, place, values, strobes, peaks, *told)
 
 
-def _settled(
-    model: Model, path: str, z: Any, settle: int, keep: int, start: Vector, value: float
-) -> tuple[Vector, Vector]:
+def _settled(family: Family, z: Any, settle: int, keep: int, start: Vector, value: float) -> tuple[Vector, Vector]:
     """States and peaks of the periods kept."""
-    model = Family(model, path, 1).at(value)
+    model = family.at(value)
     T, n = load_period(model.scene), len(model.omega)
     method = solvers.Exponential(1e-8, ledger=False)
     # settling needs no samples; but it is one run: a restart would forget the entry rate of a contact under way

@@ -84,6 +84,13 @@ class Change:
         return np.asarray(getattr(self.found, name)[self.mine])
 
     @cached_property
+    def omega(self) -> Vector:
+        """(n,) of the natural frequencies."""
+        models = self.found.models
+        size = len(self.found.run.readout.model.omega)
+        return np.zeros(size) if models is None else models.derivative(lambda one: one.omega)
+
+    @cached_property
     def stiffness(self) -> Vector:
         """(n, n) of the matrix K on the coordinates."""
         size, systems = len(self.found.run.readout.model.omega), self.found.systems

@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam import plot
 from fembeam.model import Model, Run, places
-from fembeam.scene import signals_of, turns_at, unit_of
+from fembeam.scene import keys_of, signals_of, turns_at, unit_of
 from fembeam.statistics import Batches, Estimate, Impacts, Signal
 from fembeam.statistics.initial_transient import Settling, settling
 from fembeam.statistics.spectra import FEWEST_OF_SLOW, FINEST_RESOLUTION
@@ -284,7 +284,7 @@ def stationary(
 def _identity(plan: Segments, sums: Sums, discard: Any, start: Any) -> dict[str, str]:
     """What the segments depend on, seeds among it, as texts that can be compared."""
     asked = [plan.duration, plan.dt, discard, None if start is None else np.asarray(start), plan.solver]
-    asked += [sums.segment, sums.bins, sums.levels]
+    asked += [sums.segment, sums.bins, sums.levels, sums.touching]
     about = model_identity(plan.model) | {"watch": f"{', '.join(sums.watched)} #{fingerprint(sums.watched, 'watch')}"}
     return about | {"stationary": f"{plan.duration:g} s, dt = {plan.dt:g} s #{fingerprint(asked, 'stationary')}"}
 
@@ -555,7 +555,7 @@ class Sums:
     def response(self, plan: Segments, settled: Settling | None, enough: bool | None) -> Response:
         """The statistics so far."""
         seen = self.signals, self.impacts, plan.kept, plan.discarded, settled, enough, plan.seconds
-        names = tuple(row.key(i) for i, row in enumerate(self.contacts))
+        names = keys_of(self.contacts)
         rubbing = tuple(row.rub[1] > 0.0 for row in self.contacts)
         rotations = tuple(row.rotation for row in self.contacts)
         return Response(*seen, names, self.work, rubbing, rotations, self.touching)

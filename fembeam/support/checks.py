@@ -152,7 +152,12 @@ def has_switches(values: Any) -> bool:
     """
     if isinstance(values, np.ndarray) and values.dtype != object:
         return values.dtype == bool
-    return any(isinstance(one, (bool, np.bool_)) for one in np.asarray(values, dtype=object).ravel().tolist())
+    if not isinstance(values, (list, tuple, np.ndarray)):
+        return isinstance(values, (bool, np.bool_))
+    listed = values.ravel().tolist() if isinstance(values, np.ndarray) else values
+    kinds = set(map(type, listed))  # of many numbers quicker than each by itself
+    nested = not kinds.isdisjoint((list, tuple, np.ndarray))
+    return not kinds.isdisjoint((bool, np.bool_)) or (nested and any(map(has_switches, listed)))
 
 
 def vector(

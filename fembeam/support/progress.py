@@ -7,10 +7,15 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from fembeam.support.checks import require_switch
+from fembeam.support.checks import require
 
 WHERE = "a run or study"
 SIMULATED = "{percentage:3.0f}%|{bar}| {n:.4g}/{total:.4g} s simulated [{elapsed}<{remaining}]"
+
+
+def _check(wanted: Any) -> None:
+    """ValueError for text, which counts as true."""
+    require(not isinstance(wanted, str), "progress must be True or False", wanted, WHERE, "without quotes")
 
 
 @contextmanager
@@ -18,7 +23,7 @@ def bar(duration: float, wanted: bool) -> Iterator[Callable[[float], None]]:
     """A progress bar over simulated seconds; where signals that waited are handled."""
     from fembeam.support import interrupts
 
-    require_switch("progress", wanted, WHERE)
+    _check(wanted)
     if not wanted:
         yield lambda _: interrupts.check()
         return
@@ -33,13 +38,13 @@ def bar(duration: float, wanted: bool) -> Iterator[Callable[[float], None]]:
 
 def titled(wanted: bool, title: str) -> str | None:
     """The name of a bar that is shown elsewhere, None for no bar."""
-    require_switch("progress", wanted, WHERE)
+    _check(wanted)
     return title if wanted else None
 
 
 def counting(wanted: bool, *items: Any, **options: Any) -> Any:
     """The bar of tqdm, with its arguments: of widgets in a notebook that has them, else of text."""
-    require_switch("progress", wanted, WHERE)
+    _check(wanted)
     if not wanted:
         from tqdm import tqdm
 
