@@ -249,9 +249,7 @@ def stationary(
     segment = segment or default_segment(dt)
     solver = solver or solvers.Exponential(1e-8, ledger=False)
     plan = Segments.of(model, duration, dt, discard, start, solver, segment)
-    known = {name: (look, "") for name, look in watch.items()} if watch else watched_by_default(model)
-    watched = {name: look for name, (look, _) in known.items()}
-    units = {name: unit for name, (_, unit) in known.items()}
+    watched, units = _watched(model, watch)
     sums = Sums(watched, units, model.contact_rows, dt, segment, dict(bins or {}), dict(levels or {}))
     kept = Checkpoint(checkpoint, partial(_identity, plan, sums, discard, start))
     settled, enough = _resumed(kept, plan, sums), None if until is None else False
@@ -279,6 +277,12 @@ def stationary(
     response = sums.response(plan, settled, enough)
     note("%r, %.4g s before it left out", response, response.discarded)
     return response
+
+
+def _watched(model: Model, watch: Mapping[str, Watch] | None) -> tuple[dict[str, Watch], dict[str, str]]:
+    """What is looked at by name, and its units, which of a user's own functions are not known."""
+    known = {name: (look, "") for name, look in watch.items()} if watch else watched_by_default(model)
+    return {name: look for name, (look, _) in known.items()}, {name: unit for name, (_, unit) in known.items()}
 
 
 def _identity(plan: Segments, sums: Sums, discard: Any, start: Any) -> dict[str, str]:
