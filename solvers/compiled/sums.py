@@ -39,12 +39,12 @@ def add_response(rows, force, delta, rate):
 
 
 @inlined
-def iterate_power_law(rows, free, force, motion, stiffness, rooted, damping, viscosity):
+def iterate_power_law(rows, free, force, motion, stiffness, rooted, damping, viscosity, cut):
     """One fixed-point iteration for the forces at eight nodes; returns Σ change² and Σ force², N².
 
     ``rows`` (8, 16) are δ and δ̇ at all nodes per unit force at a node. Motion free + Σ_e force[e] rows[e] is written
     to ``motion`` (2, 8), the new forces K d (1 + a δ̇) + c δ̇ to ``force`` (8,), with d = max(δ, 0), or d^{3/2} if
-    ``rooted``.
+    ``rooted``, raised to zero if ``cut``.
     """
     old = load8(force, 0)
     delta, rate = add_response(rows, force, load8(free[0], 0), load8(free[1], 0))
@@ -54,6 +54,8 @@ def iterate_power_law(rows, free, force, motion, stiffness, rooted, damping, vis
     if rooted:
         deep = deep * sqrt8(deep)
     new = splat8(stiffness) * deep * (splat8(1.0) + splat8(damping) * rate) + splat8(viscosity) * rate
+    if cut:
+        new = positive8(new)
     store8(force, 0, new)
     change = new - old
     return sum8(change * change), sum8(new * new)

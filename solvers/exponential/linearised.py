@@ -81,7 +81,7 @@ from solvers.exponential.circles.friction_derivative import (
     latch_begin,
     pass_slider,
 )
-from solvers.exponential.contact.crossings import FORCE, side_at
+from solvers.exponential.contact.crossings import side_at
 from solvers.exponential.contact.landing_step import landing_step, start_landing
 from solvers.exponential.contact.node_response import LANDED, START
 from solvers.exponential.linearised_border import pass_border
@@ -95,6 +95,7 @@ from solvers.exponential.linearised_step import (
 )
 from solvers.exponential.preparation import SCRATCH, TABLES
 from solvers.exponential.responses import propagate
+from solvers.exponential.tables import FORCE
 from solvers.problem.friction import CODE, FREE, SLIDES
 
 _OFF = 1e-10  # relative distance from a knot at which a law is evaluated on one side of it

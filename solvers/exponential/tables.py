@@ -28,6 +28,7 @@ from solvers.exponential.phi_functions import quintic_responses, signal_response
 from solvers.exponential.responses import fill_propagators
 
 STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # places in `Tables.power_law`
+RATE, FORCE = 1.0, 2.0  # kinds of bends in `Tables.bend`, named by their event function; 0 for a law without one
 TAYLOR_REACH = 0.02  # |λ| h up to which a Taylor step of order 6 is exact to rounding
 _MOST_RADIANS = 2000.0  # |λ| h of the largest contact step
 _CONTACT_REACH = 1e-6  # |λ| h of the smallest one, at most
@@ -61,7 +62,7 @@ class Tables(NamedTuple):
     own_blocks: Annotated[float, "number"]  # number of the structure's blocks; those behind them are tones
     accelerance: Annotated[Any, "R, R"]  # -δ̈ of row r per newton at row u, > 0 where the force opens the contact
     exponent: Annotated[Any, "E"]  # leading exponents p of the laws
-    power_law: Annotated[Any, "E, 4"]  # K, p, a, c of a force K δ^p (1 + a δ̇/δ̇⁻) + c δ̇; p = 0 for laws that are called
+    power_law: Annotated[Any, "E, 4"]  # K, p, a, c of K δ^p (1 + a δ̇/δ̇⁻) + c δ̇ before a cut; p = 0: the law is called
     contact_step: Annotated[Any, "j"]  # s, falling
     contact_propagator: Annotated[Any, "j, 2, N"]  # α, β of every block
     time_exponent: Annotated[Any, "f"]  # κ
@@ -94,18 +95,18 @@ class Tables(NamedTuple):
     steady_rate: Annotated[Any, "2*tones, own8"]  # blocks' steady rate by p, then v, of the tones; loss_rows: × √c
     gauss: Annotated[Any, "2+S, S"]  # points, weights on (0, 1); integrals to all points of each one's polynomial
     extrapolation: Annotated[Any, "f, 5, S, S"]  # force on the next smooth step, 2^{(i-2)/2} times shorter
-    bend: Annotated[Any, "E"]  # kind of the law's bend: 0 for none, else as named in `contact.crossings`
+    bend: Annotated[Any, "E"]  # kind of the law's bend: 0 for none, else as named above
     uncut: Annotated[Any, "int E"]  # addresses of the laws without their cut at F = 0
     uncut_gradient: Annotated[Any, "int E"]  # and of their derivatives
     uncut_parameters: Annotated[Any, "E, P"]
 
 
 def law_tables_of(contacts: Sequence[Any]) -> dict[str, Any]:
-    """Entries of `Tables` from the laws of contacts, see `problem.system.Law`. Laws that always act are not inlined."""
+    """Entries of `Tables` from the laws of contacts, see `problem.system.Law`."""
     laws = [contact.law for contact in contacts]
-    inlined = [None if contact.always else getattr(contact.law, "inlined", None) for contact in contacts]
     bends = [getattr(law, "bend", None) for law in laws]
     uncut = [_uncut(law) for law in laws]
+    inlined = [_inlined(contact) for contact in contacts]
     return {
         "exponent": np.array([law.exponent for law in laws], dtype=float),
         "power_law": np.array([own or (0.0,) * 4 for own in inlined]).reshape(-1, 4),
@@ -114,6 +115,12 @@ def law_tables_of(contacts: Sequence[Any]) -> dict[str, Any]:
         "uncut_gradient": np.array([law.gradient_address for law in uncut], dtype=np.int64),
         "uncut_parameters": parameters_of(uncut),
     }
+
+
+def _inlined(contact: Any) -> Any:
+    """Parameters of a power law that need not be called, before its cut at F = 0; None of others."""
+    law = contact.law if contact.friction is not None else _uncut(contact.law)
+    return None if contact.always else getattr(law, "inlined", None)
 
 
 def _uncut(law: Any) -> Any:

@@ -39,7 +39,7 @@ from solvers.compiled.sums import above
 from solvers.exponential.contact.many_stops import pair_response
 from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.step_integrals import resolves_rates, work_by_places, work_by_rates
-from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
+from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, FORCE, STIFFNESS
 
 _TINY = 1e-300  # m²: makes δ̇ at the centre, where there is no direction, 0 instead of NaN
 
@@ -80,7 +80,8 @@ def _radial_forces(problem, tables, state, scratch, s):
         deep, rate = positive8(load8(motion[0], 0)), load8(motion[1], 0)
         deep = deep * sqrt8(deep) if law[EXPONENT] == 1.5 else deep
         growth = splat8(1.0) + splat8(law[FACTOR] / state.entry_rate[s]) * rate
-        store8(force, 0, splat8(law[STIFFNESS]) * deep * growth + splat8(law[DAMPING]) * rate)
+        push = splat8(law[STIFFNESS]) * deep * growth + splat8(law[DAMPING]) * rate
+        store8(force, 0, positive8(push) if tables.bend[s] == FORCE else push)
     else:
         above(motion[0], problem.knots[s, 0], scratch.clipped)
         law_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], force)

@@ -75,7 +75,7 @@ from solvers.exponential.contact.node_response import (
     unresolved_signal,
 )
 from solvers.exponential.contact.nodes import AT_BEGIN, AT_END, S
-from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
+from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, FORCE, STIFFNESS
 from solvers.problem.friction import STIFFNESS as FRICTION_STIFFNESS
 
 _END_ERROR, _INNER_ERROR = 1.5e-19, 2.7e-11  # of ẍ = -ω² x: at the end, over (ωh)^17; inside, over (ωh)^9; ωh < 6
@@ -159,12 +159,12 @@ def solve_forces(problem, tables, state, scratch, node_set, level):
     law, row, unit = tables.power_law[s], row_of(problem, s), 1.0 / scratch.force_tolerance[s] ** 2
     own = pair_response(problem, tables, scratch, node_set, level, row, row)
     stiffness, rooted, damping = law[STIFFNESS], law[EXPONENT] == 1.5, law[DAMPING]
-    factor = law[FACTOR] / state.entry_rate[s]
+    factor, cut = law[FACTOR] / state.entry_rate[s], tables.bend[s] == FORCE
     for iteration in range(MOST_ITERATIONS):
         if alone >= 0:
             change, largest = iterate_power_law(
                 *(own, scratch.free[row], scratch.force[row], scratch.motion[row]),
-                *(stiffness, rooted, factor, damping),
+                *(stiffness, rooted, factor, damping, cut),
             )
             change, largest = change * unit, largest * unit
             state.count[CALLS] += S

@@ -54,8 +54,8 @@ from solvers.exponential.contact.node_response import (
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import largest_indentation, maximum_and_place, motion_around
 from solvers.exponential.flight import energy_norms
+from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, FORCE, RATE, STIFFNESS
 
-RATE, FORCE = 1.0, 2.0  # kinds of bends in Tables.bend, named by their event function; 0 for a law without one
 CLEAR, TOO_LONG = -1, -2  # results of `before_landing`: no other event, or one that requires shorter steps
 # event functions of bends, and margins of borders, in units of their largest on the step:
 ROUNDING = 1e-11  # up to which they may be rounding
@@ -218,10 +218,21 @@ def time_of_place(tables, node_set, h, i, place):
 
 
 @inlined
+def power_force(tables, s, delta, rate, entry_rate):
+    """Force, N, of stop s by its power law before a cut at zero, without a call; δ >= 0."""
+    law = tables.power_law[s]
+    elastic = law[STIFFNESS] * (delta * math.sqrt(delta) if law[EXPONENT] == 1.5 else delta)
+    return elastic * (1.0 + law[FACTOR] / entry_rate * rate) + law[DAMPING] * rate
+
+
+@inlined
 def _sides(tables, state, s, n, delta, rate, out):
     """Event function of a bend, δ̇ or the force before its cut, at n points with δ >= 0, into ``out``."""
     if tables.bend[s] == RATE:
         copy(rate, out, n)
+    elif tables.power_law[s, EXPONENT] > 0.0:
+        for i in range(n):
+            out[i] = power_force(tables, s, delta[i], rate[i], state.entry_rate[s])
     else:
         call_force(tables.uncut[s], n, delta, rate, state.entry_rate[s], tables.uncut_parameters[s], (out,))
 

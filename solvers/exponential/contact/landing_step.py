@@ -38,10 +38,10 @@ from solvers.compiled.parts import LANDING_STEP, part
 from solvers.compiled.simd import WIDTH, load8, splat8, store8
 from solvers.compiled.state import T
 from solvers.compiled.sums import combine
-from solvers.exponential.contact.crossings import FORCE
+from solvers.exponential.contact.crossings import power_force
 from solvers.exponential.contact.node_response import BATCH, LANDED, SHORT, START
 from solvers.exponential.energy.quadrature import powers
-from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, STIFFNESS
+from solvers.exponential.tables import EXPONENT, FORCE
 
 INDENTATION, ROOT, TIME, SINCE = range(4)
 MIDPOINT = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 1.0]])
@@ -66,11 +66,8 @@ def _force_of_law(problem, tables, s, segment, delta, delta_dot, side, entry_rat
 @merged
 def _force(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batch):
     """Force, N, of stop s; power laws are evaluated here, others called. No cut at zero acts within the step."""
-    law = tables.power_law[s]
-    if law[EXPONENT] > 0.0:
-        deep = max(delta, 0.0)
-        deep = law[STIFFNESS] * (deep * math.sqrt(deep) if law[EXPONENT] == 1.5 else deep)
-        return deep * (1.0 + law[FACTOR] / entry_rate * delta_dot) + law[DAMPING] * delta_dot
+    if tables.power_law[s, EXPONENT] > 0.0 and (tables.bend[s] != FORCE or side > 0.0):
+        return power_force(tables, s, max(delta, 0.0), delta_dot, entry_rate)
     return _force_of_law(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batch)
 
 
