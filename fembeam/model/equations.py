@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
@@ -92,6 +92,7 @@ class ModalEquations:
     shapes: Any  # Shapes, of a body with places by name PlacedShapes
     counts: tuple[tuple[int, int], ...]
     others: tuple[Any, ...] = ()
+    reduction_options: dict[str, Any] = field(default_factory=dict)
 
     @property
     def omega(self) -> Vector:

@@ -9,7 +9,7 @@ every impactor.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -65,8 +65,6 @@ class Model(Printed, ModalEquations):
     static_share : part of the static compliance that the model keeps at every stop, every element, then at every
         force; 1 is all.
     """
-
-    reduction_options: dict[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         ends = dict.fromkeys(f"{omega:.6g}" for omega in (self.omega.min(), self.omega.max()))

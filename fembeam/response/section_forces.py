@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 Vector = NDArray[np.float64]
 
 BALANCED = 1e-6  # relative: K v = ω² M v holds, the vector is a mode
+STILL = 1e-9  # relative: a place does not move
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +98,9 @@ def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | Fram
     vectors = model.basis.vectors[mine]
     places = (at.row(beam) for at in loaded(model.scene, body))
     rows = sparse.vstack([sparse.csr_matrix((0, beam.M.shape[0])), *places, *beam.following_loads])
-    inertia, load = _inertia(beam, vectors, model.omega, rows.toarray().T)
+    done = sum(map(sum, model.counts[:body]))
+    modes, held = slice(done, done + model.counts[body][0]), model.reduction_options.get("interface", False)
+    inertia, load = _inertia(beam, vectors, model.omega, modes, held, rows.toarray().T)
     inertia, carried = beam.spread @ inertia, carried_on(model.scene, beam, body)
     moved = np.hstack([beam.spread @ vectors, carried])
     # less the inertia of the shapes which follow supports: they have none
@@ -110,10 +113,14 @@ def section_forces(model: ModalEquations, body: int = 0) -> SectionForces | Fram
     return _of_vectors(beam, moved, inertia)
 
 
-def _inertia(beam: Matrices, vectors: Vector, omega: Vector, rows: Vector) -> tuple[Vector, Vector]:
+def _inertia(
+    beam: Matrices, vectors: Vector, omega: Vector, modes: slice, held: bool, rows: Vector
+) -> tuple[Vector, Vector]:
     """The inertia a (N, n) with K v = M a + point loads along rows (N, m), where static shapes are loaded, and K v.
 
-    Loads are fitted to the shapes that they make where K = RᵀR, else to K v, which has the rounding of K.
+    The a of a static shape is a motion in the `modes`, `held` where the rows are: of all shapes, a coarse mesh has more
+    than it tells apart. Loads are fitted to the shapes that they make where K = RᵀR, else to K v, which has the
+    rounding of K.
     """
     a = vectors * omega**2
     load = beam.K @ vectors
@@ -123,7 +130,12 @@ def _inertia(beam: Matrices, vectors: Vector, omega: Vector, rows: Vector) -> tu
         return a, beam.M @ a
     # static shapes, orthogonal to modes or not: point loads beside inertia of the basis
     rooted = isinstance(beam, BodyMatrices) and beam.root is not None
-    basis, rigid = (vectors[:, omega > 0.0], rigid_shapes(beam)) if rooted else (vectors, vectors[:, :0])  # type: ignore[arg-type]
+    rigid = rigid_shapes(beam) if rooted else vectors[:, :0]  # type: ignore[arg-type]
+    basis = vectors[:, modes]
+    if held:
+        basis = basis @ _still(rows.T @ basis)
+    elif rooted:
+        basis = basis[:, omega[modes] > 0.0]
     terms = np.hstack([beam.M @ basis, rows])
     if rooted:
         shapes = reduction.static_shapes(beam.M, beam.K, terms, rigid, beam.root)
@@ -134,6 +146,14 @@ def _inertia(beam: Matrices, vectors: Vector, omega: Vector, rows: Vector) -> tu
     a[:, others] = basis @ found[: basis.shape[1]] - carried
     acting[:, others] = terms @ found - beam.M @ carried
     return a, acting
+
+
+def _still(moved: Vector) -> Vector:
+    """Combinations (n, k) of n shapes that do not move the places (m, n)."""
+    from scipy.linalg import null_space
+
+    size = np.linalg.norm(moved, axis=1)
+    return np.asarray(null_space(moved[size > 0] / size[size > 0, None], rcond=STILL))
 
 
 def _fitted(terms: Vector, given: Vector, least: float) -> Vector:
