@@ -126,24 +126,32 @@ class Part:
         return 1.0 / eigh(self.G[inside], self.K[inside], eigvals_only=True)[-1]
 
     def basis(self, how: Table, loaded: list[Any]) -> tuple[Any, Any, Any]:
-        """ω, vectors on all dofs and mode numbers; static shapes under the rows in ``loaded`` included."""
+        """ω, vectors on all dofs and mode numbers; static shapes under the rows in ``loaded`` included.
+
+        Kept beside: the inertia a of the vectors, K v = M a + loads along the rows.
+        """
         squares, vectors = self.free_modes()
         highest = squares[-1]
         chosen = how["modes"] if isinstance(how["modes"], list) else list(range(how["modes"]))
         rows = np.array(loaded).reshape(len(loaded), len(self.M))[:, self.free]
         kept, inside = vectors[:, chosen] if chosen else vectors[:, :0], np.ix_(self.free, self.free)
-        M, K = self.M[inside], self.K[inside]
+        M, K, inertia = self.M[inside], self.K[inside], kept * squares[chosen]
         if how.get("residual") and len(rows):
             others = [i for i in range(len(squares)) if i not in chosen]
+            inertia = np.hstack([inertia, -kept @ (kept.T @ rows.T)])
             kept = np.hstack([kept, (vectors[:, others] / squares[others]) @ vectors[:, others].T @ rows.T])
         if how.get("interface"):
             inner = null_space(rows)
-            _, held = eigh(inner.T @ K @ inner, inner.T @ M @ inner)
-            kept = np.hstack([inner @ held[:, : len(chosen)], np.linalg.solve(K, rows.T)])
-        kept = independent(kept, M)
+            apart, held = eigh(inner.T @ K @ inner, inner.T @ M @ inner)
+            held, n = inner @ held[:, : len(chosen)], len(chosen)
+            inertia = np.hstack([held * apart[:n], np.zeros(rows.T.shape)])
+            kept = np.hstack([held, np.linalg.solve(K, rows.T)])
+        given, kept = kept, independent(kept, M)
         squares, ritz = eigh(kept.T @ K @ kept, kept.T @ M @ kept)
-        whole = np.zeros((len(self.M), kept.shape[1]))
+        whole, self.inertia = np.zeros((2, len(self.M), kept.shape[1]))
         whole[self.free] = kept @ ritz
+        size = np.linalg.norm(given, axis=0)
+        self.inertia[self.free] = inertia / size @ np.linalg.lstsq(given / size, kept @ ritz, rcond=1e-12)[0]
         numbers = list(range(kept.shape[1]))
         if not how.get("interface"):
             numbers = [*chosen, *range(chosen[-1] + 1, chosen[-1] + 1 + kept.shape[1] - len(chosen))]

@@ -131,34 +131,36 @@ def settled(drawn: Drawn, model: fb.Model, whole: Whole, start: Any, rounding: f
 
 
 def sections(drawn: Drawn, whole: Whole, run: fb.Run, most: float) -> Check:
-    """Moments, shear and stress of modes: end forces of every element, K u - ω² M u, and a cubic between."""
-    if drawn.how.get("residual") or drawn.how.get("interface"):
-        return
+    """Moments, shear and stress: end forces of every element, K v - M a, and a cubic between; ahead of a point load."""
+    done = 0
     for body, part in enumerate(whole.parts):
-        e, x = 1, 0.37
-        mine, K, M = part.elements[e][0], part.elements[e][2], part.elements[e][1]
-        h = part.nodes[e + 1] - part.nodes[e]
-        shapes = whole.vectors[whole.starts[body] : whole.starts[body + 1]][mine]
-        forces = K @ shapes - M @ shapes * whole.omega**2  # on the element: shear and moment at both ends
-        moments = -forces[1], forces[3]
-        shears = np.array([forces[0], -forces[2]]) + part.beam.get("axial_force", 0.0) * shapes[[1, 3]]  # dM/dz
-        z, ends = part.nodes[e] + x * h, np.array([moments[0], shears[0], moments[1], shears[1]])
+        count, mine = part.inertia.shape[1], slice(whole.starts[body], whole.starts[body + 1])
+        shapes, own = whole.vectors[mine], []
+        inertia = np.zeros_like(shapes)
+        inertia[:, done : done + count] = part.inertia
+        done += count
+        for (dofs, M, K), a, b in zip(part.elements, part.nodes[:-1], part.nodes[1:], strict=True):
+            forces, N = K @ shapes[dofs] - M @ inertia[dofs], part.beam.get("axial_force", 0.0)
+            ends = np.array([-forces[1], forces[0] + N * shapes[dofs][1], forces[3], N * shapes[dofs][3] - forces[2]])
+            own += [[hermite(x, b - a, order) @ ends for order in (0, 1)] for x in (0.0, 0.37)]
+        z = (part.nodes[:-1, None] + np.diff(part.nodes)[:, None] * [0.0, 0.37]).ravel()
         for order, name in enumerate(("moment", "shear")):
-            yield f"{name} {body}", off_coordinates(run, whole, name, z, body, hermite(x, h, order) @ ends), most
-        _, _, A, I, c = at(part.beam, z)
-        if not math.isnan(c):
+            yield f"{name} {body}", off_coordinates(run, whole, name, z, body, np.array(own)[:, order]), most
+        numbers = np.array([at(part.beam, x) for x in z])
+        if not np.isnan(numbers).any():
+            _, _, A, I, c = numbers.T
             stress = run.moment(z, body) * c / I + part.beam.get("axial_force", 0.0) / A
             yield f"stress {body}", off(run.stress(z, body), stress), 1e-9
 
 
-def off_coordinates(run: fb.Run, whole: Whole, name: str, z: float, body: int, own: Any) -> float:
-    """A row of a field by its histories: signs of modes are those of participation or shapes."""
+def off_coordinates(run: fb.Run, whole: Whole, name: str, z: Any, body: int, own: Any) -> float:
+    """Rows of a field by its histories: signs of modes are those of participation or shapes."""
     model = run.model
     nodes = whole.parts[body].nodes
     places = np.linspace(0.0, nodes[-1], 17)
     mine, other = model.phi(places, 0, body), np.array([whole.phi(x, 0, body) for x in places])
     sign = np.sign(np.sum(mine * other, axis=0))
-    return off(getattr(run, name)(z, body), run.q @ (sign * own))
+    return off(getattr(run, name)(z, body), run.q @ (sign * own).T)
 
 
 def files(drawn: Drawn, run: fb.Run) -> Check:
