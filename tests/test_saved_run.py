@@ -3,6 +3,7 @@
 import json
 import sys
 import zipfile
+from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
@@ -11,6 +12,7 @@ from problems import STEEL, cubic
 
 import fembeam as fb
 from contacts import Hertz, Jenkins
+from fembeam import scene_file
 from fembeam.results.files import summary
 
 SQUARE = fb.Section.rectangle(2.1e11, 7850.0, 0.01, 0.01)
@@ -260,3 +262,20 @@ def test_quantities_of_a_run_are_those_of_its_file(tmp_path):
 def test_a_folder_is_no_saved_run(tmp_path):
     with pytest.raises(ValueError, match=r"is a folder: give the file of a run in it, .*run\.npz"):
         fb.load(tmp_path)
+
+
+@pytest.mark.parametrize("path", [None, 3, b"run.npz", "", ["run.npz"]])
+def test_what_is_no_path_is_refused_by_name(path, tmp_path):
+    run = fb.Scene(fb.Beam(0.5, STEEL), [fb.Clamped(0.0)]).reduce(1).simulate(0.1, 0.05)
+    for call, where in (
+        (fb.load, "load"),
+        (run.save, "Run.save"),
+        (run.to_csv, "Run.to_csv"),
+        (run.to_xdmf, "Run.to_xdmf"),
+        (run.to_vtu, "Run.to_vtu"),
+        (partial(fb.plot.animate, run), "animate"),
+        (fb.Record.from_csv, "Record.from_csv"),
+        (scene_file.read, "scene_file.read"),
+    ):
+        with pytest.raises(ValueError, match=rf"path must be text or a pathlib.Path, got .* in {where}; write e.g."):
+            call(path)

@@ -13,7 +13,6 @@ from contextlib import contextmanager, redirect_stdout
 from errno import ENOENT
 from io import StringIO
 from itertools import combinations, groupby, pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from fembeam.beams.beam import Beam
 from fembeam.beams.mesh import SHORTEST, divided
 from fembeam.beams.mesh_cards import abaqus_mesh, nastran_mesh
 from fembeam.beams.section import Section, Taper
-from fembeam.support import is_whole, require, warn, written_beside
+from fembeam.support import file_path, is_whole, require, warn, written_beside
 
 Vector = NDArray[np.float64]
 Names = list[set[str]]
@@ -68,10 +67,11 @@ def read_mesh(path: str | os.PathLike[str]) -> Any:
     """The file, or a ValueError that says why not."""
     import meshio
 
-    if not Path(path).is_file():
+    file = file_path(path, "read_mesh")
+    if not file.is_file():
         raise FileNotFoundError(ENOENT, "this mesh does not exist", f"{path}")
-    if reader := READERS.get(Path(path).suffix.lower()):
-        return reader(Path(path))
+    if reader := READERS.get(file.suffix.lower()):
+        return reader(file)
     said = StringIO()
     try:
         with _mended_reader(), redirect_stdout(said):
@@ -295,7 +295,7 @@ def to_mesh(beam: Beam, path: str | os.PathLike[str], elements: int = 100) -> di
     -------
     The `sections` with which `Beam.from_mesh` reads it back.
     """
-    target = Path(path)
+    target = file_path(path, "to_mesh")
     where, borders = "to_mesh", np.array(beam.borders)
     known = target.suffix in WRITERS
     require(known, f"the suffix must be one of {', '.join(WRITERS)}", target.suffix, where, "choose one")

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fembeam.excitation.record import Interpolation, Record
 from fembeam.excitation.samples import checked_samples, read_rows
-from fembeam.support import require_switch
+from fembeam.support import file_path, require_switch
 
 Vector = NDArray[np.float64]
 Unit = Literal["g", "m/s2", "cm/s2"]
@@ -80,7 +80,7 @@ def earthquake(
     np.float64(0.099957)
     """
     require_switch("baseline", baseline, "earthquake")
-    path = Path(path)
+    path = file_path(path, "earthquake")
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     found = _peer(text, path) or _cosmos(text, path)
     if found is None:

@@ -30,7 +30,7 @@ from fembeam.excitation.samples import (
     padded,
     read_rows,
 )
-from fembeam.support import number, require_switch
+from fembeam.support import file_path, number, require_switch
 
 Quantity = Literal["displacement", "acceleration", "force"]
 Interpolation = Literal["spectral", "linear"]
@@ -180,7 +180,7 @@ class Record:
         ValueError
             No numeric row, or a row that is not numeric after the first one (with its line number).
         """
-        rows = read_rows(Path(path), columns)
+        rows = read_rows(file_path(path, "Record.from_csv"), columns)
         scaled = rows[:, 1] * number("scale", scale)
         try:
             return cls(rows[:, 0], scaled, band, quantity, detrend, interpolation, padding, kind=kind)

@@ -17,7 +17,18 @@ from fembeam.model.equations import load_period
 from fembeam.model.orbit import Orbit, checked_period, orbit
 from fembeam.model.reduce import likeness, signed_like
 from fembeam.scene import changes_structure, path_of, replaced, value_of
-from fembeam.support import Part, Printed, changes, counting, note, numbers, require, write_rows, written_whole
+from fembeam.support import (
+    Part,
+    Printed,
+    changes,
+    counting,
+    file_path,
+    note,
+    numbers,
+    require,
+    write_rows,
+    written_whole,
+)
 from fembeam.support.fingerprint import fingerprint
 from solvers.branches import recorded, restarted
 from solvers.problem import counted, dataframe
@@ -179,7 +190,7 @@ class Branch(Printed):
 
     def to_csv(self, path: str | Path) -> None:
         """Write the table, units in the heads of its columns; the file is written whole or not at all."""
-        write_rows(Path(path), self.table(), self._units())
+        write_rows(file_path(path, "Branch.to_csv"), self.table(), self._units())
 
     def _units(self) -> dict[str, str]:
         """Units of the columns that have one."""
@@ -211,7 +222,7 @@ class Branch(Printed):
             **{"scene": repr(model.scene), "digest": _digest(model)},
             **{"modes": list(model.modes), "omega": model.omega.tolist(), "walks": recorded(self.found)},
         }
-        with written_whole(Path(path)) as file:
+        with written_whole(file_path(path, "Branch.save")) as file:
             np.savez_compressed(file, branch=np.array(json.dumps(record)))
 
 

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam.response import Histories, PlacedLog
 from fembeam.scene import Source
-from fembeam.support import Part, Printed
+from fembeam.support import Part, Printed, file_path
 from solvers.integration import loads_taken
 from solvers.problem import counted
 
@@ -228,7 +228,7 @@ class Run(Histories, Printed):
         """
         from fembeam.model.run_csv import write
 
-        return write(self, Path(folder), stride, **chosen)
+        return write(self, file_path(folder, "Run.to_csv"), stride, **chosen)
 
     def to_dataframe(self, stride: int = 1, **chosen: Any) -> Any:
         """The same histories as a table of pandas over t; ImportError without pandas."""
@@ -254,4 +254,4 @@ class Run(Histories, Printed):
         """
         from fembeam.model.run_file import save
 
-        return save(self, Path(path))
+        return save(self, file_path(path, "Run.save"))

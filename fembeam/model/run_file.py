@@ -28,7 +28,7 @@ from fembeam.response import (
     unpacked,
 )
 from fembeam.scene import Source
-from fembeam.support import tuples, versions, written_whole
+from fembeam.support import file_path, tuples, versions, written_whole
 from solvers.problem import FrictionLog, Losses, Transitions, columns_of, optional
 
 FORMAT = 5
@@ -196,10 +196,11 @@ def load(path: str | os.PathLike[str]) -> Run:
     >>> again.status, len(again.t)
     ('finished', 11)
     """
-    if Path(path).is_dir():
-        raise ValueError(f"{path} is a folder: give the file of a run in it, {Path(path) / 'run.npz'}")
+    file = file_path(path, "load")
+    if file.is_dir():
+        raise ValueError(f"{path} is a folder: give the file of a run in it, {file / 'run.npz'}")
     try:
-        return _of_arrays(*_read(Path(path)), Path(path))
+        return _of_arrays(*_read(file), file)
     except _OtherFormatError as error:
         raise ValueError(f"{path} {error}") from None
     except (FileNotFoundError, ImportError):

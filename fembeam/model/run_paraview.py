@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from fembeam.response import rows_of
 from fembeam.structures import FrameForces
-from fembeam.support import is_whole, require, require_switch, written_beside
+from fembeam.support import file_path, is_whole, require, require_switch, written_beside
 from solvers.problem import optional
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def to_xdmf(run: Run, path: str | os.PathLike[str], stride: int = 1, hdf5: bool 
     require_switch("hdf5", hdf5, "Run.to_xdmf")
     h5py = optional("h5py", "XDMF with HDF5 data") if hdf5 else None
     samples, points, cells, values = _samples(run, stride), *_geometry(run), _fields(run)
-    target = _target(Path(path), ".xdmf")
+    target = _target(file_path(path, "Run.to_xdmf"), ".xdmf")
     with written_beside(target) as draft:
         writer: Any = TimeSeriesWriter(draft, data_format="HDF" if hdf5 else "XML")
         writer.numpy_to_xml_string = _as_text if h5py is None else writer.numpy_to_xml_string
@@ -80,7 +80,7 @@ def to_vtu(run: Run, path: str | os.PathLike[str], sample: int = -1, stride: int
     def write(target: str, number: int) -> None:
         meshio.write(target, meshio.Mesh(points, cells, point_data=values(number)), file_format="vtu")
 
-    path = Path(path)
+    path = file_path(path, "Run.to_vtu")
     if stride is None:
         target = _target(path, ".vtu")
         with written_beside(target) as draft:

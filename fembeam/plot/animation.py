@@ -15,7 +15,7 @@ from fembeam.plot.run_signals import samples_in
 from fembeam.plot.style import BLUE, GREY, ORANGE, RED, entry, own_colour, styled
 from fembeam.plot.units import length_for, unit_for
 from fembeam.scene import ON
-from fembeam.support import counting, require, written_beside
+from fembeam.support import counting, file_path, require, written_beside
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -64,7 +64,7 @@ def animate(
     """
     from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 
-    target = Path(path)
+    target = file_path(path, "animate")
     known = target.suffix in (".gif", ".mp4")
     require(known, "the suffix must be .gif or .mp4", target.suffix, "animate", "choose one")
     able = target.suffix == ".gif" or FFMpegWriter.isAvailable()

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 from fembeam.scene import Scene, Source
 from fembeam.scene_file.study_tables import STUDIES
 from fembeam.scene_file.tables import SceneFileError, TableReader
+from fembeam.support import file_path
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -91,7 +92,8 @@ def read(path: str | Path, overrides: Sequence[str] = ()) -> SceneFile:
     >>> read(path).scene.supports
     (Clamped(z=0.0),)
     """
-    return built(replace(source := _source(Path(path)), overrides=(*source.overrides, *overrides)), overrides)
+    source = _source(file_path(path, "scene_file.read"))
+    return built(replace(source, overrides=(*source.overrides, *overrides)), overrides)
 
 
 def _source(path: Path) -> Source:

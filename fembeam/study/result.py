@@ -6,13 +6,12 @@ import os
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from fembeam.model import Model, Run
-from fembeam.support import Printed, write_rows
+from fembeam.support import Printed, file_path, write_rows
 from solvers.problem import dataframe
 
 if TYPE_CHECKING:
@@ -45,7 +44,7 @@ class Result(Printed, ABC):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the table as CSV, with units where they are known, whole or not at all."""
-        write_rows(Path(path), self.table(), self._units())
+        write_rows(file_path(path, "save"), self.table(), self._units())
 
     def plain(self) -> dict[str, Any]:
         """What was found as JSON has it, without models, runs and functions."""

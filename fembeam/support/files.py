@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from fembeam.support.cards import included_files
+from fembeam.support.checks import require
 
 DRAFT = ".part"  # end of the name of a file that is not complete
 MAPPING = (".mapping", ".MAPPING")  # of Harwell–Boeing files
@@ -29,6 +30,20 @@ def read_with(path: Path) -> Iterator[str]:
             yield path.with_suffix(suffix).name
     if path.suffix.lower() == ".inp" and path.is_file():
         yield from included_files(path)
+
+
+def file_path(given: Any, where: str) -> Path:
+    """What was given as a path, or ValueError.
+
+    Examples
+    --------
+    >>> file_path(None, "load")
+    Traceback (most recent call last):
+    ValueError: path must be text or a pathlib.Path, got None in load; write e.g. 'results/run'
+    """
+    right = isinstance(given, (str, os.PathLike)) and isinstance(os.fspath(given), str) and os.fspath(given) != ""
+    require(right, "path must be text or a pathlib.Path", given, where, "write e.g. 'results/run'")
+    return Path(given)
 
 
 @contextmanager

@@ -21,6 +21,7 @@ from fembeam.structures.readers.matrix_market import HEAD, read_matrix_market
 from fembeam.structures.readers.node_files import read_nodes
 from fembeam.structures.readers.npz import label_of, read_npy, read_npz
 from fembeam.structures.readers.op4 import HEADS, read_op4
+from fembeam.support import file_path
 
 Source: TypeAlias = str | os.PathLike[str] | tuple[str | os.PathLike[str], str]
 SUFFIXES: dict[str, Callable[[Path], Given]] = {
@@ -55,7 +56,7 @@ def read_matrices(path: str | os.PathLike[str]) -> Given:
     >>> given.labels, given.matrix("K").toarray().tolist()
     (((7, 'x'), (8, 'x')), [[2.0, -1.0], [-1.0, 1.0]])
     """
-    path = Path(path)
+    path = file_path(path, "read_matrices")
     with path.open("rb") as file:
         head = file.read(4096)
     if not head.strip():
