@@ -660,3 +660,33 @@ def test_curves_keep_the_librarys_colours_when_they_are_drawn_later(run):
     shown = [plot.time_history(run), plot.loops({"a": KelvinVoigt(1e4, 1.0), "b": KelvinVoigt(1e4, 2.0)})]
     lines = [line for figure in shown for axis in figure.axes for line in axis.lines]
     assert all(str(line.get_color()).startswith("#") for line in lines)
+
+
+@pytest.mark.parametrize(
+    ("draw", "message"),
+    [
+        (lambda run: plot.time_history(run, (-1.0, 0.0)), r"overlap the run, 0 to 2 s, got \(-1.0, 0.0\)"),
+        (lambda run: plot.time_history(run, (3.0, 4.0)), "the window must overlap the run, 0 to 2 s"),
+        (lambda run: plot.time_history(run, (0.0, np.inf)), r"the window must be two numbers, got \(0.0, inf\)"),
+        (lambda run: plot.time_history(run, (0.3, 0.1)), "the window must end after it begins"),
+        (lambda run: plot.time_history(run, 5), "the window must be two numbers, got 5 in time_history"),
+        (lambda run: plot.time_history(run, ("a", "b")), "the window must be two numbers"),
+        (lambda run: plot.densities(run, discard=2.0), "discard must be below the last sample, at 2 s, got 2.0"),
+        (lambda run: plot.densities(run, discard=None), "discard must be a number, got None"),
+        (lambda run: plot.spectrum(run, discard=-1.0), "discard must be finite and not negative, got -1.0"),
+        (lambda run: plot.contacts(run, discard=-1.0), "discard must be finite and not negative, got -1.0"),
+        (lambda run: plot.spectrum(run, omega_max=np.inf), "omega_max must be finite and positive, got inf"),
+        (lambda run: plot.spectrum(run, omega_max=-5.0), "omega_max must be finite and positive, got -5.0"),
+        (lambda run: plot.animate(run, "run.gif", fps=0), "fps must be finite and positive, got 0 in animate"),
+        (lambda run: plot.animate(run, "run.gif", fps="25"), "fps must be a number, got '25' in animate"),
+        (lambda run: plot.frame(run, 9.0), "t must lie within the run, 0 to 2 s, got 9.0 in plot.frame"),
+    ],
+)  # fmt: skip
+def test_times_beyond_a_run_are_refused_by_what_is_wrong(run, draw, message):
+    with pytest.raises(ValueError, match=message):
+        draw(run)
+
+
+def test_a_window_may_be_an_array_or_reach_beyond_the_run(run):
+    for window in (np.array([0.1, 0.3]), (-5.0, 50.0)):
+        assert plot.time_history(run, window).axes[-1].get_xlim()[0] < 1e3 * 0.3

@@ -15,7 +15,7 @@ from fembeam.plot.run_signals import samples_in
 from fembeam.plot.style import BLUE, GREY, ORANGE, RED, entry, own_colour, styled
 from fembeam.plot.units import length_for, unit_for
 from fembeam.scene import ON
-from fembeam.support import counting, file_path, require, written_beside
+from fembeam.support import counting, file_path, is_finite, require, require_positive, written_beside
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -60,7 +60,7 @@ def animate(
 
     Raises
     ------
-    ValueError : another suffix, no ffmpeg, fewer than 2 samples in the window.
+    ValueError : another suffix, no ffmpeg, fewer than 2 samples in the window, fps not above 0.
     """
     from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 
@@ -70,8 +70,9 @@ def animate(
     able = target.suffix == ".gif" or FFMpegWriter.isAvailable()
     require(able, "an .mp4 needs the program ffmpeg", "none", "animate", "install it, or write a .gif")
     require(target.parent.is_dir(), "the folder must exist", str(target.parent), "animate", "make it first")
+    require_positive("fps", fps, "animate", "give pictures per second")
     samples = _samples(run, window, frames)
-    stage = _stage(run, samples, fps)
+    stage = _stage(run, samples, float(fps))
     film = FuncAnimation(stage.figure, stage.show, frames=len(samples), init_func=lambda: [], blit=False)
     writer = (PillowWriter if target.suffix == ".gif" else FFMpegWriter)(fps=fps)  # type: ignore[arg-type]
     with written_beside(target) as draft, counting(progress, total=len(samples), unit=" pictures") as bar:
@@ -93,6 +94,8 @@ def frame(run: Run, t: float, window: tuple[float, float] | None = None) -> Figu
     >>> figure.axes[0].get_xlabel()
     'z / mm'
     """
+    inside = is_finite(t) and run.t[0] <= t <= run.t[-1]
+    require(inside, f"t must lie within the run, {run.t[0]:g} to {run.t[-1]:g} s", t, "plot.frame", "choose one")
     samples = _samples(run, window, MOST_FRAMES)
     stage = _stage(run, samples, None)
     stage.show(int(np.argmin(np.abs(run.t[samples] - t))))

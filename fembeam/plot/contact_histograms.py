@@ -10,6 +10,7 @@ from fembeam.plot.figure import after, heading, sheet
 from fembeam.plot.style import BLUE, GREEN, RED, Vector, plain_decades, styled
 from fembeam.plot.units import unit_for
 from fembeam.scene import unit_of
+from fembeam.support import require_non_negative
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def contacts(run: Run, discard: float = 0.0, axes: Sequence[Axes] | None = None)
     Only contacts that began after `discard` and ended count. `axes` to draw into are four; None makes a figure. Raises
     ValueError when there is no contact.
     """
+    require_non_negative("discard", discard, "plot.contacts", "give s at the beginning to leave out")
     log = run.contacts
     kept = np.isfinite(log.t_out) & (log.t_in >= discard)
     if not np.any(kept):

@@ -36,6 +36,7 @@ from fembeam.plot.body_shapes import body_mode_shapes
 from fembeam.plot.figure import after, heading, sheet, side_by_side
 from fembeam.plot.random import density_panels
 from fembeam.plot.run_signals import (
+    after_discard,
     between_samples,
     estimated,
     first_stop,
@@ -44,6 +45,7 @@ from fembeam.plot.run_signals import (
     sampling_of,
     signal_name,
     stationary,
+    two_times,
 )
 from fembeam.plot.spectra import segment_for
 from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, entry, own_colour, place_name, styled, verbatim
@@ -80,13 +82,19 @@ def time_history(
     z : where, in m; None: the stop of the largest force in the window, on its beam; without contacts the tip.
     axes : to draw into, two where there are stops; None makes a figure.
 
+    Raises
+    ------
+    ValueError : a window that is none, or does not overlap the run; fewer than 2 samples.
+
     Notes
     -----
     Shaded are the contacts of the stops at z, of all stops where there is none. Between samples the displacement is the
     cubic through values and rates. Contacts shorter than ten samples are drawn as their logged peak.
     """
     step = sampling_of(run)
-    lo, hi = window or _window(run)
+    lo, hi = _window(run) if window is None else two_times(window, "time_history")
+    seen = f"the window must overlap the run, {run.t[0]:g} to {run.t[-1]:g} s"
+    require(lo < run.t[-1] and hi > run.t[0], seen, (lo, hi), "time_history", "move it")
     body, place = _watched(run, lo, hi) if z is None else (0, z)
     figure, drawn = sheet(2 if len(run.stops) else 1, 1, (7.0, 4.2), axes, sharex=True)
     t, u = _displacement(run, place, body, lo, hi)
@@ -99,9 +107,9 @@ def time_history(
         stops = _stops_at(run, body, place)
         _shade_contacts(drawn, run, stops, lo, hi, tick)
         _draw_forces(drawn[1], run, lo, hi, FEW * step, tick)
-        seen = np.isin(run.contacts.stop, stops) & _within(run, lo, hi)
-        title += f", contacts of {_listed(stops, run)} shaded" if seen.any() else ""
-    beside = 0.0 if window else 0.01 * (hi - lo)  # so that a contact at the first instant is seen
+        here = np.isin(run.contacts.stop, stops) & _within(run, lo, hi)
+        title += f", contacts of {_listed(stops, run)} shaded" if here.any() else ""
+    beside = 0.0 if window is not None else 0.01 * (hi - lo)  # so that a contact at the first instant is seen
     drawn[-1].set(xlabel=f"time / {second}", xlim=(tick * (lo - beside), tick * (hi + beside)))
     heading(drawn, title, axes is None, run=run)
     return figure
@@ -113,7 +121,7 @@ def densities(run: Run, discard: float = 0.0, axes: Axes | Sequence[Axes] | None
 
     Shaded: 95 % confidence, where the run holds at least four independent parts. `axes` to draw into: one each.
     """
-    signals = estimated(run, discard, segment_for(int(np.count_nonzero(run.t >= discard)), sampling_of(run)))
+    signals = estimated(run, discard, segment_for(int(np.count_nonzero(after_discard(run, discard))), sampling_of(run)))
     figure, drawn = sheet(1, len(signals), (7.0, 3.1), axes)
     density_panels(drawn, {signal_name(run, name): one for name, one in signals.items()})
     if axes is None:

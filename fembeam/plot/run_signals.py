@@ -12,7 +12,7 @@ from fembeam.plot.style import Vector
 from fembeam.scene import persistent_drive, turns_at
 from fembeam.scene.places import unsigned
 from fembeam.statistics import Signal, pdf
-from fembeam.support import is_finite, require
+from fembeam.support import is_finite, require, require_non_negative
 
 if TYPE_CHECKING:
     from fembeam.model import Run
@@ -25,7 +25,7 @@ STEADY = 0.1  # of the largest mean square over a quarter of the time: below it 
 
 def responses(run: Run, discard: float = 0.0) -> dict[str, Vector]:
     """Signals shown with density, m: δ of the first stop of displacement (the tip when there is none) and mid-beam."""
-    kept = run.t >= discard
+    kept = after_discard(run, discard)
     named, stop = places(run.shapes), first_stop(run)
     first = {} if stop is None else {"δ": run.indentation(stop)}
     if not first and "tip" in named:
@@ -88,15 +88,30 @@ def sampling_of(run: Run) -> float:
 
 def samples_in(run: Run, window: tuple[float, float] | None, where: str, advice: str = "widen it") -> Any:
     """Numbers of the samples in a window (s), all without one; ValueError below two."""
-    pair = window is None or (isinstance(window, (tuple, list)) and len(window) == 2 and all(map(is_finite, window)))
-    require(pair, "the window must be two numbers", window, where, "give (from, to) in s")
     first, last = float(run.t[0]), float(run.t[-1])
-    lo, hi = window or (first, last)
+    lo, hi = (first, last) if window is None else two_times(window, where)
     if not (lo < last and hi > first):
         advice = f"samples lie from {first:g} to {last:g} s"
     inside = np.flatnonzero((run.t >= lo) & (run.t <= hi))
     require(len(inside) >= 2, "the window must hold at least 2 samples", (lo, hi), where, advice)
     return inside
+
+
+def two_times(window: Any, where: str) -> tuple[float, float]:
+    """A window's begin and end (s); ValueError for what is none."""
+    pair = isinstance(window, (tuple, list, np.ndarray)) and len(window) == 2 and all(map(is_finite, window))
+    require(pair, "the window must be two numbers", window, where, "give (from, to) in s")
+    lo, hi = map(float, window)
+    require(lo < hi, "the window must end after it begins", (lo, hi), where, "give (from, to) in s")
+    return lo, hi
+
+
+def after_discard(run: Run, discard: float) -> Any:
+    """Which samples lie after `discard` s; ValueError if it is no time, or none does."""
+    require_non_negative("discard", discard, "fembeam.plot", "give s at the beginning to leave out")
+    require(discard < run.t[-1] or discard == 0.0, f"discard must be below the last sample, at {run.t[-1]:g} s",
+            discard, "fembeam.plot", "lower it")  # fmt: skip
+    return run.t >= discard
 
 
 def between_samples(t: Vector, x: Vector, rates: Vector) -> tuple[Vector, Vector]:

@@ -13,6 +13,7 @@ from fembeam.plot.axis_names import frequency_words
 from fembeam.plot.figure import after, heading, sheet
 from fembeam.plot.linear import frequencies
 from fembeam.plot.run_signals import (
+    after_discard,
     coordinates,
     estimated,
     first_stop,
@@ -29,6 +30,7 @@ from fembeam.scene import signals_of
 from fembeam.statistics import Spectrum, psd
 from fembeam.statistics.spectra import FEWEST_OF_SLOW, FINEST_RESOLUTION
 from fembeam.structures import COMPONENTS, direction_of
+from fembeam.support import require_positive
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,8 +71,10 @@ def spectrum(
     model and the frequencies of its static shapes, named at the top; numbers are the peaks of the first curve. Of a
     transient the levels hold for this stretch of time only: see `floor_spectrum`.
     """
-    figure, (upper, lower) = sheet(2, 1, (7.0, 5.6), axes, sharex=True)
+    if omega_max is not None:
+        require_positive("omega_max", omega_max, "plot.spectrum", "give rad/s")
     spectra, linear = spectra_of(run, discard), _linear(run)
+    figure, (upper, lower) = sheet(2, 1, (7.0, 5.6), axes, sharex=True)
     bases = [name for name in spectra if name in BASES]
     main, *others = (name for name in spectra if name not in BASES)
     colours = {main: BLUE, **dict.fromkeys(others, GREEN), **dict(zip(bases, BASE_COLOURS, strict=False))}
@@ -102,7 +106,7 @@ def _about(run: Run, discard: float, line: Spectrum) -> str:
 def spectra_of(run: Run, discard: float = 0.0) -> Mapping[str, Spectrum]:
     """Spectra of the base motion (where the run knows it) and of `responses`, these with their confidence."""
     motions = {} if run.model is None else run.model.scene.motions
-    t, dt = run.t[run.t >= discard], sampling_of(run)
+    t, dt = run.t[after_discard(run, discard)], sampling_of(run)
     found = {name: signal.psd for name, signal in estimated(run, discard, segment_for(len(t), dt)).items()}
     for direction, base in motions.items():
         step, rows = base.nodes(float(run.t[-1]), 1e-3) if hasattr(base, "nodes") else (np.inf, None)
