@@ -172,3 +172,17 @@ def test_the_pipe_is_one_scene_in_both_forms():
     assert run.startswith("scene.reduce(modes=10, residual=True)\nrun = model.simulate(duration=8.0, dt=2.5e-4)")
     assert file.reduce == {"modes": 10, "residual": True}
     assert (study.duration, study.dt, study.points, study.zeta) == (8.0, 2.5e-4, 50, 0.02)
+
+
+def test_oscillators_beyond_the_floats_are_refused():
+    t = np.linspace(0.0, 4.0, 401)
+    for given, message in (
+        ({"periods": [1e-300, 1.0]}, "periods must be positive and finite, at least 1e-50, got"),
+        ({"omega": [1e-300, 1.0]}, "omega must be positive and finite, at least 1e-50, got"),
+        ({"omega": [1e-20, 1.0]}, r"omega must be at least 1e-08 rad/s, 1e-10 / step, got 1e-20 in response_spectrum"),
+        ({"periods": [1e20]}, "omega must be at least 1e-08 rad/s"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            fb.response_spectrum(t, np.sin(9.0 * t), **given)
+    slow = fb.response_spectrum(t, np.sin(9.0 * t), omega=[1e-8, 1e-6], zeta=0.0).displacement[0]
+    np.testing.assert_allclose(slow, (36.0 - np.sin(36.0)) / 81.0, rtol=1e-3)  # ∬ sin 9t; straight lines: (9 h)²/12

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.scene import turns_at
-from fembeam.support import numbers, require, vector, warn
+from fembeam.support import LARGEST, numbers, require, vector, warn
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -29,6 +29,7 @@ UNIFORM = 1e-6  # of a step, that times may be off a uniform grid
 FINE = 0.05  # ω τ up to which the cubic through values and slopes keeps maxima to 1e-5, mostly (ω τ)⁴/384
 PARTS = 4  # of an interval, at least: what its two samples do may nearly cancel in between
 ENOUGH = 1e-6  # relative: bounds on a maximum that exceed it by less
+SLOWEST = 1e-10  # ω τ; below 1e-12 rounding takes over the displacement
 GONE = 40.0  # ζ ω τ after which free vibration is below rounding
 FIRST_LOOK, MOST_AT_ONCE = 16, 1 << 12  # intervals looked into at once
 BLOCK = 1 << 16  # steps of the record at once, so that memory stays small
@@ -125,6 +126,8 @@ def response_spectrum(
     """
     step, values = _checked_record(t, acceleration)
     omega, zeta = checked_oscillators(omega, periods), checked_damping(zeta)
+    require(omega.min() * step >= SLOWEST, f"omega must be at least {SLOWEST / step:.3g} rad/s, {SLOWEST:g} / step",
+            omega.min(), "response_spectrum", "leave slower ones out")  # fmt: skip
     found = np.array([[_largest(step, values, w, d) for w in omega] for d in zeta])
     return ResponseSpectrum(omega, zeta, *np.moveaxis(found, -1, 0))
 
@@ -167,8 +170,9 @@ def checked_oscillators(omega: ArrayLike | None, periods: ArrayLike | None) -> V
     require((omega is None) != (periods is None), "give omega or periods, one of them", (omega, periods),
             "response_spectrum", "omega in rad/s, or periods in s")  # fmt: skip
     name, given = ("omega", omega) if periods is None else ("periods", periods)
-    values = vector(name, given, "response_spectrum", "give at least one", "must be positive and finite",
-                    lambda x: np.isfinite(x) & (x > 0))  # fmt: skip
+    rule = f"must be positive and finite, at least {1.0 / LARGEST:g}"
+    values = vector(name, given, "response_spectrum", "give at least one", rule,
+                    lambda x: np.isfinite(x) & (x >= 1.0 / LARGEST))  # fmt: skip
     return values if periods is None else 2 * np.pi / values
 
 
