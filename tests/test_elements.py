@@ -513,7 +513,7 @@ def test_scene_files(file_of):
     ):
         with pytest.raises(SceneFileError, match=message):
             file_of(FILE, change)
-    steep = file_of(FILE, "stops[0].gap=2.0")
+    steep = file_of(FILE, "stops[0].gap=1.0")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         assert any("is it in degrees?" in said for said in check(steep.model()))
@@ -603,3 +603,13 @@ def test_laws_that_never_open_are_no_stops():
     with pytest.raises(ValueError, match=r"law must be one that opens, .* make it an Element"):
         fb.Stop(0.5, Jenkins(1.0, 1.0))
     fb.Stop(0.5, WaltonBraun(1.0, 2.0))
+
+
+@pytest.mark.parametrize("make", [fb.Stop, fb.Element])
+def test_a_gap_of_a_slope_given_in_degrees_is_refused(make):
+    with pytest.raises(
+        ValueError, match=r"quarter turn, 1\.57 rad, got 20 in .*; is it in degrees\? np\.radians\(20\) are 0\.349"
+    ):
+        make(0.2, KelvinVoigt(400.0, 0.2), gap=20, of="rotation")
+    assert make(0.2, KelvinVoigt(400.0, 0.2), gap=0.349, of="rotation").gap == 0.349
+    assert make(0.2, KelvinVoigt(400.0, 0.2), gap=20).gap == 20  # m, which `check` doubts

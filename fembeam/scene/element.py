@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.scene.impactor import check_law
-from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
+from fembeam.scene.local_coordinate import LocalCoordinate, Of, check_turn, local_coordinate
 from fembeam.scene.part import ScenePart
 from fembeam.scene.places import Second
 from fembeam.structures import Direction, direction_of
@@ -41,7 +41,7 @@ class Element(ScenePart):
     Raises
     ------
     ValueError : a law that is for δ > 0 only (`Stop` takes it) or asks for a rate of entry, an `of` that is neither, a
-        gap that is not finite.
+        gap that is not finite, or of a slope beyond a quarter turn.
 
     Examples
     --------
@@ -66,6 +66,7 @@ class Element(ScenePart):
         where = self.where
         require_finite("gap", self.gap, where, "give the offset in m, or rad of a rotation")
         _ = self.coordinate
+        check_turn(self.of, self.gap, where)
         check_law(self.law, where)
         why = next(one_sided(self.law), "")
         require(not why, f"law must act at both signs of d: {why}", self.law, where,

@@ -7,6 +7,7 @@ On bodies that are not a `Beam` a place has a name and a direction n: W = n · (
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
@@ -95,6 +96,13 @@ class LocalCoordinate:
         if body == number:
             return [self if second == body else replace(self, to=None)]
         return [replace(self, z=self.to[1], to=None)] if self.to is not None and second == number else []
+
+
+def check_turn(of: str, gap: float, where: str) -> None:
+    """Raise ValueError for a gap of a beam's slope beyond a quarter turn: it was meant in degrees."""
+    right = of == KINDS[0] or abs(gap) <= math.pi / 2
+    require(right, "gap of a rotation must be at most a quarter turn, 1.57 rad", gap, where,
+            f"is it in degrees? np.radians({gap:g}) are {math.radians(gap):.3g} rad")  # fmt: skip
 
 
 def local_coordinate(z: Any, of: str, to: Any, where: str, key: str, direction: Any = None) -> LocalCoordinate:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fembeam.scene.impactor import check_law
-from fembeam.scene.local_coordinate import LocalCoordinate, Of, local_coordinate
+from fembeam.scene.local_coordinate import LocalCoordinate, Of, check_turn, local_coordinate
 from fembeam.scene.part import ScenePart
 from fembeam.scene.places import Place, Second, sign_of
 from fembeam.scene.rubbing import Friction, check_oblique
@@ -274,7 +274,8 @@ class Stop(ScenePart):
     against ξ = t·u: an oblique contact of a frame or structure; in a plane frame t is the other way in the plane.
     `name` (keyword, as of all parts): what the contact log, tables and figures call it, unique in a scene.
     ValueError for a side that is neither "below" nor "above", a side beside a direction, an `of` that is neither, a gap
-    that is not finite; for friction of a rotation, on a `Beam`, without a tangent, or with one that is not across.
+    that is not finite, or of a slope beyond a quarter turn; for friction of a rotation, on a `Beam`, without a tangent,
+    or with one that is not across.
 
     Examples
     --------
@@ -315,6 +316,7 @@ class Stop(ScenePart):
                 "choose one")  # fmt: skip
         _check_direction(self, where)
         local_coordinate(self.z, self.of, self.on, where, "on", self.direction)
+        check_turn(self.of, self.gap, where)
         check_law(self.law, where)
         acts_always = getattr(self.law, "memory", ()) and not getattr(self.law, "one_sided", False)
         require(not acts_always, "law must be one that opens", self.law, where, "make it an Element, which always acts")
