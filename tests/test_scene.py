@@ -397,3 +397,26 @@ def test_every_kind_of_float_is_a_place(kind):
         return scene.reduce(1).simulate(0.01, 1e-3).q
 
     np.testing.assert_array_equal(moved(kind), moved(float))
+
+
+@pytest.mark.parametrize("kind", [np.int8, np.uint8, np.int16, np.uint64, np.float32])
+def test_numbers_of_numpy_count_like_those_of_python(kind):
+    """Small and unsigned whole numbers of NumPy wrap around: -np.uint8(1) is 255, np.int16(100)**3 is 16960."""
+
+    def omega(of):
+        section = fb.Section.rectangle(2e11, 7800.0, of(5), of(7))
+        assert section.I == 5 * 7**3 / 12
+        scene = fb.Scene(
+            fb.Beam(of(100), section, axial_force=of(100)),
+            [fb.Clamped(of(0))],
+            masses=[fb.LumpedMass(of(100), mass=of(100), inertia=of(100), offset=of(20))],
+            stops=[fb.Stop(of(100), Hertz(of(100)), gap=of(1))],
+            gravity=of(100),
+        )
+        run = scene.reduce(2).simulate(of(1), 0.1)
+        frame = fb.Frame({"A": (of(0), of(0)), "B": (of(100), of(0))}, [fb.Member("A", "B", section)])
+        parts = {"masses": [fb.LumpedMass("B", of(100), offset=(of(20), of(20)))], "gravity": (of(0), of(100))}
+        placed = fb.Scene(frame, [fb.Clamped("A")], **parts).reduce(3)
+        return np.concatenate([run.model.omega, run.indentation(0), placed.omega, placed.equilibrium()])
+
+    np.testing.assert_array_equal(omega(kind), omega(float))

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 from fembeam.beams.section import Profile, Section, Taper
-from fembeam.support import require, require_finite, require_non_negative, require_positive
+from fembeam.support import make_native, require, require_finite, require_non_negative, require_positive
 
 Vector = NDArray[np.float64]
 Span = tuple[float, Section | Taper]
@@ -63,6 +63,7 @@ class Beam:
     meshed = True  # elements are chosen, or asked for
 
     def __post_init__(self) -> None:
+        make_native(self)
         require_positive("length", self.length, "Beam", "give the length in m")
         if self.section is not None:  # rebuilt always, so that dataclasses.replace(beam, length=…) works
             object.__setattr__(self, "spans", ((self.length, self.section),))

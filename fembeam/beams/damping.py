@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 import reduction
-from fembeam.support import require, require_non_negative
+from fembeam.support import make_native, require, require_non_negative
 
 FULL_MATRIX_LIMIT = 2000  # free dofs: C of modal damping is dense, 32 MB here, and takes all modes (about 10 s)
 
@@ -102,6 +102,7 @@ class Rayleigh:
     beta: float
 
     def __post_init__(self) -> None:
+        make_native(self)
         require_non_negative("alpha", self.alpha, "Rayleigh", "give the mass factor in 1/s")
         require_non_negative("beta", self.beta, "Rayleigh", "give the stiffness factor in s")
 

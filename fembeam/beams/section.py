@@ -15,7 +15,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fembeam.support import is_finite, require, require_finite, require_positive
+from fembeam.support import is_finite, make_native, require, require_finite, require_positive
 
 Shear: TypeAlias = float | tuple[float, float] | None
 
@@ -66,6 +66,7 @@ class Section:
     shear: Shear = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
+        make_native(self)
         require_positive("E", self.E, "Section", "give Young's modulus in N/m²")
         require_positive("rho", self.rho, "Section", "give the mass density in kg/m³")
         require_positive("A", self.A, "Section", "give the area in m²")
@@ -102,6 +103,7 @@ class Section:
         """Solid rectangle bending over its height (m): A = b h, I = b h³/12, I2 = h b³/12; J by its series."""
         require_positive("width", width, "Section.rectangle", "give the width in m")
         require_positive("height", height, "Section.rectangle", "give the height in the bending plane in m")
+        width, height = float(width), float(height)
         I, I2, J = width * height**3 / 12, height * width**3 / 12, _rectangle_torsion(width, height)
         return cls(E, rho, width * height, I, height / 2, I2, 0.0, J, nu, width / 2, shear)
 
@@ -109,6 +111,7 @@ class Section:
     def circle(cls, E: float, rho: float, diameter: float, nu: float = 0.3, shear: Shear = None) -> Section:
         """Solid circle (m): A = π d²/4, I = I2 = π d⁴/64, J = 2 I."""
         require_positive("diameter", diameter, "Section.circle", "give the diameter in m")
+        diameter = float(diameter)
         I, fibre = math.pi * diameter**4 / 64, diameter / 2
         return cls(E, rho, math.pi * diameter**2 / 4, I, fibre, I, 0.0, 2 * I, nu, fibre, shear)
 
@@ -118,6 +121,7 @@ class Section:
         require_positive("outer", outer, "Section.tube", "give the outer diameter in m")
         require_positive("inner", inner, "Section.tube", "give the inner diameter in m, or use Section.circle")
         require(inner < outer, f"inner must be below outer = {outer}", inner, "Section.tube", "swap the two")
+        outer, inner = float(outer), float(inner)
         I, fibre = math.pi * (outer**4 - inner**4) / 64, outer / 2
         return cls(E, rho, math.pi * (outer**2 - inner**2) / 4, I, fibre, I, 0.0, 2 * I, nu, fibre, shear)
 

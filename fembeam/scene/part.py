@@ -9,7 +9,7 @@ from typing import Any
 from fembeam.scene.local_coordinate import LocalCoordinate
 from fembeam.scene.places import Place, directed_words, place_words, quoted
 from fembeam.structures import Six, direction_of
-from fembeam.support import is_whole, require, require_place
+from fembeam.support import is_whole, make_native, require, require_place
 
 UNSAID = ("direction", "motion", "name", "friction", "tangent", "radius")  # of a part, when they are None
 
@@ -26,6 +26,7 @@ class ScenePart:
     word = "part"  # that a made name begins with
 
     def __post_init__(self) -> None:
+        make_native(self)
         require_place(self.z, self)
         name: object = self.name
         text = isinstance(name, str) and bool(name.strip()) and name.isprintable()

@@ -29,7 +29,16 @@ from fembeam.scene.rotors import Disk, Unbalance, driven
 from fembeam.scene.signal_checks import require_motion
 from fembeam.scene.signals import support_motion
 from fembeam.structures import COMPONENTS, Joint, translations_of
-from fembeam.support import in_mm, is_finite, require, require_finite, require_non_negative, require_positive, warn
+from fembeam.support import (
+    in_mm,
+    is_finite,
+    native,
+    require,
+    require_finite,
+    require_non_negative,
+    require_positive,
+    warn,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -142,7 +151,7 @@ class Scene:
             pulls = any(given) if isinstance(given, (list, tuple)) else is_finite(given) and given != 0.0
             require(not pulls, "gravity needs a body that moves along x, y or z, joined ones all along the same",
                     self.gravity, "Scene", "give the structure more dofs, or leave it out")  # fmt: skip
-        object.__setattr__(self, "gravity", _fall(self.gravity, self._ways_to_fall))
+        object.__setattr__(self, "gravity", _fall(native(self.gravity), self._ways_to_fall))
         self._check_base()
         self._check_gravity()
         self._check_names()

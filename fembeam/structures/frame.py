@@ -21,6 +21,7 @@ from fembeam.support import (
     is_finite,
     is_pair,
     is_whole,
+    make_native,
     require,
     require_finite,
     require_positive,
@@ -84,6 +85,7 @@ class Frame:
     def __post_init__(self) -> None:
         from fembeam.structures.frame_checks import check_frame, checked_nodes
 
+        make_native(self)
         object.__setattr__(self, "nodes", checked_nodes(self.nodes))
         listed = isinstance(self.members, Iterable) and not isinstance(self.members, (str, Mapping))
         require(listed, "members must be a list", self.members, "Frame", "give [Member(a, b, section), …]")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fembeam.beams import Beam, Section
 from fembeam.structures.assembled import COMPONENTS
 from fembeam.structures.directions import direction_of
-from fembeam.support import is_finite, require, require_finite, require_non_negative
+from fembeam.support import is_finite, make_native, require, require_finite, require_non_negative
 
 Vector = NDArray[np.float64]
 
@@ -65,6 +65,7 @@ class Member:
     foundation: float = 0.0
 
     def __post_init__(self) -> None:
+        make_native(self)
         for end in (self.a, self.b):
             write = "write 'A'" if isinstance(end, str) else f"names are text: write {str(end)!r}"
             require(isinstance(end, str) and bool(end), "a and b must be names of nodes", end, "Member", write)

@@ -16,6 +16,8 @@ from fembeam.support.checks import (
     is_numbered,
     is_pair,
     is_whole,
+    make_native,
+    native,
     number,
     numbers,
     require,

@@ -172,6 +172,29 @@ def vector(
     return found
 
 
+def native(value: Any) -> Any:
+    """A number of Python for one of NumPy, also within a tuple; what is neither as it is.
+
+    Small and unsigned whole numbers of NumPy would wrap around.
+
+    Examples
+    --------
+    >>> -native(np.uint8(1)), native((np.int16(300), 0.5))[0] ** 3, native("lever")
+    (-1, 27000000, 'lever')
+    """
+    if isinstance(value, np.integer):
+        return int(value)
+    if isinstance(value, np.floating):
+        return float(value)
+    return tuple(map(native, value)) if type(value) is tuple else value
+
+
+def make_native(part: Any) -> None:
+    """Make the numbers in the fields of a frozen dataclass those of Python."""
+    for name, value in vars(part).items():
+        object.__setattr__(part, name, native(value))
+
+
 def tuples(value: Any) -> Any:
     """Tuples for lists, as files have them: of places, directions, pairs of these.
 
