@@ -690,3 +690,12 @@ def test_times_beyond_a_run_are_refused_by_what_is_wrong(run, draw, message):
 def test_a_window_may_be_an_array_or_reach_beyond_the_run(run):
     for window in (np.array([0.1, 0.3]), (-5.0, 50.0)):
         assert plot.time_history(run, window).axes[-1].get_xlim()[0] < 1e3 * 0.3
+
+
+def test_forces_of_more_stops_than_colours_are_told_apart():
+    stops = [fb.Stop(z, KelvinVoigt(1e5, 10.0), gap=1e-4) for z in np.linspace(0.1, 0.25, 8)]
+    run = paper_scene(fb.Harmonic(1e-3, 195.0), 0.02, masses=(), stops=stops).reduce(3).simulate(0.1, 1e-4)
+    for axis in (plot.time_history(run, (0.0, 0.1)).axes[1], plot.frame(run, 0.05).axes[1]):
+        curves = [line for line in axis.lines if not line.get_label().startswith("_")]
+        assert len(curves) > 6
+        assert len({(line.get_color(), line.get_linestyle()) for line in curves}) == len(curves)

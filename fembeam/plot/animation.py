@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from fembeam.plot.bodies import BodyStage
 from fembeam.plot.figure import side_by_side
 from fembeam.plot.run_signals import samples_in
-from fembeam.plot.style import BLUE, GREY, ORANGE, RED, entry, own_colour, styled
+from fembeam.plot.style import BLUE, GREY, ORANGE, RED, entry, own_line, styled
 from fembeam.plot.units import length_for, unit_for
 from fembeam.scene import ON
 from fembeam.support import counting, file_path, is_finite, require, require_positive, written_beside
@@ -230,7 +230,7 @@ class _Stage:
         t = self.tick * self.run.t[self.samples]
         for i, force in enumerate(self.forces):
             label = entry(self.run.name(i))
-            self.force_axis.step(t, scale * force, color=own_colour(i), where="mid", label=label)
+            self.force_axis.step(t, scale * force, **own_line(i), where="mid", label=label)
         self.cursor = self.force_axis.axvline(t[0], color=ORANGE)
         self.force_axis.set(xlabel=f"time / {self.second}", ylabel=f"peak contact\nforce / {unit}")
         self.force_axis.set_xlim(*self.tick * self.run.t[self.samples[[0, -1]]])

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from contacts import PUBLISHED, Bounce, Hysteretic, Identified, KelvinVoigt, Law, Viscoelastic, bounce, restitution
 from fembeam.plot.figure import heading, legend, sheet
-from fembeam.plot.style import BLUE, CYCLE, GREY, RED, Vector, entry, logarithmic, own_colour, styled, verbatim
+from fembeam.plot.style import BLUE, GREY, RED, Vector, entry, logarithmic, own_line, styled, verbatim
 from fembeam.plot.units import length_for, unit_for
 from fembeam.support import require
 
@@ -125,8 +125,8 @@ def restitutions(axes: Sequence[Axes] | None = None) -> Figure:
     whole.plot([0, 1], [0, 1], color=GREY, linewidth=4, alpha=0.4, label=exact)
     near.axhline(0.0, color=GREY, linewidth=4, alpha=0.4)
     for number, (name, achieved) in enumerate(lines.items()):
-        whole.plot(nominal, achieved, **_line(number), label=name)
-        near.plot(nominal, np.array(achieved) - nominal, **_line(number))
+        whole.plot(nominal, achieved, **own_line(number), label=name)
+        near.plot(nominal, np.array(achieved) - nominal, **own_line(number))
     whole.set(xlim=(0, 1), ylim=(0, 1), xlabel="nominal restitution", ylabel="achieved by a free mass")
     near.set(xlim=(0, 1), ylim=(-0.05, 0.1), xlabel="nominal restitution", ylabel="achieved - nominal")
     legend(whole, axes is None, "outside lower center", ncols=3 if axes is None else 1)
@@ -167,7 +167,7 @@ def _drawn(
     scale, unit = unit_for([force for _, force in curves.values()], "N")
     per_length, of_length = length_for([delta for delta, _ in curves.values()])
     for number, (name, (delta, force)) in enumerate(curves.items()):
-        axis.plot(per_length * delta, scale * force, **_line(number), label=entry(name))
+        axis.plot(per_length * delta, scale * force, **own_line(number), label=entry(name))
     axis.axhline(0.0, color=GREY, linewidth=0.6)
     axis.set(xlabel=f"{words[0]} / {of_length}", ylabel=f"{words[1]} / {unit}")
     legend(axis, axes is None, "outside right center", ncols=-(-len(curves) // ROWS))
@@ -185,11 +185,6 @@ def _turns(name: str, law: Law, path: ArrayLike | None) -> Vector:
         turns = np.asarray(path, dtype=float)
     places = np.linspace(0.0, turns.size - 1.0, POINTS * (turns.size - 1) + 1)
     return np.interp(places, np.arange(turns.size), turns)
-
-
-def _line(number: int) -> dict[str, Any]:
-    """Dashes tell lines apart once the colours repeat."""
-    return {"color": own_colour(number), "linestyle": ("-", "--", ":")[number // len(CYCLE) % 3]}
 
 
 def _traced(law: Law, thrown: Bounce, mass: float) -> tuple[Vector, Vector]:

@@ -48,7 +48,7 @@ from fembeam.plot.run_signals import (
     two_times,
 )
 from fembeam.plot.spectra import segment_for
-from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, entry, own_colour, place_name, styled, verbatim
+from fembeam.plot.style import BLUE, GREY, ORANGE, Vector, entry, own_line, place_name, styled, verbatim
 from fembeam.plot.units import length_for, motion_for, unit_for
 from fembeam.scene import persistent_drive, turns_at, unit_of
 from fembeam.support import require
@@ -270,7 +270,7 @@ def _draw_forces(axis: Axes, run: Run, lo: float, hi: float, least: float, tick:
     scale, unit = unit_for((log.peak_force[inside], *forces.values()), plain)
     for stop in drawn:
         mine = log.stop == stop
-        look: dict[str, Any] = {"color": own_colour(int(stop)), "label": entry(run.name(int(stop)))}
+        look: dict[str, Any] = own_line(int(stop)) | {"label": entry(run.name(int(stop)))}
         if stop in always or np.any(mine & inside & ~short):
             axis.plot(tick * run.t[kept], scale * forces[int(stop)], **look)
             look.pop("label")

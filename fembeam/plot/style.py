@@ -76,6 +76,11 @@ def own_colour(number: int) -> str:
     return CYCLE[number % len(CYCLE)]
 
 
+def own_line(number: int) -> dict[str, Any]:
+    """Colour and dashes of one of several curves; dashes tell them apart once the colours repeat."""
+    return {"color": own_colour(number), "linestyle": ("-", "--", ":")[number // len(CYCLE) % 3]}
+
+
 def verbatim(name: Any) -> str:
     r"""Text of a figure that shows a user's name as it is: matplotlib makes formulas of what stands between two $.
 
