@@ -699,3 +699,13 @@ def test_forces_of_more_stops_than_colours_are_told_apart():
         curves = [line for line in axis.lines if not line.get_label().startswith("_")]
         assert len(curves) > 6
         assert len({(line.get_color(), line.get_linestyle()) for line in curves}) == len(curves)
+
+
+def test_a_contact_beyond_the_end_of_a_period_is_shaded_at_its_beginning():
+    period, run = 1.0, SimpleNamespace()
+    run.t = np.linspace(0.0, period, 11)
+    run.displacement = run.velocity = lambda _: np.sin(2 * np.pi * run.t)
+    log = np.rec.fromarrays([[0.3, 0.9], [0.4, 1.15]], names="t_in,t_out")
+    one = SimpleNamespace(run=run, contacts=log, stable=True, parameter=np.nan, period=1)
+    bands = sorted((p.get_x(), p.get_x() + p.get_width()) for p in plot.orbit.__wrapped__(one, 0.1).axes[0].patches)
+    np.testing.assert_allclose(bands, [(0.0, 150.0), (300.0, 400.0), (900.0, 1000.0)])

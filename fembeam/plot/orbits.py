@@ -314,7 +314,10 @@ def orbit(one: Orbit, z: Any = None, axes: Sequence[Axes] | None = None) -> Figu
     left.plot(tick * t, u)
     for t_in, t_out in zip(one.contacts.t_in, one.contacts.t_out, strict=True):
         end = t_out if np.isfinite(t_out) else t[-1]
-        left.axvspan(tick * t_in, tick * end, color=ORANGE, alpha=0.4, linewidth=0.8)
+        for earlier in (0.0, t[-1] - t[0]):  # what goes on beyond the period stands at its beginning
+            band = np.clip([t_in - earlier, end - earlier], t[0], t[-1])
+            if band[0] < band[1]:
+                left.axvspan(*tick * band, color=ORANGE, alpha=0.4, linewidth=0.8)
     left.set(xlabel=f"t / {second}", ylabel=f"{displacement_name(place)} / {unit}")
     right.plot(u, v)
     right.plot(u[:1], v[:1], "o", color=RED, markersize=3)
