@@ -709,3 +709,16 @@ def test_a_contact_beyond_the_end_of_a_period_is_shaded_at_its_beginning():
     one = SimpleNamespace(run=run, contacts=log, stable=True, parameter=np.nan, period=1)
     bands = sorted((p.get_x(), p.get_x() + p.get_width()) for p in plot.orbit.__wrapped__(one, 0.1).axes[0].patches)
     np.testing.assert_allclose(bands, [(0.0, 150.0), (300.0, 400.0), (900.0, 1000.0)])
+
+
+def test_a_second_response_moves_by_more_than_rounding():
+    bar = fb.Section.circle(2.1e11, 7850.0, 0.012)
+    frame = fb.Frame(
+        {"A": (0, 0, 0), "B": (0.5, 0, 0), "C": (0.5, 0.3, 0)}, [fb.Member("A", "B", bar), fb.Member("B", "C", bar)]
+    )
+    scene = fb.Scene(frame, [fb.Clamped("A")], stops=[fb.Stop("C", Hertz(1e8), gap=5e-4, direction="-z")],
+                     damping=fb.ModalDamping(0.02), base={"z": fb.Harmonic(4e-4, 100.0)})  # fmt: skip
+    run = scene.reduce(5).simulate(0.5, 1e-3)
+    assert np.ptp(run.displacement("B", "x")) < 1e-15  # which comes before z
+    first, second = plot.responses(run).values()
+    assert np.ptp(second) > 1e-3 * np.ptp(first)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 FINER = 8  # times the samples, what is drawn between them
 MOST_BATCHES, FEWEST_BATCHES = 32, 4  # of a history, for standard errors
 MEMORIES = 10.0  # time constants of the structure that a batch lasts at least
+ROUNDED = 1e-9  # of the largest motion: what moves less does so by rounding
 STEADY = 0.1  # of the largest mean square over a quarter of the time: below it the motion comes and goes
 
 
@@ -35,7 +36,8 @@ def responses(run: Run, discard: float = 0.0) -> dict[str, Vector]:
     else:  # of other bodies the first usual place that moves and is not that of the stop
         at = None if stop is None else place_of(run, stop)
         moving = {f"{name} u": run.displacement(one) for name, one in named.items() if not (first and one == at)}
-        second = dict([next((pair for pair in moving.items() if np.ptp(pair[1]) > 0), ("", np.zeros(0)))])
+        least = ROUNDED * max((float(np.ptp(x)) for x in [*first.values(), *moving.values()]), default=0.0)
+        second = dict([next((pair for pair in moving.items() if np.ptp(pair[1]) > least), ("", np.zeros(0)))])
     return {name: x[kept] for name, x in {**first, **second}.items() if len(x)}
 
 
