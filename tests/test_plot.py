@@ -722,3 +722,15 @@ def test_a_second_response_moves_by_more_than_rounding():
     assert np.ptp(run.displacement("B", "x")) < 1e-15  # which comes before z
     first, second = plot.responses(run).values()
     assert np.ptp(second) > 1e-3 * np.ptp(first)
+
+
+def test_a_legend_of_many_response_spectra_stands_beside_the_curves():
+    t = np.linspace(0.0, 4.0, 401)
+    one = fb.response_spectrum(t, np.sin(9.0 * t), periods=np.geomspace(0.05, 5.0, 20), zeta=[0.02, 0.05])
+    few, many = plot.response_spectrum(one), plot.response_spectrum({"A": one, "B": one, "C": one})
+    many.draw_without_rendering()
+    assert few.axes[0].get_legend() is not None
+    assert not few.legends
+    (beside,) = many.legends
+    assert len(beside.get_texts()) == 7
+    assert not any(beside.get_window_extent().overlaps(axis.get_window_extent()) for axis in many.axes)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fembeam.plot.figure import heading, sheet
+from fembeam.plot.figure import heading, legend, sheet
 from fembeam.plot.style import Vector, place_name, plain_decades, styled, verbatim
 from fembeam.plot.units import length_for, unit_for
 from fembeam.scene import split
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from fembeam.model import Model, Run
     from fembeam.response import FrequencyResponse, ResponseSpectrum
 
+MOST_INSIDE = 5  # entries of a legend that find room among the curves
 OSCILLATORS = 60  # of a run's response spectrum
 FEWEST = 12  # samples in the shortest period drawn: the error of straight lines between them is near 2 %
 
@@ -75,7 +76,8 @@ def response_spectrum(
         axis.margins(x=0.0)
         plain_decades(axis.xaxis, *axis.get_xlim())
         axis.grid(which="both", alpha=0.25, linewidth=0.5)
-    upper.legend()
+    crowded = len(upper.get_legend_handles_labels()[1]) > MOST_INSIDE
+    legend(upper, axes is None and crowded, "outside right upper")
     return figure
 
 
@@ -159,5 +161,6 @@ def frequency_response(found: FrequencyResponse, axes: Sequence[Axes] | None = N
     lower.set(xlabel="ω / rad s⁻¹", ylabel="phase / °")
     lower.yaxis.set_major_locator(MultipleLocator(90.0))
     lower.set_xlim(float(found.omega[0]), float(found.omega[-1]))
-    upper.legend()
+    crowded = len(upper.get_legend_handles_labels()[1]) > MOST_INSIDE
+    legend(upper, axes is None and crowded, "outside right upper")
     return figure
