@@ -734,3 +734,24 @@ def test_a_legend_of_many_response_spectra_stands_beside_the_curves():
     (beside,) = many.legends
     assert len(beside.get_texts()) == 7
     assert not any(beside.get_window_extent().overlaps(axis.get_window_extent()) for axis in many.axes)
+
+
+def test_what_is_no_count_span_or_result_is_refused_before_its_use(run, tmp_path):
+    model, uses = run.model, "choose one|count from 0|give|1 keeps every|make them"
+    for call in (
+        lambda: run.indentation(True),
+        lambda: run.unit(["force"]),
+        lambda: run.impactor_displacement("a"),
+        lambda: run.to_csv(tmp_path, stride="2"),
+        lambda: run.to_csv(tmp_path, stride=2.5),
+        lambda: run.to_vtu(tmp_path / "run.vtu", sample=None),
+        lambda: fb.study.basins(model, x_span="ab"),
+        lambda: fb.study.bifurcation(model, "stops[0].gap", "abc"),
+        lambda: plot.branch(run),
+        lambda: plot.response_spectrum(run),
+        lambda: plot.rig(model.scene, 3),
+    ):
+        with pytest.raises(ValueError, match=rf".*, got .* in .*; ({uses})"):
+            call()
+    log = model.strike(np.uint64(1))  # -np.uint64(1) is 1.8e19
+    np.testing.assert_array_equal(log.peak_force, model.strike(1.0).peak_force)

@@ -134,7 +134,7 @@ def test_tables_of_pandas_hold_the_numbers(things):
         assert isinstance(table, pandas.DataFrame)
         assert len(table) == rows.get(name, len(table)) > 0
     assert things["ensemble"].to_dataframe()["tip"].mean() == pytest.approx(things["ensemble"]["tip"].value)
-    with pytest.raises(ValueError, match="stride must be at least 1, got 0"):
+    with pytest.raises(ValueError, match="stride must be a whole number above 0, got 0"):
         run.to_dataframe(stride=0)
 
 

@@ -105,7 +105,7 @@ class Model(Printed, ModalEquations):
         else:
             reach = np.abs(contact.direction)
             mode = int(np.argmax(reach >= _MOVES * reach.max()))
-            start[:, mode] = np.array([-contact.gap, -speed]) / contact.direction[mode]
+            start[:, mode] = np.array([-contact.gap, -float(speed)]) / contact.direction[mode]
         system = solvers.System(self.system.M, self.system.C, self.system.K, [contact], gyroscopic=self.turning)
         slowest = max(float(self.omega[mode]), 1.0)
         with whole_runs():

@@ -12,7 +12,7 @@ import numpy as np
 from fembeam.model.watched_places import places as usual_places
 from fembeam.response import BodyReaction
 from fembeam.scene import directed_words, is_directed, place_words, unit_of
-from fembeam.support import is_finite, require, tuples
+from fembeam.support import is_finite, is_whole, require, tuples
 from solvers.problem import dataframe, optional
 
 if TYPE_CHECKING:
@@ -62,7 +62,9 @@ def histories(
     run: Run, stride: int = 1, places: Sequence[Any] | None = None, quantities: Sequence[str] | None = None
 ) -> dict[str, Vector]:
     """Columns of every `stride`-th sample, by name and unit: quantities at places, of stops, of supports."""
-    require(stride >= 1, "stride must be at least 1", stride, "Run", "1 keeps every sample")
+    require(
+        is_whole(stride) and stride >= 1, "stride must be a whole number above 0", stride, "Run", "1 keeps every sample"
+    )
     _check_lists(run, places, quantities)
     asked = USUAL if quantities is None else quantities
     unknown = [name for name in asked if name not in UNITS]

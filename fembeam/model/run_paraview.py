@@ -73,7 +73,8 @@ def to_vtu(run: Run, path: str | os.PathLike[str], sample: int = -1, stride: int
     """Write one sample of a run as VTU, or every `stride`-th and their times as PVD; returns the path to open."""
     import meshio
 
-    require(-len(run.t) <= sample < len(run.t), f"sample must be below {len(run.t)}, the number of samples", sample,
+    right = is_whole(sample) and -len(run.t) <= sample < len(run.t)
+    require(right, f"sample must be below {len(run.t)}, the number of samples", sample,
             "to_vtu", "count from 0, or from the end with -1")  # fmt: skip
     points, cells, values = *_geometry(run), _fields(run)
 

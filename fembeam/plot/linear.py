@@ -53,7 +53,8 @@ def response_spectrum(
 
     figure, (upper, lower) = sheet(2, 1, (7.0, 5.2), axes, sharex=True)
     several = spectrum if isinstance(spectrum, Mapping) else {"": spectrum}
-    require(bool(several), "nothing to draw", spectrum, "plot.response_spectrum", "give one spectrum or more")
+    right = bool(several) and all(hasattr(one, "pseudo_acceleration") for one in several.values())
+    require(right, "nothing to draw", spectrum, "plot.response_spectrum", "give one spectrum or more")
     plain = " or ".join(dict.fromkeys(one.unit for one in several.values()))
     shown = [one.displacement for one in several.values()]
     scale, unit = length_for(shown) if plain == "m" else unit_for(shown, plain)

@@ -74,7 +74,8 @@ def branch(
         is not, such as the level.
     """
     several = [branches] if not isinstance(branches, Sequence) else list(branches)
-    require(bool(several), "nothing to draw", branches, "plot.branch", "give one branch or more")
+    right = bool(several) and all(hasattr(one, "family") for one in several)
+    require(right, "nothing to draw", branches, "plot.branch", "give one branch or more")
     model = several[0].family.model
     place = observed(model) if z is None else z
     figure, (axis,) = sheet(1, 1, (8.4, 3.8), axes)

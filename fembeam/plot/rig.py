@@ -24,6 +24,7 @@ from fembeam.plot.rig_words import gap_words, label, law_words, length, signal_w
 from fembeam.plot.style import GREY, round_factor, styled
 from fembeam.plot.units import length_for
 from fembeam.scene import Guided, Pinned, PointMoment
+from fembeam.support import require
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -117,6 +118,8 @@ def rig(scene: Scene, axes: Axes | None = None) -> Figure:
     >>> figure.get_suptitle()
     'Rig, to scale along z; gaps × 10 across'
     """
+    drawn = axes is None or hasattr(axes, "set_title")
+    require(drawn, "axes must be axes of matplotlib", axes, "fembeam.plot", "make them by plt.subplots()")
     if any(part.named for part in (scene, *scene.bodies)):
         return rig_of_bodies(scene, axes)
     view = _View(scene, WIDTH if axes is None else _inches(axes))

@@ -278,7 +278,8 @@ class Histories:
     def _of_impactor(self, coordinates: Vector, impactor: int) -> Vector:
         """One of the last columns, without its √m."""
         count = len(self.impactor_masses)
-        require(0 <= impactor < count, f"impactor must be below {count}, the number of impactors", impactor, "Run",
+        right = is_whole(impactor) and 0 <= impactor < count
+        require(right, f"impactor must be below {count}, the number of impactors", impactor, "Run",
                 "count from 0")  # fmt: skip
         column = coordinates.shape[1] - count + impactor
         return self._at_samples(coordinates)[:, column] / np.sqrt(self.impactor_masses[impactor])
@@ -414,10 +415,10 @@ class Histories:
                     if near else "there is none at all")  # fmt: skip
             return self.names.index(stop)
         count = len(self.stops)
-        whole = isinstance(stop, (int, np.integer))
-        require(whole and -count <= stop < count, f"stop must be below {count}, the number of stops", stop, "Run",
+        right = is_whole(stop) and -count <= stop < count
+        require(right, f"stop must be below {count}, the number of stops", stop, "Run",
                 "count from 0")  # fmt: skip
-        return stop
+        return int(stop)
 
 
 def modal_accelerations(run: Histories) -> Vector:

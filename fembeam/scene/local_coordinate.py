@@ -34,7 +34,8 @@ def unit_of(quantity: str, rotations: Iterable[Any]) -> str:
     >>> unit_of("force", [False]), unit_of("force", [True]), unit_of("force", [True, False])
     ('N', 'N m', 'N or N m')
     """
-    require(quantity in UNITS, f"quantity must be one of {', '.join(UNITS)}", quantity, "Run.unit", "choose one")
+    known = isinstance(quantity, str) and quantity in UNITS
+    require(known, f"quantity must be one of {', '.join(UNITS)}", quantity, "Run.unit", "choose one")
     kinds = sorted({bool(rotation) for rotation in rotations}) or [False]
     return " or ".join(UNITS[quantity][kind] for kind in kinds)
 

@@ -25,7 +25,7 @@ from fembeam.scene import Place, directed_words
 from fembeam.study.execution.checkpoint import Checkpoint, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.result import Result
-from fembeam.support import Part, is_finite, is_whole, require, titled
+from fembeam.support import Part, is_finite, is_whole, numbers, require, titled
 from solvers.orbits import delayed
 from solvers.orbits import run as run_from
 
@@ -270,7 +270,7 @@ def _sorted(x: Axis, y: Axis, origin: Vector, label: NDArray[np.int64], known: l
 
 def axis_of(model: Model, kind: Any, span: Any, points: int, z: Any) -> Axis:
     """An axis from what `basins` takes for it, checked."""
-    ends = np.asarray(span, dtype=float)
+    ends = numbers("a span", span, WHERE, "give (lowest, highest)")
     valid = ends.shape == (2,) and bool(np.isfinite(ends).all()) and ends[0] < ends[1]
     require(valid, "a span must be two finite values, ascending", span, WHERE, "give (lowest, highest)")
     direction, name = _direction(model, kind, z)

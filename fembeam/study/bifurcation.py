@@ -24,7 +24,7 @@ from fembeam.scene import Place, path_of, turns_at
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import samples_per_period
 from fembeam.study.result import Result
-from fembeam.support import Part, is_whole, require
+from fembeam.support import Part, is_whole, numbers, require
 from solvers.problem import counted
 
 Vector = NDArray[np.float64]
@@ -111,7 +111,7 @@ def bifurcation(
     (2, 4)
     """
     path = path_of(model.scene, parameter)
-    values = np.atleast_1d(np.asarray(values, dtype=float))
+    values = np.atleast_1d(numbers("values", values, "bifurcation", "give a range such as np.linspace(60, 900, 200)"))
     require(values.size > 0 and bool(np.all(np.isfinite(values))), "values must be finite numbers", values,
             "bifurcation", "give a range such as np.linspace(60, 900, 200)")  # fmt: skip
     for name, count in (("settle", settle), ("keep", keep)):
