@@ -97,6 +97,22 @@ def test_damping_by_the_entry_rate_scales_with_it(speed):
     assert found.impulse[0] == pytest.approx(log.impulse[0] / speed, rel=1e-9)
 
 
+@pytest.mark.parametrize("parts", [1, 2])
+def test_the_floor_of_entry_rates_where_it_acts(parts):
+    """F = K δ^p (1 + a δ̇/floor) of an entry below the floor is the same for a and the floor made larger alike."""
+    a, floor = 0.5, 2.0 * SPEED
+
+    def made(a, floor):
+        varied = Hysteretic(1e6, damping_factor=a, entry_rate_floor=floor)
+        beside = Hysteretic(1e6, damping_factor=0.2, entry_rate_floor=2.0 * SPEED)
+        return ball(law=varied if parts == 1 else varied + beside)
+
+    by_a, by_floor = thrown(lambda x: made(x, floor), a), thrown(lambda x: made(a, x), floor)
+    for read in (lambda one: one.exits, lambda one: one.peak_force, lambda one: one.impulse, lambda one: one.end):
+        np.testing.assert_allclose(floor * read(by_floor), -a * read(by_a), rtol=1e-7)
+        assert np.all(read(by_a) != 0.0)
+
+
 # --- differences of runs ---------------------------------------------------------------------------------------------
 
 OMEGA, ZETA = np.array([109.13, 790.6]), np.array([0.02, 0.01])

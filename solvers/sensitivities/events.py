@@ -167,9 +167,7 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
     by = laws.margin_slopes(law, acting.rows[s], *place, acting.entry_rate[s], sizes)
     known = flow.latched[s]
     d_margin = by[0] * d_delta + by[1] * d_rate + by[2:] @ known
-    d_margin[flow.own] += flow.over_laws(
-        s, acting, lambda one, own: laws.margin(one, own, *place, acting.entry_rate[s])
-    )
+    d_margin[flow.own] += flow.over_laws(s, acting, lambda one, own, entry: laws.margin(one, own, *place, entry))
     margin_rate = by[0] * rate + by[1] * acceleration
     size = np.abs(by * np.concatenate((place[1:], acting.rows[s][places]))).sum()
     margin = laws.margin(law, acting.rows[s], *place, acting.entry_rate[s])
@@ -182,11 +180,11 @@ def _at_border(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[A
     latched = np.outer(maps[:, 0], d_delta + rate * shift) + np.outer(maps[:, 1], d_rate + acceleration * shift)
     latched += maps[:, 2:] @ known
 
-    def followed(one: Any, own: Array) -> Array:
+    def followed(one: Any, own: Array, entry: float) -> Array:
         """Numbers latched by a nearby law where it meets the border itself: they may have a corner there."""
         delta = place[1]
         for _ in range(_CORRECTIONS if by[0] else 0):
-            beyond = laws.margin(one, own, border, delta, place[2], acting.entry_rate[s]) - margin
+            beyond = laws.margin(one, own, border, delta, place[2], entry) - margin
             delta -= beyond / by[0]
         after = laws.renewed(one, own, border, delta, place[2])[places]
         return after - maps[:, 0] * (delta - place[1])

@@ -146,15 +146,19 @@ class Flow:
         y, y_dot = (np.moveaxis(-one.rows @ x, 0, -1) for x in self.motion.at(np.atleast_1d(t)))
         return y - one.offsets.T[:, None], y_dot
 
-    def over_laws(self, s: int, acting: Acting, read: Callable[[Any, Array], Any]) -> Any:
-        """Derivatives (..., d) by the parameters of what is read off a law, at fixed latched numbers."""
-        places, width = self.system.contacts[s].memory, len(acting.rows[s])
+    def over_laws(self, s: int, acting: Acting, read: Callable[[Any, Array, float], Any]) -> Any:
+        """Derivatives (..., d) by the parameters of what is read off a law, at fixed latched numbers.
+
+        An entry rate at the floor of the law is, in nearby ones, at theirs.
+        """
+        places, width, rate = self.system.contacts[s].memory, len(acting.rows[s]), acting.entry_rate[s]
+        floored = rate == self.system.contacts[s].law.entry_rate_floor
 
         def of(law: Any) -> Any:
             row = np.zeros(width)
             row[: len(law.parameters)] = law.parameters
             row[places] = acting.rows[s][places]
-            return read(law, row)
+            return read(law, row, law.entry_rate_floor if floored else rate)
 
         return self.by.over_laws(s, of)
 
@@ -167,9 +171,9 @@ class Flow:
         law, rate = self.system.contacts[s].law, acting.entry_rate[s]
         inside = self._inside(s, acting, motion, self.by.laws_of(s))
         if getattr(law, "bend", None) != "force":
-            return self.over_laws(s, acting, lambda one, own: laws.force(one, own, inside, rate))
+            return self.over_laws(s, acting, lambda one, own, entry: laws.force(one, own, inside, entry))
         pushes: Any = laws.bend(law, inside, rate)
-        uncut = self.by.over_laws(s, lambda one: laws.uncut_force(one, inside, rate))
+        uncut = self.over_laws(s, acting, lambda one, own, entry: laws.uncut_force(one, inside, entry))
         return uncut * (pushes > 0.0)[:, None]
 
     def force_change(self, t: Array, s: int, acting: Acting) -> Linear:
