@@ -13,7 +13,7 @@ from problems import TIP, paper_scene
 from refusals import refused
 
 import fembeam as fb
-from contacts import Hertz, Hysteretic, Iwan, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic
+from contacts import Hertz, Hysteretic, Iwan, Jenkins, KelvinVoigt, PiecewiseLinear, Viscoelastic, law
 from fembeam.scene import with_value
 from fembeam.study.measure import cut
 from solvers import Contact, Exponential, Nearby, NoDerivativeError, System, integrate, sensitivity
@@ -85,6 +85,26 @@ def test_the_peak_of_a_contact_that_only_pulls():
     found = sensitivity(system, *start, nearby=strengths, method=FINE)
     assert found.impulse[0] < -1e-5
     assert found.peak_force[0] == 0.0
+
+
+KNOT = 0.02
+
+
+@law(knots=[KNOT])
+def breaking(delta, delta_dot, entry_rate, stiffness=STIFFNESS):
+    return stiffness * delta * (1.0 if delta <= KNOT else 0.2)
+
+
+def test_a_peak_just_before_the_force_drops():
+    """k δ up to the knot, a fifth of it beyond: until it turns back, the largest force is k × knot."""
+
+    def made(k):
+        return ball(law=breaking(stiffness=k))
+
+    k = 0.1 * STIFFNESS
+    found = sensitivity(made(k), [0.0], [SPEED], 0.24, nearby=Nearby.of(made, k, 1.0), method=FINE)
+    assert found.contacts.peak_force[0] == pytest.approx(k * KNOT, rel=1e-9)
+    assert found.peak_force[0] == pytest.approx(KNOT, rel=1e-8)
 
 
 @pytest.mark.parametrize("speed", [1e-6, 1e-3, 1e3])

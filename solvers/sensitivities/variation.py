@@ -436,7 +436,7 @@ class _Walk:
             if _ends_on_knot(row, following):
                 last = knot_shift(self.flow, t, following, self.acting, float(self.asked.span[s]))
             ends, begins = row[at.FROM] > 0.0 and row[at.TO] == 0.0, row[at.FROM] == 0.0 and row[at.TO] > 0.0
-            known = self._at_instant(t) if t > 0.0 else {}
+            known = self._at_instant(t)
             before = self.flow.impulse[s].copy()
             self.acting, last = cross(self.flow, t, row, self.acting, float(self.asked.span[s]), last)
             self._offer(known, last)
