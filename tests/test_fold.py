@@ -88,11 +88,36 @@ def test_folds_alone_have_no_derivative():
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 
-def test_a_stop_by_its_gap_and_by_the_force():
-    """Lengths scale with the force: a gap 1.02 times as wide has the folds of a force 1.02 times as small."""
+def of_stop():
+    """A branch of a rod that strikes a stop."""
     scene = fb.Scene(ROD, [fb.Clamped(0.0)], stops=[fb.Stop(TIP, KelvinVoigt(5e3, 1.0), gap=1e-3, name="stop")],
                      forces=[fb.PointForce(TIP, fb.Harmonic(1.0, 200.0))], damping=fb.ModalDamping(0.02))  # fmt: skip
-    branch = of_branch(scene.reduce(modes=1), (160.0, 280.0))
+    return of_branch(scene.reduce(modes=1), (160.0, 280.0))
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_closed_curve_is_passed_once(number):
+    """Gaps near nothing and gaps beyond the amplitude at resonance fold nothing: in between the folds form a ring."""
+    found = fb.study.fold(of_stop(), "stops[stop].gap", (1e-4, 0.1), number=number)
+    assert set(found.endings) == {"closed: came back to its first fold"}
+    assert len(found.cusps) == 2
+    np.testing.assert_allclose(found.values[[0, -1]], 1e-3, rtol=1e-12)
+    assert found.at[0] == found.at[-1]
+    model = found.orbits[0].model
+    resonance = float(model.phi(TIP)[0] ** 2 / (2.0 * 0.02 * model.omega[0] ** 2))
+    assert 0.9 * resonance < found.values.max() < resonance
+
+
+def test_steps_grow_with_the_motion():
+    """Followed to 30 times the force, from near the cusp as from far: steps were those of the motion at the start."""
+    near, far = of_branch(duffing(0.13), (180.0, 195.0)), of_branch(duffing(3.9), (175.0, 500.0))
+    counts = [len(fb.study.fold(one, FORCE, (0.1, 4.0)).values) for one in (near, far)]
+    assert counts[0] < 3 * counts[1]
+
+
+def test_a_stop_by_its_gap_and_by_the_force():
+    """Lengths scale with the force: a gap 1.02 times as wide has the folds of a force 1.02 times as small."""
+    branch = of_stop()
     by_gap = fb.study.fold(branch, "stops[stop].gap", (1e-3, 1.02e-3))
     by_force = fb.study.fold(branch, FORCE, (1.0 / 1.02, 1.0))
     assert by_gap.at[-1] == pytest.approx(by_force.at[0], rel=1e-9)

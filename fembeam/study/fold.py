@@ -111,7 +111,7 @@ def fold(branch: Branch, over: str, span: tuple[float, float], number: int = 0, 
     Notes
     -----
     Motions are periodic to 1e-10, λ and p are right to 1e-8 of themselves. Where a contact grazes the curve ends, as
-    the return map is not smooth there; `endings` says so.
+    the return map is not smooth there, and a closed one where it began; `endings` says so.
 
     References
     ----------

@@ -27,6 +27,8 @@ CLOSED, SINGULAR = 1e-10, 1e-8  # largest residual, relative to the motion, and 
 MOST, STRAIGHT = 8, 0.8  # most iterations for a point, and least cosine between two tangents
 LONGEST, SHORTEST = 0.2, 1e-4  # steps along the curve, in units of both spans and of the motion
 SHARP = 1e-9  # arc length to which a cusp is located
+SAME = 1e-6  # distance from its first point at which a curve has come back to it
+ROUND = "closed: came back to its first fold"
 POINTS = 400  # at most, in one direction
 
 
@@ -37,7 +39,8 @@ class FoldCurve:
     Attributes
     ----------
     orbits : the motions at the folds; `Orbit.parameter` is the first parameter, ``mark`` "fold", or "cusp" where two
-        folds meet and the second parameter turns. values : (k,) of the second. endings : of both directions, in words.
+        folds meet and the second parameter turns. values : (k,) of the second. endings : of both directions, in words;
+        a closed curve begins and ends at the fold it was followed from.
     """
 
     orbits: list[Orbit]
@@ -181,8 +184,9 @@ def fold_curve(
     u, _, v = np.linalg.svd(equations.at(y)[3][:, :-2])
     up = np.append(np.zeros(len(y) - 1), 1.0)
     first = equations.solved(y, up, (u[:, -1], v[-1]), up)
-    walks = [_walk(equations, replace(first, tangent=sign * first.tangent), span, step) for sign in (1.0, -1.0)]
-    (ahead, end), (behind, begin) = walks
+    ahead, end = _walk(equations, first, span, step)
+    back = replace(first, tangent=-first.tangent)
+    behind, begin = ([], end) if end == ROUND else _walk(equations, back, span, step)
     found = [*reversed(behind), (first, "fold"), *ahead]
     orbits = [
         orbit_of(one.problem, replace(one.chain, error=float(np.abs(one.chain.residual).max())), mark)
@@ -192,32 +196,54 @@ def fold_curve(
 
 
 def _walk(
-    equations: _Equations, point: _Point, span: tuple[float, float], longest: float
+    equations: _Equations, point: _Point, span: tuple[float, float], most: float
 ) -> tuple[list[tuple[_Point, str]], str]:
     """Points in one direction with their marks, and how the curve ended."""
     points: list[tuple[_Point, str]] = []
-    ends, step = np.array(span) / equations.widths[1], 0.2 * longest
+    ends, step = np.array(span) / equations.widths[1], 0.2 * most
     if np.any(np.isclose(point.y[-1], ends, rtol=1e-12, atol=0.0) & (np.array([-1.0, 1.0]) * point.tangent[-1] > 0.0)):
         return points, "reached the end of the span"  # it begins there
+    first = point
     while len(points) < POINTS:
+        longest = _longest(first, point, most)
         try:
-            new = _moved(equations, point, step, ends)
+            new = _moved(equations, point, min(step, longest), ends)
+            back = _is_back(equations, first, point, new)
+            new = first if back else new
             turned = float(new.tangent @ point.tangent)
             if turned < STRAIGHT:
                 raise OrbitError("the curve turns too fast")
             if new.tangent[-1] * point.tangent[-1] < 0.0:
                 points.append((_cusp(equations, point, new), "cusp"))
         except NO_ORBIT as error:
-            step *= 0.5
-            if step < SHORTEST * longest:
+            step = 0.5 * min(step, longest)
+            if step < SHORTEST * most:
                 return points, f"stopped at {point.y[-1] * equations.widths[1]:.6g}: {error}"
             continue
         points.append((new, "fold"))
-        if new.y[-1] in ends:
-            return points, "reached the end of the span"
-        step = min(1.5 * step, longest) if turned > 0.5 * (1.0 + STRAIGHT) else step
+        if back or new.y[-1] in ends:
+            return points, ROUND if back else "reached the end of the span"
+        step = 1.5 * min(step, longest) if turned > 0.5 * (1.0 + STRAIGHT) else step
         point = new
     return points, f"{POINTS} points were not enough"
+
+
+def _longest(first: _Point, point: _Point, most: float) -> float:
+    """The longest step: ``most`` in units of the motion and of the way along λ so far, where these are larger."""
+    size = max(1.0, float(np.linalg.norm(point.y[:-2])))
+    far = max(1.0, abs(float(point.y[-2] - first.y[-2])))
+    along = float(np.linalg.norm(point.tangent[:-2]))
+    return most / math.hypot(along / size, point.tangent[-2] / far, point.tangent[-1])
+
+
+def _is_back(equations: _Equations, first: _Point, a: _Point, b: _Point) -> bool:
+    """Whether the curve passes its first point between two others: the plane there, at right angles to it."""
+    before, behind = (float(first.tangent @ (one.y - first.y)) for one in (a, b))
+    if not (before < 0.0 <= behind and np.linalg.norm(b.y - first.y) < 2.0 * np.linalg.norm(b.y - a.y)):
+        return False
+    guess = a.y + before / (before - behind) * (b.y - a.y)
+    met = equations.solved(guess, first.tangent, a.borders, first.tangent)
+    return float(np.linalg.norm(met.y - first.y)) < SAME
 
 
 def _moved(equations: _Equations, point: _Point, step: float, ends: Array) -> _Point:
