@@ -118,7 +118,10 @@ def law_tables_of(contacts: Sequence[Any]) -> dict[str, Any]:
 
 
 def _inlined(contact: Any) -> Any:
-    """Parameters of a power law that need not be called, before its cut at F = 0; None of others."""
+    """Parameters of a power law that need not be called, before its cut at F = 0; None of others.
+
+    Under friction a law with a cut is called: there the slopes of its force count, which are 0 where it is cut.
+    """
     law = contact.law if contact.friction is not None else _uncut(contact.law)
     return None if contact.always else getattr(law, "inlined", None)
 

@@ -425,8 +425,9 @@ def note_signals(problem, tables, scratch):
 def _hidden_kink(problem, state, scratch, s, largest):
     """Largest difference, N, of law and polynomial at the ends of a smooth step; 0 if the coefficients explain it.
 
-    Otherwise the law has a kink between that end and the next node, within a fiftieth of the step, as with clamp=True;
-    or it saturates within that time, as hysteresis of a knee that is small beside the motion does after a border.
+    Otherwise the law has a kink between that end and the next node, within a fiftieth of the step, as a called law
+    with clamp=True; or it saturates within that time, as hysteresis of a knee that is small beside the motion does
+    after a border.
     """
     delta, rate = scratch.clipped[0:2], scratch.trial[0:2]
     delta[0], rate[0] = indentation_and_rate(problem, s, scratch.x_new)
