@@ -2,8 +2,10 @@
 
 import csv
 import re
+import sys
 from dataclasses import replace
 from functools import partial
+from io import StringIO
 from pathlib import Path
 from runpy import run_path
 from types import SimpleNamespace
@@ -16,7 +18,7 @@ from refusals import refused_by
 import fembeam as fb
 from contacts import KelvinVoigt, PiecewiseLinear
 from fembeam.cli import main
-from fembeam.study import NoReferenceError, Point, SpeedAccuracy, Verdict, speed_accuracy, stability_map
+from fembeam.study import NoReferenceError, Point, SpeedAccuracy, Verdict, mode_count, speed_accuracy, stability_map
 from fembeam.study.measure import cut
 from fembeam.study.quantities import Amplitude, Psd
 from solvers import RK4, CentralDifference, DormandPrince, Exponential, HenonRK2, Newmark
@@ -207,6 +209,19 @@ def test_map_over_modes_agrees_with_the_predicted_limits(tmp_path):
     assert found.error[0, 0] < found.tolerance
     assert "predicted" in str(found)
     fb.plot.stability_map(found).savefig(tmp_path / "map.png")
+
+
+@pytest.mark.parametrize("wanted", [True, False])
+def test_studies_show_progress_on_a_terminal_when_asked(wanted, monkeypatch):
+    """A map showed none, studies of modes did under `fembeam run --quiet` too."""
+    terminal = StringIO()
+    terminal.isatty = lambda: True
+    monkeypatch.setattr(sys, "stderr", terminal)
+    stability_map(paper_scene(), RK4, [1e-5, 5e-5], modes=(1, 2), duration=0.01, progress=wanted)
+    assert ("4/4" in terminal.getvalue()) == wanted
+    terminal.truncate(0)
+    mode_count(paper_scene(), [1, 2], "peak_force", duration=0.1, residual=False, progress=wanted)
+    assert ("2/2" in terminal.getvalue()) == wanted
 
 
 def test_map_over_stiffness_sees_missed_contacts():

@@ -67,8 +67,8 @@ if TYPE_CHECKING:
     from fembeam.scene import Scene
     from fembeam.scene_file.reader import SceneFile
 
-# Python objects, what [reduce] says of the mesh, and what the folder of results has
-NOT_IN_A_FILE = "scene", "start", "solver", "executor", "elements", "checkpoint"
+# Python objects, what [reduce] says of the mesh, what the folder of results has, and what the command says
+NOT_IN_A_FILE = "scene", "start", "solver", "executor", "elements", "checkpoint", "progress"
 MOST_SEEDS = 100_000
 MOST_POINTS = 100_000  # of an axis
 MOST_WORKERS = 1000  # processes
@@ -110,7 +110,7 @@ class ModeStudy:
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> ModeCount | SmallestModel:
         """The study, with its checkpoint in the folder; NotMetError when there is no such model."""
         kept = folder / f"{self.study.__name__}.npz"
-        given = {**self.arguments, "seeds": self.seeds, **_mesh_of(file), "checkpoint": kept}
+        given = {**self.arguments, "seeds": self.seeds, **_mesh_of(file), "checkpoint": kept, "progress": progress}
         found: ModeCount | SmallestModel = self.study(file.scene, **given)
         return found
 

@@ -20,7 +20,7 @@ from fembeam.model.branch import Family
 from fembeam.plot.axis_names import axis_name, parameter_unit
 from fembeam.scene import called, path_of, turns_at, value_of
 from fembeam.study.result import Result, with_units
-from fembeam.support import Part, by_rows, is_finite, is_whole, require
+from fembeam.support import Part, by_rows, counting, is_finite, is_whole, require
 from solvers.branches import fold_curve
 from solvers.problem import counted
 
@@ -86,7 +86,9 @@ class Fold(Result):
     figure = plot.fold_curve
 
 
-def fold(branch: Branch, over: str, span: tuple[float, float], number: int = 0, z: Any = None) -> Fold:
+def fold(
+    branch: Branch, over: str, span: tuple[float, float], number: int = 0, z: Any = None, progress: bool = False
+) -> Fold:
     """Follow a fold of a branch along a second number of its scene, both ways.
 
         x(T; x₀, λ, p) = x₀,   g(x₀, λ, p) = 0, which vanishes where 1 is a multiplier
@@ -98,6 +100,7 @@ def fold(branch: Branch, over: str, span: tuple[float, float], number: int = 0, 
     span : (lowest, highest) p, the present one among them.
     number : which of the folds of the branch, from 0.
     z : m, or (place, direction), of the displacement u; None: the first stop or element, else the tip.
+    progress : show a bar of the folds found (on terminals and in notebooks only).
 
     Returns
     -------
@@ -144,15 +147,17 @@ def fold(branch: Branch, over: str, span: tuple[float, float], number: int = 0, 
     model.phi(z)  # a place that does not exist is refused
     families = _Families(Family(model, path, branch.family.period), name)
     low, high = branch.found.walks[0].span
-    found = fold_curve(families, known[number].found, present, (float(span[0]), float(span[1])), high - low)
+    ends = float(span[0]), float(span[1])
+    with counting(progress, unit=" folds") as bar:
+        found = fold_curve(families, known[number].found, present, ends, high - low, seen=bar.update)
     orbits = tuple(
         Orbit(families.at(value).at(one.parameter), one, branch.family.period)
         for value, one in zip(found.values.tolist(), found.orbits, strict=True)
     )
-    ends = np.array([one.extremes(z) for one in orbits])
+    extremes = np.array([one.extremes(z) for one in orbits])
     at = np.array([one.parameter for one in orbits])
     titles = axis_name(path, model.scene), axis_name(name, model.scene)
-    amplitude = 0.5 * (ends[:, 1] - ends[:, 0])
+    amplitude = 0.5 * (extremes[:, 1] - extremes[:, 0])
     units = parameter_unit(path, model.scene), parameter_unit(name, model.scene)
     return Fold(name, called(model.scene, over), found.values, at, amplitude, orbits, found.endings, z, titles, units)
 

@@ -156,7 +156,9 @@ class Case:
         return ", ".join(f"{name}={value}" for name, value in self.reduce)
 
 
-def measured(cases: Sequence[Case], executor: Executor | None, told: str, kept: Checkpoint) -> list[list[Measured]]:
+def measured(
+    cases: Sequence[Case], executor: Executor | None, told: str | None, kept: Checkpoint
+) -> list[list[Measured]]:
     """`measure` of each case, spread over an executor; what a checkpoint holds is not measured again."""
 
     def keys(case: Case) -> list[str]:

@@ -29,7 +29,7 @@ from fembeam.study.execution.checkpoint import Checkpoint
 from fembeam.study.measure import Case, Measured, Plan, Start, identity_of, measured
 from fembeam.study.quantities import Quantity, label, named, unit_of
 from fembeam.study.result import Result, with_units
-from fembeam.support import Part, is_whole, require, warn
+from fembeam.support import Part, is_whole, require, titled, warn
 from solvers.problem import counted
 
 LOOSER = 10.0  # times the tolerance, in the second run of the reference
@@ -185,6 +185,7 @@ def mode_count(
     executor: Executor | None = None,
     elements: int | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
+    progress: bool = True,
 ) -> ModeCount:
     """How a quantity converges with the number of modes.
 
@@ -208,6 +209,7 @@ def mode_count(
     elements : of the mesh of all counts; None: for each as few as make its frequencies right to 1e-6.
     checkpoint : file written whole after each count; what it holds is not computed again, also of other counts. It is
         refused when scene, quantity or runs differ.
+    progress : show a bar (on terminals and in notebooks only).
 
     Returns
     -------
@@ -258,7 +260,7 @@ def mode_count(
         for a in arguments
     ]
     finished = Checkpoint(checkpoint, partial(identity_of, scene, plan, kept))
-    found = measured(items, executor, f"modes for {label(kept)}", finished)
+    found = measured(items, executor, titled(progress, f"modes for {label(kept)}"), finished)
     exact, *loose = found[arguments.index(finest)]
     rows = _rows(arguments, [first for first, *_ in found], exact)
     study = ModeCount(label(kept), rows, _change(loose[0], exact) if loose else None, unit_of(kept, scene))

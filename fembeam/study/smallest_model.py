@@ -31,7 +31,7 @@ from fembeam.study.measure import Case, Measured, Plan, Start, identity_of, meas
 from fembeam.study.mode_count import check_comparable, difference, kinds_of
 from fembeam.study.quantities import Quantity, label, named
 from fembeam.study.result import Result
-from fembeam.support import Part, is_finite, is_whole, require
+from fembeam.support import Part, is_finite, is_whole, require, titled
 
 HEAD = "modes", "static", "rtol", "value", "error", "± (95 %)", "seconds", ""
 MOST = 64  # modes offered as an answer; the ladder goes twice as far
@@ -165,12 +165,13 @@ def smallest_model(
     executor: Executor | None = None,
     elements: int | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
+    progress: bool = True,
 ) -> SmallestModel:
     """The fewest coordinates and the loosest rtol that give a quantity to a relative tolerance.
 
     Parameters
     ----------
-    scene, quantity, duration, dt, discard, seeds, residual, start, executor, elements : as for `mode_count`.
+    scene, quantity, duration, dt, discard, seeds, residual, start, executor, elements, progress : as for `mode_count`.
     tolerance : relative, in (0, 1); of the norm if the quantity is an array.
     most : modes that an answer may have, 1 to 64. checkpoint : as for `mode_count`, written after each model.
 
@@ -204,8 +205,9 @@ def smallest_model(
     plan, kept = Plan(duration, dt, discard, seeds, start), named(quantity)
     plan.check(scene, kept)
     finished = Checkpoint(checkpoint, partial(identity_of, scene, plan, kept))
+    told = titled(progress, f"smallest model for {label(kept)}")
     return Search(
-        scene, kept, plan, float(tolerance), int(most), kinds_of(scene, residual), executor, elements, finished
+        scene, kept, plan, float(tolerance), int(most), kinds_of(scene, residual), executor, elements, finished, told
     ).answer()
 
 
@@ -230,6 +232,7 @@ class Search:
     executor: Executor | None
     elements: int | None
     finished: Checkpoint
+    told: str | None
     seen: dict[Choice, Measured] = field(default_factory=dict)
 
     def answer(self) -> SmallestModel:
@@ -255,7 +258,7 @@ class Search:
             for (n, kind), group in zip(models, groups, strict=True)
         ]  # fmt: skip
         if items:
-            found = measured(items, self.executor, f"smallest model for {label(self.quantity)}", self.finished)
+            found = measured(items, self.executor, self.told, self.finished)
             for group, each in zip(groups, found, strict=True):
                 self.seen.update(zip(group, each, strict=True))
         return [self.seen[choice] for choice in choices]

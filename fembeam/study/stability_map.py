@@ -16,7 +16,7 @@ from fembeam.model import Model
 from fembeam.scene import Scene
 from fembeam.study.result import Result
 from fembeam.study.speed_accuracy import method_name
-from fembeam.support import Part, require, vector
+from fembeam.support import Part, counting, require, vector
 from solvers.problem.whole_runs import whole_runs
 
 Vector = NDArray[np.float64]
@@ -94,6 +94,7 @@ def stability_map(
     duration: float = 0.1,
     tolerance: float = 0.01,
     start: Callable[[Model], Any] | None = None,
+    progress: bool = False,
 ) -> StabilityMap:
     """Run a method over a grid of steps and mode counts, or steps and contact stiffnesses.
 
@@ -109,6 +110,7 @@ def stability_map(
     duration : s; some ten impacts at most, as later trajectories of any two settings differ.
     tolerance : largest error of an accurate run, relative to the range of δ at the first stop.
     start : model -> (2n,); None is rest.
+    progress : show a bar (on terminals and in notebooks only).
 
     Returns
     -------
@@ -137,7 +139,14 @@ def stability_map(
     require(0.0 < tolerance < 1.0, "tolerance must lie in (0, 1)", tolerance, where, "e.g. 0.01")
     models, axis, rows = _models(scene, modes, stiffness)
     require(bool(models), f"{axis} must hold one", rows, where, "e.g. modes=[1, 2]")
-    cells = [[_cell(model, method, dt, duration, tolerance, start) for dt in steps] for model in models]
+    with counting(progress, total=len(models) * len(steps), unit=" runs") as bar:
+
+        def cell(model: Model, dt: float) -> tuple[Verdict, float]:
+            judged = _cell(model, method, dt, duration, tolerance, start)
+            bar.update()
+            return judged
+
+        cells = [[cell(model, dt) for dt in steps] for model in models]
     limits = [_limits(model, method, steps, duration) for model in models]
     flight, contact = np.array(limits).T
     return StabilityMap(

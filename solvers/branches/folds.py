@@ -130,7 +130,13 @@ class _Equations:
 
 
 def fold_curve(
-    make: Make, fold: Orbit, second: float, span: tuple[float, float], width: float, step: float = LONGEST
+    make: Make,
+    fold: Orbit,
+    second: float,
+    span: tuple[float, float],
+    width: float,
+    step: float = LONGEST,
+    seen: Callable[[], Any] = lambda: None,
 ) -> FoldCurve:
     """Follow a fold of a branch along a second parameter, both ways.
 
@@ -141,6 +147,7 @@ def fold_curve(
     second : value of the second parameter there, within span, its (lowest, highest) value.
     width : of the first parameter, to measure the curve with, such as the span of the branch.
     step : largest one, in units of both widths and of the motion.
+    seen : called after each point.
 
     Returns
     -------
@@ -184,9 +191,9 @@ def fold_curve(
     u, _, v = np.linalg.svd(equations.at(y)[3][:, :-2])
     up = np.append(np.zeros(len(y) - 1), 1.0)
     first = equations.solved(y, up, (u[:, -1], v[-1]), up)
-    ahead, end = _walk(equations, first, span, step)
+    ahead, end = _walk(equations, first, span, step, seen)
     back = replace(first, tangent=-first.tangent)
-    behind, begin = ([], end) if end == ROUND else _walk(equations, back, span, step)
+    behind, begin = ([], end) if end == ROUND else _walk(equations, back, span, step, seen)
     found = [*reversed(behind), (first, "fold"), *ahead]
     orbits = [
         orbit_of(one.problem, replace(one.chain, error=float(np.abs(one.chain.residual).max())), mark)
@@ -196,7 +203,7 @@ def fold_curve(
 
 
 def _walk(
-    equations: _Equations, point: _Point, span: tuple[float, float], most: float
+    equations: _Equations, point: _Point, span: tuple[float, float], most: float, seen: Callable[[], Any]
 ) -> tuple[list[tuple[_Point, str]], str]:
     """Points in one direction with their marks, and how the curve ended."""
     points: list[tuple[_Point, str]] = []
@@ -221,6 +228,7 @@ def _walk(
                 return points, f"stopped at {point.y[-1] * equations.widths[1]:.6g}: {error}"
             continue
         points.append((new, "fold"))
+        seen()
         if back or new.y[-1] in ends:
             return points, ROUND if back else "reached the end of the span"
         step = 1.5 * min(step, longest) if turned > 0.5 * (1.0 + STRAIGHT) else step
