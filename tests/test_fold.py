@@ -163,6 +163,23 @@ def test_the_table_of_a_scene_file(tmp_path, file_of):
     assert np.count_nonzero(found.values == 0.3) == 1  # the end that it begins at, once
 
 
+def test_the_branch_of_a_fold_is_kept(tmp_path, file_of, monkeypatch):
+    """What came after it failed or was killed, and the branch was lost."""
+    file = file_of(FILE)
+
+    def failing(branch, *_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("fembeam.study.fold", failing)
+    with pytest.raises(KeyboardInterrupt):
+        file.studies["fold"].run(file, tmp_path)
+    monkeypatch.setattr("fembeam.study.fold", lambda branch, *_: branch)
+    orbits = file.model().resume(tmp_path / "fold.npz").orbits
+    monkeypatch.setattr("fembeam.model.model.Model.branch", failing)  # not computed again
+    kept = file.studies["fold"].run(file, tmp_path)
+    np.testing.assert_array_equal(kept.parameter, [one.parameter for one in orbits])
+
+
 def test_values_without_the_present_one_are_refused_when_read(file_of):
     """Before the branch is computed, by the name of the key."""
     with pytest.raises(SceneFileError, match=r"\[fold\]: values must hold the present value 0.3 of forces"):

@@ -14,6 +14,7 @@ from problems import paper_scene
 import fembeam as fb
 import solvers
 from contacts import Hertz
+from fembeam.model import branch as of_branch
 from fembeam.scene_file import study_tables
 from fembeam.study import ensemble, stationary, vary
 from fembeam.study.execution import executors
@@ -95,6 +96,40 @@ def test_an_interrupted_branch_goes_on_as_if_it_had_not_been(interrupt):
     branch.run()
     np.testing.assert_array_equal(branch.parameter, whole.parameter)
     assert [one.mark for one in branch.orbits] == [one.mark for one in whole.orbits]
+
+
+def test_a_killed_branch_goes_on_from_its_file_as_if_it_had_not_been(tmp_path, monkeypatch):
+    """It was written at Ctrl-C and at the end only, so that SIGKILL lost all of it."""
+    path, whole = tmp_path / "branch.npz", DRIVEN.branch("omega", (145.0, 155.0)).run()
+    monkeypatch.setattr(of_branch, "EVERY", -1.0)
+    save, kept = of_branch.Branch.save, []
+
+    def saved(self, target):
+        save(self, target)
+        kept.append(path.read_bytes())
+
+    monkeypatch.setattr(of_branch.Branch, "save", saved)
+    DRIVEN.branch("omega", (145.0, 155.0)).run(checkpoint=path)
+    assert len(kept) == len(whole.orbits) + 1
+    for content in kept[:: len(kept) // 3]:
+        path.write_bytes(content)
+        resumed = DRIVEN.resume(path).run()
+        np.testing.assert_array_equal(resumed.parameter, whole.parameter)
+        np.testing.assert_array_equal([one.state for one in resumed.orbits], [one.state for one in whole.orbits])
+        assert [one.mark for one in resumed.orbits] == [one.mark for one in whole.orbits]
+
+
+def test_a_branch_that_fails_is_kept(tmp_path, monkeypatch):
+    path, branch = tmp_path / "branch.npz", DRIVEN.branch("omega", (145.0, 155.0))
+
+    def failing():
+        yield from list(branch.found.orbits)
+        raise solvers.SolverError("diverged", None)
+
+    monkeypatch.setattr(type(branch.found), "__iter__", lambda _: failing())
+    with pytest.raises(solvers.SolverError, match="diverged"):
+        branch.run(checkpoint=path)
+    assert len(DRIVEN.resume(path).orbits) == 1
 
 
 NOISE = fb.BandNoise(std=3e-4, band=(0.0, 1226.6), seed=3)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,6 +41,7 @@ Vector = NDArray[np.float64]
 RECORDED = {"name", "period", "scene", "digest", "modes", "omega", "walks"}  # of a saved branch
 SAME = 1e-9  # relative: frequencies of one model, made again
 ALIKE = 0.8  # cosine between shapes of a mode, from which on its sign is known
+EVERY = 10.0  # s between two times a branch under way is saved
 SHORTEST = 2.0**-8  # share of a step in which signs are followed
 
 
@@ -117,11 +119,22 @@ class Branch(Printed):
         """Known orbits, then new ones."""
         return (self._orbit(one) for one in self.found)
 
-    def run(self, progress: bool = False) -> Branch:
-        """Compute all of it; after Ctrl-C the orbits found are kept, and another call continues."""
-        with counting(progress, self.found, unit=" orbits") as bar:
-            for one in bar:
-                bar.set_postfix_str(f"{self.family.name} = {one.parameter:.6g}", refresh=False)
+    def run(self, progress: bool = False, checkpoint: str | Path | None = None) -> Branch:
+        """Compute all of it; after Ctrl-C the orbits found are kept, and another call continues.
+
+        With checkpoint that file is written as by `save`, every `EVERY` seconds and at the end, whatever ends it.
+        """
+        try:
+            with counting(progress, self.found, unit=" orbits") as bar:
+                saved = monotonic()
+                for one in bar:
+                    bar.set_postfix_str(f"{self.family.name} = {one.parameter:.6g}", refresh=False)
+                    if checkpoint is not None and monotonic() - saved > EVERY:
+                        self.save(checkpoint)
+                        saved = monotonic()
+        finally:
+            if checkpoint is not None:
+                self.save(checkpoint)
         note("%r", self)
         return self
 

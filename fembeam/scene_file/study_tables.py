@@ -451,25 +451,22 @@ class BranchTable:
         load_period(with_value(scene, path_of(scene, self.parameter), self.span[1]))
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> FoundBranch:
-        """The branch, saved as ``branch.npz`` in the folder; continues where an interrupted one left that.
+        """The branch, saved as ``branch.npz`` in the folder; continues where an interrupted one left that."""
+        return FoundBranch(self.followed(file.model(), folder / "branch.npz", progress))
+
+    def followed(self, model: Model, kept: Path, progress: bool) -> Branch:
+        """The branch, saved in a file; from there if it exists.
 
         Raises
         ------
         ValueError : that branch belongs to another table, scene or number of modes.
         """
-        model, kept = file.model(), folder / "branch.npz"
         if kept.exists():
             branch = model.resume(kept)
             self._check(branch, model, kept)
         else:
             branch = model.branch(self.parameter, self.span, self.period, at=self.at, step=self.step)
-        try:
-            branch.run(progress)
-        except KeyboardInterrupt:
-            branch.save(kept)
-            raise
-        branch.save(kept)
-        return FoundBranch(branch)
+        return branch.run(progress, kept)
 
     def _check(self, branch: Branch, model: Model, path: Path) -> None:
         """A saved branch answers this table."""
@@ -692,9 +689,10 @@ class FoldTable:
         _check_place(scene, self.z)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.Fold:
-        """The study."""
-        branch = file.model().branch(self.parameter, self.span, self.period).run(progress)
-        return studies.fold(branch, self.over, self.values, self.number, self.z)
+        """The study, its branch saved as ``fold.npz`` in the folder."""
+        along = BranchTable(self.span, self.parameter, self.period)
+        branch = along.followed(file.model(), folder / "fold.npz", progress)
+        return studies.fold(branch, self.over, self.values, self.number, self.z, progress)
 
 
 @dataclass(frozen=True)
