@@ -175,7 +175,9 @@ def test_a_full_disk_leaves_whole_files_only(tmp_path, capsys, room):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert code == 1
-    assert "results cannot be written" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "results cannot be written" in said
+    assert re.search(r"out.\w+\.\w+: File too large", said)  # which file
     assert not [path for path in out.iterdir() if path.name.startswith(".")]
     assert all(path.stat().st_size < room for path in out.iterdir())
 

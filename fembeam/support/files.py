@@ -55,12 +55,16 @@ def written_whole(target: Path) -> Iterator[Any]:
     try:
         with os.fdopen(handle, "w+b") as file:
             yield file
+            file.flush()
+            os.fsync(handle)  # else a loss of power may leave the new name with nothing in it
         mask = os.umask(0)  # mkstemp makes private files; results are for the user's group too
         os.umask(mask)
         os.chmod(name, 0o666 & ~mask)
         os.replace(name, target)
-    except BaseException:
+    except BaseException as error:
         Path(name).unlink(missing_ok=True)  # Ctrl-C comes after the file has its name, too
+        if isinstance(error, OSError) and error.errno and error.filename is None:  # a full disk names no file
+            raise OSError(error.errno, error.strerror, str(target)) from error
         raise
 
 
