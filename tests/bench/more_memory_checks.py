@@ -62,6 +62,8 @@ def derivative(scene: Scene, reference: Any) -> str:
         return ""
     n = scene.system.size
     scale = np.repeat([np.abs(reference.q).max(), np.abs(reference.q_dot).max()], n)
+    if not scale.all():  # at rest all along
+        return ""
     run = _end(scene, Exponential(1e-11), tangent=True)[1]
     matrix = run.tangent if run.memory_tangent is None else run.memory_tangent
     found, least, off = matrix[:, : 2 * n] * scale, np.inf, np.zeros(1)
