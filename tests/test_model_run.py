@@ -380,6 +380,37 @@ def test_bad_arguments_are_refused_in_words(run, ask, message):
         ask(run)
 
 
+RAGGED = [[1.0, 2.0], [3.0]]
+
+
+@pytest.mark.parametrize(
+    ("ask", "message"),
+    [
+        (lambda run: fb.ModalDamping(RAGGED), r"zeta\[0\] must be a number, got \[1.0, 2.0\]"),
+        (lambda run: run.model.scene.reduce(RAGGED), "mode numbers must be whole, from 0, each once"),
+        (lambda run: run.model.scene.reduce(np.array(2.5)), "modes must be a whole number or a list of them"),
+        (lambda run: fb.pdf(np.arange(9.0), bins=RAGGED), "edges of bins must be real numbers"),
+        (lambda run: fb.study.basins(run.model, points=RAGGED), "points must be one or two whole numbers"),
+        (lambda run: fb.study.mode_count(run.model.scene, np.array(2), "peak_force"), "counts must be a list"),
+        (lambda run: fb.study.floor_spectra(run, np.array(0.2)), "places must be a list of one or more"),
+        (lambda run: fb.Stop(0.2, Hertz(1e8), direction=np.array(1.0)), "direction must be a name or a vector"),
+        (lambda run: fb.Stop(0.2, Hertz(1e8), side=np.array([])), "side must be 'below' or 'above'"),
+        (lambda run: fb.Stop(0.2, Hertz(1e8), of=np.array(["rotation"] * 2)), "of must be 'displacement' or"),
+        (lambda run: fb.SineSweep(1e-3, 10.0, 20.0, 1.0, np.ones(2)), "kind must be 'linear' or 'logarithmic'"),
+        (lambda run: run.model.orbit(10**400), "period counts periods of the load"),
+        (lambda run: solvers.System(RAGGED, RAGGED, RAGGED), "M must be real numbers in rows of equal length"),
+        (lambda run: solvers.System.modal(RAGGED, 0.1), "omega must be real numbers in rows of equal length"),
+        (lambda run: solvers.System.modal([1.0], 0.1, [], [(RAGGED, math.cos)]), "vector of load 0 must be real"),
+        (lambda run: solvers.Contact(RAGGED, Hertz(1e8)), "direction of a Contact must be real numbers"),
+        (lambda run: solvers.integrate(solvers.System.modal([1.0], 0.1), RAGGED, [0.0], 1.0), "q0 must be real"),
+    ],
+)  # fmt: skip
+def test_ragged_rows_and_arrays_without_a_length_are_refused_in_words(run, ask, message):
+    """They ended in the words of NumPy."""
+    with pytest.raises(ValueError, match=message):
+        ask(run)
+
+
 def test_a_run_that_goes_on_within_a_contact_warns_of_its_rate_of_entry(run):
     """Hysteretic's, not KelvinVoigt's; at rest in contact it is the floor, as ever."""
     log = run.contacts

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
 import reduction
-from fembeam.support import make_native, require, require_non_negative
+from fembeam.support import is_listed, make_native, require, require_non_negative
 
 FULL_MATRIX_LIMIT = 2000  # free dofs: C of modal damping is dense, 32 MB here, and takes all modes (about 10 s)
 
@@ -44,7 +44,7 @@ class ModalDamping:
     zeta: tuple[float, ...]
 
     def __init__(self, zeta: float | Sequence[float] | NDArray[np.float64]) -> None:
-        values = tuple(zeta) if isinstance(zeta, (Sequence, np.ndarray)) and np.ndim(zeta) else (zeta,)
+        values = tuple(zeta) if isinstance(zeta, (Sequence, np.ndarray)) and is_listed(zeta) else (zeta,)
         require(len(values) > 0, "zeta must hold a value", zeta, "ModalDamping", "give one ratio per mode")
         for index, value in enumerate(values):
             require_non_negative(f"zeta[{index}]", value, "ModalDamping", "give ratios such as 0.02")

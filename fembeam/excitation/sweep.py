@@ -17,6 +17,7 @@ from numpy.polynomial import Polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.excitation.line_spectrum import HERMITE_CONSTANT, checked_order, keep_number, tabulated
+from fembeam.support import is_one_of
 
 Vector = NDArray[np.float64]
 Kind = Literal["linear", "logarithmic"]
@@ -65,7 +66,7 @@ class SineSweep:
         keep_number(self, "amplitude")
         for name, unit in (("omega0", "rad/s"), ("omega1", "rad/s"), ("duration", "s")):
             keep_number(self, name, unit, above=0.0)
-        if self.kind not in ("linear", "logarithmic"):
+        if not is_one_of(self.kind, ("linear", "logarithmic")):
             raise ValueError(f"SineSweep kind must be 'linear' or 'logarithmic', got {self.kind!r}")
 
     @property

@@ -22,7 +22,7 @@ from fembeam.model.equations import load_period
 from fembeam.model.extremes import extremes_of
 from fembeam.response import PlacedLog
 from fembeam.scene import signals_of, with_signals
-from fembeam.support import Part, Printed, counting, is_whole, numbers, require, require_seed, warn
+from fembeam.support import Part, Printed, counting, is_finite, is_whole, numbers, require, require_seed, warn
 from solvers import orbits
 from solvers.problem import counted
 from solvers.problem.whole_runs import whole_runs
@@ -186,7 +186,7 @@ def orbit(
 
 def checked_period(period: int) -> int:
     """A whole number of load periods."""
-    whole = is_whole(period)
+    whole = is_whole(period) and is_finite(period)
     require(whole and period >= 1, "period counts periods of the load and must be a whole number above 0", period,
             "orbit", "period=2 is a 1/2 subharmonic")  # fmt: skip
     return int(period)

@@ -28,7 +28,7 @@ from fembeam.scene import (
 )
 from fembeam.scene.rigid_motions import carried_away
 from fembeam.structures import COMPONENTS
-from fembeam.support import is_finite, is_whole, require, require_switch, warn
+from fembeam.support import is_finite, is_listed, is_whole, require, require_switch, warn
 from solvers.problem import counted
 
 if TYPE_CHECKING:
@@ -376,7 +376,7 @@ def _most(body: Matrices, places: list[LocalCoordinate], count: int, interface: 
 def _numbers(modes: Any, interface: bool) -> tuple[int, ...]:
     """Mode numbers, ascending; the basis checks them."""
     whole = is_whole(modes)
-    require(whole or np.ndim(modes) == 1, "modes must be a whole number or a list of them", modes, "Scene.reduce",
+    require(whole or is_listed(modes), "modes must be a whole number or a list of them", modes, "Scene.reduce",
             "ask for modes=2, or modes=[0, 2]")  # fmt: skip
     require(not whole or modes <= MOST_DOFS, f"modes must be at most {MOST_DOFS}", modes, "Scene.reduce", "take fewer")
     numbers = list(range(int(modes))) if whole else list(modes)

@@ -16,7 +16,7 @@ from scipy import sparse
 
 from fembeam.scene.places import is_directed, is_place, place_words, unsigned
 from fembeam.structures import TURN, UP, Six, direction_of, turns
-from fembeam.support import is_numbered, is_pair, require
+from fembeam.support import is_numbered, is_one_of, is_pair, require
 
 if TYPE_CHECKING:
     from fembeam.scene.assembly import Matrices
@@ -108,7 +108,7 @@ def check_turn(of: str, gap: float, where: str) -> None:
 
 def local_coordinate(z: Any, of: str, to: Any, where: str, key: str, direction: Any = None) -> LocalCoordinate:
     """The coordinate that `of` or a direction and a second place (or pair, None) name; ValueError for others."""
-    require(of in KINDS, "of must be 'displacement' or 'rotation'", of, where, "choose one")
+    require(is_one_of(of, KINDS), "of must be 'displacement' or 'rotation'", of, where, "choose one")
     pair = to if to is None or is_numbered(to) else (0, to)
     planar = direction is None and pair is not None and (is_pair(pair[1]) or is_directed(pair))  # not of a beam
     is_end = pair is None or (is_place(pair[1]) and not planar)

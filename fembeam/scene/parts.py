@@ -19,7 +19,7 @@ from fembeam.scene.places import Place, Second, sign_of
 from fembeam.scene.rubbing import Friction, check_oblique
 from fembeam.scene.signal_checks import require_load, require_motion
 from fembeam.structures import COMPONENTS, Direction, direction_of, turns
-from fembeam.support import is_finite, require, require_finite, require_non_negative
+from fembeam.support import is_finite, is_one_of, require, require_finite, require_non_negative
 
 ROUNDED = 1e-9  # of the largest entry of a tensor
 
@@ -312,7 +312,8 @@ class Stop(ScenePart):
                 (self.side, self.direction), where, "keep the direction: 'y' is above, '-y' below")  # fmt: skip
         if self.side is None and self.direction is None:
             object.__setattr__(self, "side", "below")
-        require(self.side in ("below", "above", None), "side must be 'below' or 'above'", self.side, where,
+        sided = self.side is None or is_one_of(self.side, ("below", "above"))
+        require(sided, "side must be 'below' or 'above'", self.side, where,
                 "choose one")  # fmt: skip
         _check_direction(self, where)
         local_coordinate(self.z, self.of, self.on, where, "on", self.direction)

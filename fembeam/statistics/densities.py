@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fembeam.statistics.batches import Estimate
-from fembeam.support import is_whole, numbers
+from fembeam.support import is_listed, is_whole, numbers
 
 MOST_BINS = 200
 
@@ -147,7 +147,7 @@ def _bin_count(values: NDArray[np.float64]) -> int:
 
 def _edges(values: NDArray[np.float64], bins: int | ArrayLike) -> NDArray[np.float64]:
     """Bin edges from a count or from the caller, checked."""
-    if np.ndim(bins) == 0:
+    if not is_listed(bins):
         if not is_whole(bins) or bins < 1:
             raise ValueError(f"pdf: bins must be a whole number of at least 1, or edges, got {bins!r}")
         return np.histogram_bin_edges(values, int(bins))

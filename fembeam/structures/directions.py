@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 from fembeam.structures.assembled import COMPONENTS, Assembled
-from fembeam.support import is_finite, require
+from fembeam.support import is_finite, is_listed, require
 
 Direction: TypeAlias = str | Sequence[float]
 Six: TypeAlias = tuple[float, ...]  # one number for each of COMPONENTS
@@ -46,7 +46,7 @@ def direction_of(direction: Any, where: str) -> Six:
         require(name in COMPONENTS, f"direction must be one of {', '.join(COMPONENTS)}, or a vector", direction, where,
                 ADVICE)  # fmt: skip
         return tuple(sign * (name == one) + 0.0 for one in COMPONENTS)
-    vector = list(direction) if isinstance(direction, (list, tuple, np.ndarray)) else []
+    vector = list(direction) if isinstance(direction, (list, tuple, np.ndarray)) and is_listed(direction) else []
     right = len(vector) in (2, 3) and all(is_finite(number) for number in vector)
     size = float(np.linalg.norm(vector)) if right else 0.0
     require(right and size > 0.0, "direction must be a name or a vector of two or three numbers, not all zero",

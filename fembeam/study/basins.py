@@ -25,7 +25,7 @@ from fembeam.scene import Place, directed_words
 from fembeam.study.execution.checkpoint import Checkpoint, identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.result import Result
-from fembeam.support import Part, is_finite, is_whole, numbers, require, titled
+from fembeam.support import Part, is_finite, is_listed, is_whole, numbers, require, titled
 from solvers.orbits import delayed
 from solvers.orbits import run as run_from
 
@@ -320,7 +320,7 @@ def _shape(model: Model, z: Any, compliance: Vector) -> Vector:
 
 def checked_points(points: Any) -> tuple[int, int]:
     """Numbers of values along x and y."""
-    both = (points, points) if isinstance(points, (int, np.integer)) else tuple(np.ravel(points).tolist())
+    both = (points, points) if isinstance(points, (int, np.integer)) else tuple(points if is_listed(points) else ())
     whole = len(both) == 2 and all(is_finite(k) and k == int(k) and k >= 2 for k in both)
     require(whole, "points must be one or two whole numbers of at least 2", points, WHERE, "e.g. (100, 100)")
     require(both[0] * both[1] <= MOST_POINTS, f"points must be at most {MOST_POINTS} in all", points, WHERE,

@@ -29,7 +29,7 @@ from fembeam.study.execution.checkpoint import Checkpoint
 from fembeam.study.measure import Case, Measured, Plan, Start, identity_of, measured
 from fembeam.study.quantities import Quantity, label, named, unit_of
 from fembeam.study.result import Result, with_units
-from fembeam.support import Part, is_whole, require, titled, warn
+from fembeam.support import Part, is_listed, is_whole, require, titled, warn
 from solvers.problem import counted
 
 LOOSER = 10.0  # times the tolerance, in the second run of the reference
@@ -335,8 +335,7 @@ def observed_rate(rows: Sequence[Row]) -> float:
 
 def checked_counts(counts: Iterable[int], name: str = "counts") -> list[int]:
     """Checked counts, ascending, each once."""
-    listed = hasattr(counts, "__iter__")
-    require(listed, "counts must be a list of numbers of modes", counts, "study", "e.g. [1, 2, 3, 5, 10]")
+    require(is_listed(counts), "counts must be a list of numbers of modes", counts, "study", "e.g. [1, 2, 3, 5, 10]")
     chosen = list(counts)
     require(len(chosen) > 0, "counts must hold a number of modes", chosen, "study", "e.g. [1, 2, 3, 5, 10]")
     for count in chosen:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -91,6 +91,16 @@ def is_name(value: object) -> TypeGuard[str]:
     except (TypeError, OverflowError):  # the latter of a whole number beyond the floats
         return False
     return False
+
+
+def is_listed(value: Any) -> bool:
+    """Whether a value is several in a row: no text, and no array of NumPy without a length."""
+    return hasattr(value, "__iter__") and not isinstance(value, str) and getattr(value, "ndim", 1) > 0
+
+
+def is_one_of(value: Any, names: Iterable[str]) -> bool:
+    """Whether a value is one of the words; an array, which ``in`` would compare with each, is none."""
+    return isinstance(value, str) and value in names
 
 
 def is_pair(value: Any) -> bool:

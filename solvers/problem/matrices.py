@@ -26,6 +26,14 @@ def number(value: Any, what: str) -> float:
         return math.inf
 
 
+def reals(values: Any, what: str, dimensions: int = 0, kind: Any = float) -> Array:
+    """Numbers, real if not of another kind, in rows of equal length as a new array of at least so many dimensions."""
+    try:
+        return np.array(values, dtype=kind, ndmin=dimensions)
+    except (TypeError, ValueError):
+        raise ValueError(f"{what} must be real numbers in rows of equal length, got {values!r}") from None
+
+
 def product(rows: Array, matrix: Any) -> Array:
     """Rows (..., n) times a matrix (n, m), many of them in pieces too small for BLAS to spread over threads.
 
@@ -46,6 +54,7 @@ def dense(matrix: Any) -> Array:
 
 def square_matrix(name: str, matrix: Any, skew: bool = False) -> Any:
     """A finite copy of a symmetric or a ``skew`` matrix: sparse by columns if it was sparse, else dense."""
+    matrix = matrix if hasattr(matrix, "toarray") else reals(matrix, name, 2, None)
     if np.iscomplexobj(matrix):
         turned = float(abs(np.imag(matrix.data if hasattr(matrix, "toarray") else matrix)).max(initial=0.0))
         if turned > 0.0:
@@ -59,7 +68,7 @@ def square_matrix(name: str, matrix: Any, skew: bool = False) -> Any:
         copied: Any = csc_array(matrix, dtype=float, copy=True)
         values = copied.data
     else:
-        copied = values = np.array(matrix, dtype=float, ndmin=2)
+        copied = values = reals(matrix, name, 2)
     if copied.ndim != 2 or copied.shape[0] != copied.shape[1] or not copied.shape[0]:
         raise ValueError(f"{name} must be square, got shape {copied.shape}")
     if not np.all(np.isfinite(values)):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.problem import Array, Contact, Parameter, System
-from solvers.problem.matrices import number
+from solvers.problem.matrices import number, reals
 
 _MOST_SAMPLES = 500_000_000
 _FEW_SAMPLES = 10_000  # up to which an even sampling is kept
@@ -102,9 +102,10 @@ def checked_start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any)
 def _joined(n: int, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
     """A start (2n,) of one coordinate given as plain numbers, or ValueError that says which vector does not fit."""
     start = np.empty(2 * n)
-    for name, vector, place in (("q0", q0, start[:n]), ("q_dot0", q_dot0, start[n:])):
-        if np.shape(vector) != (n,) and (np.ndim(vector) or n != 1):
-            raise ValueError(f"{name} must have shape ({n},), got {np.shape(vector)}")
+    for name, given, place in (("q0", q0, start[:n]), ("q_dot0", q_dot0, start[n:])):
+        vector = reals(given, name)
+        if vector.shape != (n,) and (vector.ndim or n != 1):
+            raise ValueError(f"{name} must have shape ({n},), got {vector.shape}")
         place[:] = vector
     return start
 

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike
 
 from solvers.problem.decoupling import Blocks, decouple
 from solvers.problem.friction import Friction, Rubbing, row_of
-from solvers.problem.matrices import Array, check_mass, dense, number, product, square_matrix
+from solvers.problem.matrices import Array, check_mass, dense, number, product, reals, square_matrix
 from solvers.problem.memo import Memo
 
 _SMALL = 64  # coordinates up to which one product gives the energy of a motion sooner than two of half the size
@@ -131,7 +131,7 @@ class Contact:
     spin: float = 0.0
 
     def __post_init__(self) -> None:
-        direction = np.array(self.direction, dtype=float, ndmin=1)
+        direction = reals(self.direction, "direction of a Contact", 1)
         if isinstance(self.law, Rubbing):  # of a contact that this one is made of
             object.__setattr__(self, "law", self.law.law)
         if not hasattr(self.law, "entry_rate_floor") or isinstance(self.law, type):
@@ -172,7 +172,7 @@ class Contact:
             )
         if self.always or self.memory:
             raise ValueError(f"an annulus takes laws without memory that act for delta > 0, got {self.law!r}")
-        centre = np.array(self.centre, dtype=float)
+        centre = reals(self.centre, "centre of a Contact")
         if centre.shape != (2,) or not np.all(np.isfinite(centre)):
             raise ValueError(f"centre of an annulus must be two finite numbers (m), got {self.centre!r}")
         object.__setattr__(self, "centre", tuple(centre.tolist()))
@@ -386,7 +386,7 @@ class System:
             raise TypeError(f"load {i} must be a pair (vector, signal), got {pair!r}") from None
         vector: Any = next((vector for vector in known if vector is given), None)
         if vector is None:
-            vector = np.array(given, dtype=float, ndmin=1)
+            vector = reals(given, f"vector of load {i}", 1)
             vector.setflags(write=False)
             if vector.shape != (self.size,) or not np.all(np.isfinite(vector)):
                 raise ValueError(f"load {i} needs a finite vector of {self.size}, got {vector!r}")
@@ -415,8 +415,7 @@ class System:
         zeta : one number or (n,), >= 0.
         contacts, loads : as for `System`, in modal coordinates.
         """
-        omega = np.atleast_1d(np.asarray(omega, dtype=float))
-        zeta = np.asarray(zeta, dtype=float)
+        omega, zeta = reals(omega, "omega", 1), reals(zeta, "zeta")
         if omega.ndim != 1 or zeta.shape not in ((), (1,), omega.shape):
             raise ValueError(
                 f"omega must be a row of numbers, zeta one number or as many, got shapes {omega.shape}, {zeta.shape}"
