@@ -262,12 +262,13 @@ def reduced(tables: Table, modes: int) -> Reduced:
     space, found, least = Several(tables), [], 1.0
     for part in space.parts:
         K, M = part.Z.T @ part.K @ part.Z, part.Z.T @ part.M @ part.Z
-        squares, V = eigh((K + K.T) / 2, (M + M.T) / 2)
-        omega, d = np.sqrt(squares[:modes]), part.tables["damping"]
+        inverse, V = eigh((M + M.T) / 2, (K + K.T) / 2)  # of M v = v/ω²: the highest modes do not round the lowest
+        omegas = inverse[: -modes - 2 : -1] ** -0.5
+        omega, d = omegas[:modes], part.tables["damping"]
         zeta = np.append(np.atleast_1d(d.get("zeta", 0.0)), np.full(modes, np.atleast_1d(d.get("zeta", 0.0))[-1]))
         C = d["alpha"] + d["beta"] * omega**2 if "alpha" in d else 2 * zeta[:modes] * omega
-        found.append((omega, part.Z @ V[:, :modes], C))
-        apart = np.diff(np.sqrt(squares[: modes + 1])) / omega
+        found.append((omega, part.Z @ V[:, : -modes - 1 : -1] * omega, C))
+        apart = np.diff(omegas) / omega
         least = min(least, apart[-1], apart[0] if np.size(d.get("zeta", 0.0)) > 1 else 1.0)
     m, k, c = (np.array([one.get(key, 0.0) for one in space.impactors]) for key in ("mass", "stiffness", "damping"))
     omegas, vectors, C = zip(*found, (np.sqrt(k / m), np.diag(1 / np.sqrt(m)), c / m), strict=True)
