@@ -9,6 +9,7 @@ import fembeam as fb
 from contacts import Hertz, KelvinVoigt
 from fembeam.plot.bodies import displacements
 from fembeam.study.measure import cut
+from solvers import Exponential
 
 WAVE = fb.Harmonic(1e-3, 46.0, phase=0.7)
 DAMPED = {"damping": fb.ModalDamping(0.02)}
@@ -114,6 +115,19 @@ def test_few_modes_with_the_shapes_of_the_supports():
     w = np.array([5.0, 30.0, 60.0])
     both = [two.frequency_response(w, f"supports[{i}].motion.x", ("C", "x")).values for i in range(2)]
     assert np.allclose(sum(both), one.frequency_response(w, "base.x", ("C", "x"), absolute=True).values, rtol=1e-4)
+
+
+@pytest.mark.parametrize("elements", [4, 12])
+def test_reactions_with_few_modes(elements):
+    """Off from those on a base that moves by (ω/ω_s)² of the inertia that the other modes leave out."""
+    wave, damping = fb.Harmonic(1e-3, 200.0, phase=-np.pi / 2), fb.ModalDamping(0.2)
+    frame = fb.Frame({"A": (0, 0), "B": (1.0, 0.4)}, [fb.Member("A", "B", fb.Section.circle(2.1e11, 7800.0, 0.02))])
+    based = fb.Scene(frame, [fb.Clamped("A")], base={"x": wave}, damping=damping).reduce(4, elements=elements)
+    moved = fb.Scene(frame, [fb.Clamped("A", motion={"x": wave})], damping=damping).reduce(4, elements=elements)
+    one, two = (model.simulate(0.4, 5e-3, None, Exponential(1e-9)).reactions()[0]["x"] for model in (based, moved))
+    left = based.moving_mass[0] - based.effective_mass[:, 0].sum()
+    off = left * wave.amplitude * wave.omega**2 * (wave.omega / moved.omega.max()) ** 2
+    assert 0.8 * off < abs(two - one)[40:].max() < 1.2 * off < 1e-3 * abs(one).max()
 
 
 @pytest.mark.parametrize("omega", [3.0, 20.0, 55.0])
