@@ -356,7 +356,8 @@ def own_run(tables: Table, model: Reduced, duration: float, rtol: float, sizes: 
         q[n + i], u[n + i] = HEAVY * signal(table)(0.0), HEAVY * signal(table, 1)(0.0)
     q[:n] += move * scale[0]
     u[:n] += move * scale[1]
-    return motion.run(q, u, duration, kinks, rtol, 0.01 * scale), V
+    least = 0.01 * np.outer(sizes, np.append(np.full(n, scale[0] / sizes[0]), np.full(s, HEAVY)))
+    return motion.run(q, u, duration, kinks, rtol, least), V
 
 
 def own_numbers(tables: Table, model: Reduced, motion: Motion, V: Any, t: Any) -> dict[str, Any]:

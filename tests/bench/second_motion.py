@@ -186,7 +186,7 @@ class Motion:
         return found
 
     def run(self, q: Any, u: Any, duration: float, breaks: list[float], rtol: float, sizes: Any) -> Motion:
-        """Integrate; ``breaks``: kinks of signals. ``sizes``: of a displacement and a rate, for absolute tolerances."""
+        """Integrate; ``breaks``: kinks of signals. ``sizes``: of q and q', (2,) or (2, n), for absolute tolerances."""
         self.duration = duration
         n, m = self.n, self.m
         y, t = np.concatenate([q, u, np.zeros(2 + 3 * m)]), 0.0
@@ -203,8 +203,9 @@ class Motion:
                 one.state = "up" if d[i] > 0 else "down"
                 if v[i] * d[i] < 0:
                     one.go("stick", d[i], v[i])
-        energy = (sizes[1] ** 2) * np.ones(2 + m)
-        atol = rtol * np.concatenate([np.full(n, sizes[0]), np.full(n, sizes[1]), energy, np.full(2 * m, sizes[1])])
+        least = np.min(sizes[1])
+        each, work = [size * np.ones(n) for size in sizes], np.full(2, np.max(sizes[1]) ** 2)
+        atol = rtol * np.concatenate([*each, work, np.full(m, least**2), np.full(2 * m, least)])
         for end in [*[b for b in sorted(set(breaks)) if 0 < b < duration], duration]:
             while t < end:
                 t, y = self.stretch(t, y, end, rtol, atol)
@@ -223,9 +224,9 @@ class Motion:
         for i, one in enumerate(self.acting):
             for value, direction, to in one.borders():
 
-                def event(t: float, y: Any, i: int = i, value: Any = value) -> float:
+                def event(t: float, y: Any, i: int = i, value: Any = value, near: float = -1e-300 * direction) -> float:
                     d, v, z = self.local(y)
-                    return float(value(d[i], v[i], z[i]))
+                    return float(value(d[i], v[i], z[i])) or near  # at rest on a border it has not passed
 
                 event.terminal, event.direction = True, direction  # type: ignore[attr-defined]
                 events.append(event)
