@@ -22,6 +22,7 @@ AXES = ("x", "y", "z", "rx", "ry", "rz")
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(6)
 POINTS, WEIGHTS = 0.5 + 0.5 * POINTS, 0.5 * WEIGHTS
 CUBICS = [np.polynomial.Polynomial(c) for c in ([1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1])]
+STILL = 1e-13  # of the largest of a mode, below which what it moves a place is rounding: stops would hear of it
 HEAVY = 1e12  # mass of a coordinate that is prescribed: the motion of a support
 Table = dict[str, Any]
 
@@ -347,7 +348,12 @@ def own_run(tables: Table, model: Reduced, duration: float, rtol: float, sizes: 
         loads.append(np.append(-model.vectors.T @ space.M @ model.shapes[i], HEAVY * np.eye(s)[i]))
         signals.append(signal(table, 2))
     kinks = [t for table in (*model.motions, *(table for _, table, _ in parts if table)) for t in breaks(table)]
-    acting = [Acting(one["law"], one.get("gap", 0.0), -w @ V, always) for one, w, always in contacts_of(tables, space)]
+    told = contacts_of(tables, space)
+    rows = np.array([w for _, w, _ in told]).reshape(-1, len(space.K)) @ V
+    rows[np.abs(rows) < STILL * np.abs(V).max(axis=0)] = 0.0
+    acting = [
+        Acting(one["law"], one.get("gap", 0.0), -row, always) for (one, _, always), row in zip(told, rows, strict=True)
+    ]
     motion = Motion(np.append(model.omega, np.zeros(s)), C, np.array(loads), signals, acting)
     scale = math.sqrt(float(np.trace(space.parts[0].M[::6, ::6]))) * np.array(sizes)
     q, u = np.zeros((2, n + s))
