@@ -26,7 +26,7 @@ from comparison import judged, told_apart
 from drawn_frames import FrameDrawer, cut
 from model_tables import scene_file
 from scipy.linalg import eigh
-from second_frames import AXES, LOG, PIECES, Reduced, Space, Table, own_numbers, own_run, reduced
+from second_frames import AXES, LOG, PIECES, Reduced, Space, Table, own_numbers, own_run, reduced, significant
 from second_motion import TooManyError
 
 from fembeam.scene_file.reader import read
@@ -55,10 +55,11 @@ def their_numbers(tables: Table, run: Any, plane: bool) -> dict[str, Any]:
     for i in range(len(tables["supports"])):
         for name in known:
             found[f"reaction {i} {name}"] = table[i][name]
-    log, order = run.contacts, np.lexsort((run.contacts.t_in, run.contacts.stop))
-    found["contacts"] = np.array([np.sum(log.stop == i) for i in range(len(run.stops))])
+    log = run.contacts
+    kept = significant(log.stop, log.peak_indentation, log.t_in)
+    found["contacts"] = np.array([np.sum(log.stop[kept] == i) for i in range(len(run.stops))])
     for name in LOG:
-        found[f"log {name}"] = np.asarray(getattr(log, name))[order]
+        found[f"log {name}"] = np.asarray(getattr(log, name))[kept]
     return found
 
 

@@ -379,10 +379,18 @@ def own_numbers(tables: Table, model: Reduced, motion: Motion, V: Any, t: Any) -
             found |= {f"{name} {node} {AXES[c]}": x @ row for name, x in (("u", q), ("v", u), ("a", a))}
     for i in range(m):
         found |= {f"force {i}": F[:, i], f"impulse {i}": y[:, 2 * n + 2 + m + i], f"work {i}": y[:, 2 * n + 2 + i]}
-    found["contacts"] = np.array([sum(r["stop"] == i for r in motion.log) for i in range(m)])
-    rows = sorted(motion.log, key=lambda r: (r["stop"], r["t_in"]))
-    found |= {f"log {name}": np.array([r[name] for r in rows]) for name in LOG}
+    stop, depth, t_in = (np.array([r[k] for r in motion.log]) for k in ("stop", "peak_indentation", "t_in"))
+    kept = significant(stop, depth, t_in)
+    found["contacts"] = np.array([np.sum(stop[kept] == i) for i in range(m)])
+    found |= {f"log {name}": np.array([motion.log[i][name] for i in kept]) for name in LOG}
     return found | reactions(tables, model, u @ V.T, a @ V.T, F, t)
+
+
+def significant(stop: Any, depth: Any, t_in: Any) -> Any:
+    """Contacts deeper than 1e-7 of the deepest of their stop, by stop and time: others vary."""
+    deepest = np.array([depth[stop == i].max() for i in stop])
+    order = np.lexsort((t_in, stop))
+    return order[depth[order] > 1e-7 * deepest[order]]
 
 
 def reactions(tables: Table, model: Reduced, u: Any, a: Any, F: Any, t: Any) -> dict[str, Any]:
