@@ -220,7 +220,7 @@ class Motion:
 
     def stretch(self, t: float, y: Any, end: float, rtol: float, atol: Any) -> tuple[float, Any]:
         """To the next border."""
-        events, what = [], []
+        events, what, (d, v, z) = [], [], self.local(y)
         for i, one in enumerate(self.acting):
             for value, direction, to in one.borders():
 
@@ -230,7 +230,7 @@ class Motion:
 
                 event.terminal, event.direction = True, direction  # type: ignore[attr-defined]
                 events.append(event)
-                what.append((i, to))
+                what.append((i, to, value, direction, direction * value(d[i], v[i], z[i]) < 0.0))
         longest = 1.0 / max(self.omega.max(), 1e-300)
         for _ in range(MOST_REFINED):
             found = solve_ivp(self.rate, (t, end), y, "DOP853", dense_output=True, events=events or None, rtol=rtol,
@@ -241,9 +241,10 @@ class Motion:
             longest /= SHORTER
         self.pieces.append((t, found.t[-1], found.sol, [(a.state, a.entry, a.place) for a in self.acting]))
         t, y = found.t[-1], found.y[:, -1]
-        for (i, to), times in zip(what, found.t_events or (), strict=True):
-            if len(times):
-                d, v, _ = self.local(y)
+        d, v, z = self.local(y)
+        for (i, to, value, direction, ahead), times in zip(what, found.t_events or (), strict=True):
+            # SciPy tells one of several events at one time: the others are behind by rounding.
+            if len(times) or (ahead and direction * value(d[i], v[i], z[i]) >= 0.0):
                 if to == "open":
                     self.finish(self.latest(i), t, y, abs(v[i]))
                     self.latest(i)["t_out"] = t
