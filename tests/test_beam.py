@@ -32,6 +32,7 @@ def test_section_shapes():
     np.testing.assert_allclose([plate.A, plate.I, rod.A, rod.I], [6, 4.5, math.pi, math.pi / 4])
     tube, outer, inner = Section.tube(1, 1, 3, 2), Section.circle(1, 1, 3), Section.circle(1, 1, 2)
     np.testing.assert_allclose([tube.A, tube.I], [outer.A - inner.A, outer.I - inner.I])
+    assert [(one.fibre, one.fibre2) for one in (plate, rod, tube)] == [(1.5, 1.0), (1.0, 1.0), (1.5, 1.5)]
 
 
 @pytest.mark.parametrize("name", ["E", "rho", "A", "I"])
@@ -112,6 +113,17 @@ TAPERED = Taper(Section.rectangle(1.0, 12.0, 1.0, 1.0), Section.rectangle(1.0, 1
 def test_root_squares_to_the_stiffness(beam, nodes):
     K, R = bending_matrices(beam, nodes)[0], bending_root(beam, nodes)
     assert abs(R.T @ R - K).max() < 1e-13 * abs(K).max()
+
+
+def test_a_tapered_element_has_the_inertia_of_its_section():
+    """ρA is of second degree where width and height change: so M has integrands of degree 8."""
+    beam, z = Beam(1.0, TAPERED), np.polynomial.Polynomial([0.0, 1.0])
+    line_mass = 12.0 * (1.0 - 0.6 * z) * (1.0 - 0.8 * z)
+    np.testing.assert_allclose(beam.line_mass([0.0, 0.5, 1.0]), line_mass(np.array([0.0, 0.5, 1.0])), rtol=1e-14)
+    M = bending_matrices(beam, np.array([0.0, 1.0]))[1]
+    shapes = [1 - 3 * z**2 + 2 * z**3, z - 2 * z**2 + z**3, 3 * z**2 - 2 * z**3, z**3 - z**2]
+    exact = [[(line_mass * a * b).integ()(1.0) for b in shapes] for a in shapes]
+    np.testing.assert_allclose(M.toarray(), exact, rtol=1e-12)
 
 
 def test_interpolation_is_exact_for_cubics():
