@@ -10,6 +10,7 @@ from scipy import linalg
 
 import fembeam as fb
 import reduction
+from fembeam.beams import WAVE_STEP
 
 STEEL = fb.Section.rectangle(2.1e11, 7850.0, width=0.02, height=0.01)
 L_OMEGA = [104.6333966779874, 206.1055544860273, 329.4079614082485, 724.2568216310866, 1104.731296032686]
@@ -196,6 +197,19 @@ def timoshenko(section, wave):
     return np.sqrt(np.roots([*terms, section.E * section.I * wave**4]).min())
 
 
+@pytest.mark.parametrize("omega", [2e3, 2e4, 2e5])
+@pytest.mark.parametrize("kappa", [(5 / 6, 5 / 6), (0.85, 0.5)])
+def test_as_many_elements_as_the_waves_of_shear_need(omega, kappa):
+    """κ h stays below the step of the promise, whichever way a square bar bends, below and above the cut-off."""
+    own = replace(fb.Section.rectangle(2.1e11, 7850.0, width=0.2, height=0.2), shear=kappa)
+    G = min(kappa) * own.E / (2 * (1 + own.nu))  # cut-off √(κGA/ρI): 5.1e4 and 3.9e4 rad/s
+    linear = -own.rho * own.I * (1 + own.E / G) * omega**2
+    static = -own.line_mass * omega**2 + own.rho**2 * own.I * omega**4 / G
+    wave = np.sqrt(np.roots([own.E * own.I, linear, static]).max())
+    made = fb.Frame.straight(1.5, own).assembled(omega=omega)
+    assert made.mesh.elements.count == np.ceil(1.5 * wave / WAVE_STEP)
+
+
 @pytest.mark.parametrize("mode", [1, 3])
 def test_shear_order_and_constant(mode):
     """Pinned at both ends, height 0.13 and 0.4 of half a wave: still fourth order, with 1.0 to 1.15 of the constant."""
@@ -222,6 +236,17 @@ def test_shear_in_space():
         assert row @ static(made, row, "A") == pytest.approx(exact, rel=1e-9)
     fine = frequencies(frame.assembled(elements=120), 6, "A")
     assert np.all(np.abs(frequencies(frame.assembled(modes=6, places=["A"]), 6, "A") / fine - 1) < 1e-6)
+
+
+def test_shear_in_one_member_of_two():
+    """Tip of a cantilever whose thick half alone has shear: ∫ (L - s)²/EI ds of bending, and a/κGA of that half."""
+    thin, a, L = fb.Section.rectangle(2.1e11, 7850.0, width=0.1, height=0.1), 0.4, 0.8
+    frame = fb.Frame({"A": (0, 0), "B": (a, 0), "C": (L, 0)}, [fb.Member("A", "B", DEEP), fb.Member("B", "C", thin)])
+    made = frame.assembled(elements=2)
+    row = made.rows("C").toarray()[1]
+    bending = (L**3 - (L - a) ** 3) / (3 * DEEP.E * DEEP.I) + (L - a) ** 3 / (3 * thin.E * thin.I)
+    exact = bending + a / (5 / 6 * DEEP.E / 2.6 * DEEP.A)
+    assert row @ static(made, row, "A") == pytest.approx(exact, rel=1e-9)
 
 
 # A `Beam` has no shear; coefficients are positive; I12 must be turned away.

@@ -304,9 +304,8 @@ def _sheared_wave(I: float, own: Section, omega: float) -> float:
     if own.shear is None:
         return 0.0
     G = float(np.min(own.shear)) * own.E / (2 * (1 + own.nu))
-    half = own.rho * omega**2 * (1 / own.E + 1 / G) / 2
-    static = own.line_mass * omega**2 / (own.E * I) * (1 - own.rho * I * omega**2 / (G * own.A))
-    return float(np.sqrt(half + np.sqrt(max(half**2 + static, 0.0))))
+    mean, apart = (own.rho * omega**2 * (1 / own.E + sign / G) / 2 for sign in (1, -1))
+    return float(np.sqrt(mean + np.hypot(apart, omega * np.sqrt(own.line_mass / (own.E * I)))))
 
 
 def _spread(frame: Frame, stops: list[Vector], elements: int) -> list[Vector]:
