@@ -45,6 +45,13 @@ def test_deflected(plane):
     assert most <= 1.001 * float(title.split()[-2]) < 1.05 * most
 
 
+@pytest.mark.parametrize(("members", "pieces"), [(1, 12), (50, 600), (100, 600), (250, 500), (400, 800)])
+def test_members_are_drawn_in_fewer_pieces_where_there_are_many(members, pieces):
+    """Twelve each, 600 at most in all, but two each."""
+    nodes = {f"{i}": (float(i), 0.1 * (i % 2)) for i in range(members + 1)}
+    assert len(fb.Frame.polyline(nodes, portal().members[0].section).edges) == pieces
+
+
 def test_in_space(space):
     """Three axes; the shapes are magnified to an eighth of the body."""
     figure = fb.plot.mode_shapes(space.model)

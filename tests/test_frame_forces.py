@@ -50,6 +50,14 @@ def test_stress_of_skew_bending():
         of_static(portal().assembled(elements=6), np.zeros(portal().assembled(elements=6).K.shape[0]), "A").rows("B")
 
 
+def test_stress_in_the_plane():
+    """σ = N/A - y M/I of tension and bending at once."""
+    made = fb.Frame({"A": (0, 0), "B": (1, 0)}, [fb.Member("A", "B", STEEL)]).assembled(elements=2)
+    found = of_static(made, np.array([50.0, 3.0, 0.0]) @ made.rows("B").toarray(), "A")
+    assert found.stress(("A-B", 0.25), y=0.002)[0] == pytest.approx(50 / STEEL.A - 0.002 * 2.25 / STEEL.I, rel=1e-9)
+    assert found.stress(("A-B", 0.25))[0] == pytest.approx(50 / STEEL.A + 0.005 * 2.25 / STEEL.I, rel=1e-9)
+
+
 def test_modes_have_the_forces_of_the_closed_form():
     """Moment and shear of a cantilever mode, tension of a rod mode, torque of a shaft mode: to 1e-5 and better."""
     made = fb.Frame.straight(1.0, STEEL).assembled(modes=6, places=["A"])

@@ -206,6 +206,13 @@ def test_mechanisms():
                                         for one in portal().members])  # fmt: skip
     with pytest.raises(ValueError, match=r"must not be a mechanism; '[BC]' moves along 'x' .*, got \['B-C'\] in Scene"):
         fb.Scene(hinged, [fb.Pinned("A"), fb.Pinned("D")]).reduce(modes=2)
+    low = replace(hinged, nodes={name: (x / 10, y / 10) for name, (x, y) in portal().nodes.items()})
+    with pytest.raises(ValueError, match=r"'[BC]' moves along 'x'"):  # the turn of its posts is 3.3 times the number
+        fb.Scene(low, [fb.Pinned("A"), fb.Pinned("D")]).reduce(modes=2)
+    line = fb.Frame({"A": (0, 0, 0), "B": (0.5, 0, 0), "C": (1, 0, 0)},
+                    [fb.Member("A", "B", STEEL, release="end along"), fb.Member("B", "C", STEEL)])  # fmt: skip
+    with pytest.raises(ValueError, match=r"'A' moves along 'rx' .*, got \['A-B'\]"):  # turns only, none is a shift
+        fb.Scene(line, [fb.Pinned("A"), fb.Clamped("C")]).reduce(modes=2)
     assert fb.Scene(hinged, [fb.Clamped("A"), fb.Pinned("D")]).reduce(modes=2, elements=9).omega[0] > 1.0
     for length, free in ((1e-8, False), (1e-6, True)):
         points = {"A": (0, 0, 0), "B": (0, 0, 2), "C": (length, 0, 2), "D": (1.5, 0, 2)}

@@ -143,6 +143,21 @@ def test_used_twice_and_turned():
         assert np.allclose(scene.beam.position((1, "B")), nodes["C"])
 
 
+def test_section_forces_of_bodies_whose_members_have_one_name():
+    """A cantilever of twice the same frame under a load at its tip, M = P (2 - x): of each its own."""
+    first, second = (fb.Frame({"A": (x, 0), "B": (x + 1, 0)}, [fb.Member("A", "B", FLAT)]) for x in (0, 1))
+    tip = fb.PointForce((1, "B"), fb.Harmonic(3.0, 0.0), direction="y")
+    joints = [fb.Joint("B", to=(1, "A"))]
+    model = fb.Scene(first, [fb.Clamped("A")], bodies=[fb.Scene(second)], joints=joints, forces=[tip]).reduce(
+        4, elements=2, residual=True
+    )
+    found = model.simulate(1e-6, 1e-6, model.equilibrium({((1, "B"), "y"): 3.0})).extremes("M")
+    exact = {(number, s): 3.0 * (2 - number - s) for number in (0, 1) for s in (0.0, 0.5, 1.0)}
+    places = [("A-B", s) if number == 0 else (1, ("A-B", s)) for number, s in exact]
+    assert found.z == places
+    np.testing.assert_allclose(found.highest, list(exact.values()), atol=1e-6)
+
+
 def test_superelements_that_may_turn():
     """Two of a stiff arm, one on a ball hinge: three turns without resistance, the rest as with the arms as frames."""
     tube = fb.Section.tube(2e11, 7900.0, 0.0603, 0.0525)

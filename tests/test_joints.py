@@ -100,10 +100,13 @@ def test_a_superelement_held_by_its_own_stiffness_is_loaded_as_it_is_moved():
     post = fb.Structure([[5e3, 0.0], [0.0, 4e3]], np.diag([1.0, 2.0]), labels=[("top", "x"), ("top", "y")])
     assert small.digest != small.knowing(small.root, 2.0 * small.moved).digest
     for one, other in ((body, small), (whole, turned), (body, small.reduced([0, 5], modes=8))):
-        for joints, bodies in (((), ()), ((fb.Joint(5, to=(1, "top")),), (fb.Scene(post),))):
-            rest = {"supports": [fb.Fixed(0)], "bodies": bodies, "joints": joints, "masses": [fb.LumpedMass(5, 0.5)]}
-            rest |= {"base": {"x": fb.Harmonic(1e-3, 40.0), "y": fb.Harmonic(2e-3, 55.0)}, "gravity": (3.0, -9.81)}
-            runs = [fb.Scene(b, **rest).reduce(modes="all").simulate(0.3, 1e-3) for b in (one, other)]
+        for to, mates in ((None, (None, None)), ("top", (post, post)), (5, (body, small))):
+            rest = {"supports": [fb.Fixed(0)], "joints": [fb.Joint(5, to=(1, to))] if to else []}
+            rest |= {"masses": [fb.LumpedMass(5, 0.5)], "gravity": (3.0, -9.81)}
+            rest |= {"base": {"x": fb.Harmonic(1e-3, 40.0), "y": fb.Harmonic(2e-3, 55.0)}}
+            pairs = ((one, mates[0]), (other, mates[1]))
+            scenes = [fb.Scene(b, bodies=[fb.Scene(mate)] if mate else [], **rest) for b, mate in pairs]
+            runs = [scene.reduce(modes="all").simulate(0.3, 1e-3) for scene in scenes]
             for c in "xy":
                 exact = runs[0].displacement(5, c)
                 np.testing.assert_allclose(runs[1].displacement(5, c), exact, atol=1e-8 * np.ptp(exact))
