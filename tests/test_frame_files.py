@@ -65,12 +65,12 @@ def test_lines_that_lie_on_each_other_are_refused(tmp_path, more):
         fb.Frame.from_mesh(tmp_path / "twice.vtu", {1: FLAT, 2: FLAT})
 
 
-def shuffled_shaft(path, seed, both_ways=True):
+def shuffled_shaft(path, seed, both_ways=True, length=1.0):
     """A straight shaft of three groups, its nodes, its lines and their ways in any order."""
     rng, z = np.random.default_rng(seed), np.linspace(0.0, 1.0, 11)
     order, node = rng.permutation(10), rng.permutation(11)
     points = np.zeros((11, 3))
-    points[node, 2] = z
+    points[node, 2] = length * z
     lines = node[np.column_stack((order, order + 1))]
     turned = rng.random(10) < 0.5
     lines[turned & both_ways] = lines[turned & both_ways][:, ::-1]
@@ -80,14 +80,14 @@ def shuffled_shaft(path, seed, both_ways=True):
     return path
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_a_straight_frame_is_one_in_whatever_order_its_lines_are(tmp_path, seed):
+@pytest.mark.parametrize(("seed", "length"), [(0, 1.0), (1, 1.0), (2, 0.2), (3, 5.0)])
+def test_a_straight_frame_is_one_in_whatever_order_its_lines_are(tmp_path, seed, length):
     """Where z is counted from, and which way the spin turns, is not left to the first line of the file."""
-    path, section = shuffled_shaft(tmp_path / "shaft.inp", seed), fb.Section.circle(2e11, 7850.0, 0.02)
+    path, section = shuffled_shaft(tmp_path / "shaft.inp", seed, length=length), fb.Section.circle(2e11, 7850.0, 0.02)
     frame = fb.Frame.from_mesh(path, {f"g{i}": section for i in range(3)}, spin=300.0, bending_only=True)
-    np.testing.assert_allclose([frame.nodes[one.a][2] for one in frame.members], [0.0, 0.3, 0.7], atol=1e-12)
-    np.testing.assert_allclose([frame.nodes[one.b][2] for one in frame.members], [0.3, 0.7, 1.0], atol=1e-12)
-    assert frame.nodes[frame.site(0.7, "test")][2] == pytest.approx(0.7)
+    ends = [[frame.nodes[name][2] / length for name in (one.a, one.b)] for one in frame.members]
+    np.testing.assert_allclose(ends, [[0.0, 0.3], [0.3, 0.7], [0.7, 1.0]], atol=1e-12)
+    assert frame.nodes[frame.site(0.7 * length, "test")][2] == pytest.approx(0.7 * length)
     np.testing.assert_array_equal(frame.axis, [0.0, 0.0, 1.0])
 
 
@@ -97,3 +97,14 @@ def test_lines_of_both_ways_leave_a_product_of_area_without_a_sign(tmp_path):
     with pytest.raises(ValueError, match="must run one way, by which the sign of I12 goes"):
         fb.Frame.from_mesh(path, skew)
     fb.Frame.from_mesh(shuffled_shaft(tmp_path / "shaft.inp", 0, both_ways=False), skew)
+
+
+def test_a_member_with_a_product_of_area_keeps_its_way(tmp_path):
+    """In the middle of a straight frame that runs the other way: by its own lines goes the sign of I12."""
+    skew, own = fb.Section(7e10, 2700.0, 3e-4, 6e-9, I2=9e-9, I12=2e-9, J=5e-9), fb.Section.circle(7e10, 2700.0, 0.02)
+    points, lines = np.outer([0.0, 0.3, 0.7, 1.0], [0, 0, 1]), np.array([[0, 1], [2, 1], [3, 2]])
+    sets = {name: [np.array([i])] for i, name in enumerate(("low", "skew", "high"))}
+    meshio.Mesh(points, [("line", lines)], cell_sets=sets).write(tmp_path / "shaft.inp")
+    frame = fb.Frame.from_mesh(tmp_path / "shaft.inp", {"low": own, "skew": skew, "high": own})
+    ends = [[frame.nodes[name][2] for name in (one.a, one.b)] for one in frame.members]
+    assert ends == [[0.0, 0.3], [0.7, 0.3], [0.7, 1.0]]

@@ -85,6 +85,20 @@ def test_one_section_for_all_and_a_slanting_axis(tmp_path):
     assert fb.Beam.from_mesh(path, THIN).length == pytest.approx(5.0, rel=1e-14)
 
 
+@pytest.mark.parametrize("length", [0.1, 20.0])
+def test_named_nodes_beside_the_beam_are_no_places(tmp_path, length):
+    """Off the axis or beyond an end by two millionths of the length; half a millionth is rounding of the file."""
+    there = {"first": [0, 0], "last": [1, 0], "above": [0.5, 5e-7], "beyond": [1 + 5e-7, 0], "before": [-5e-7, 0]}
+    not_there = {"off": [0.5, 2e-6], "after": [1 + 2e-6, 0], "ahead": [-2e-6, 0], "far": [1.5, 0]}
+    sets = {name: np.array([i]) for i, name in enumerate({**there, **not_there})}
+    points = np.array([length * np.array([*at, 0.0]) for at in {**there, **not_there}.values()])
+    meshio.Mesh(points, [("line", np.array([[0, 1]]))], point_sets=sets).write(tmp_path / "a.inp")
+    beam = fb.Beam.from_mesh(tmp_path / "a.inp", THIN)
+    assert {name: place / length for name, place in beam.places} == pytest.approx(
+        {"first": 0.0, "last": 1.0, "above": 0.5, "beyond": 1.0, "before": 0.0}, rel=1e-9
+    )
+
+
 def test_cell_data_by_name_and_by_number(tmp_path):
     data = {"part": [np.array([4, 4, 7])], "noise": [np.array([1, 2, 3])]}
     path = written(tmp_path / "a.vtu", [0.0, 1.0, 2.0, 3.0], [[0, 1], [1, 2], [2, 3]], cell_data=data)
@@ -215,6 +229,10 @@ def test_lines_of_several_groups(tmp_path):
         fb.Beam.from_mesh(tmp_path / "saved_all.msh", {"all": THIN})
     beam = fb.Beam.from_mesh(tmp_path / "saved_all.msh", THIN)
     assert (beam.borders, beam.place("tip"), beam.place("load")) == ((0.0, 1.0), 1.0, 1.0)
+    part = "$ElementData\n1\npart\n1\n0.0\n3\n0\n1\n4\n4 7\n1 7\n2 7\n3 8\n$EndElementData\n"
+    (tmp_path / "numbered.msh").write_text((tmp_path / "saved_all.msh").read_text() + part)
+    numbered = fb.Beam.from_mesh(tmp_path / "numbered.msh", {7: THICK, 8: THIN}, data="part")
+    assert numbered.spans == ((0.4, THIN), (0.6, THICK))
 
 
 def test_families_of_med_have_the_names_of_their_groups(tmp_path):

@@ -106,11 +106,11 @@ def _mended_reader() -> Iterator[None]:
         _gmsh41.Mesh = mesh
 
 
-def _even_mesh(points: Any, cells: Any, cell_data: Any = None, **rest: Any) -> Any:
+def _even_mesh(points: Any, cells: Any, cell_data: Any, **rest: Any) -> Any:
     """A mesh of gmsh's format 4.1 without data that meshio has for some cells only, those in groups; sets name them."""
     import meshio
 
-    even = {name: data for name, data in (cell_data or {}).items() if len(data) == len(cells)}
+    even = {name: data for name, data in cell_data.items() if len(data) == len(cells)}
     return meshio.Mesh(points, cells, cell_data=even, **rest)
 
 

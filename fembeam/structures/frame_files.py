@@ -84,7 +84,7 @@ def _in_order(
     main = int(np.argmax(np.ptp(used, axis=0)))
     low = used[np.argmin(used[:, main])]
     axis = used[np.argmax(used[:, main])] - low
-    length = float(np.linalg.norm(axis)) or 1.0  # of lines that fold back there is none, which the frame refuses
+    length = float(np.linalg.norm(axis))
     along = (points - low) @ axis / length
     off = np.linalg.norm(used - low - np.outer(along[ends], axis / length), axis=1)
     if off.max() > STRAIGHT * length:
