@@ -10,6 +10,8 @@ from refusals import refused_by
 from scipy.stats import binom
 
 from contacts import Hysteretic, achieved_restitution, bounce, identify, read_collisions
+from contacts.identification.fit import _Fit
+from contacts.identification.records import collisions_of
 
 sys.path.insert(0, str(Path(__file__).parent / "bench"))
 from collisions import KINDS, LAW, collisions, coverage
@@ -76,9 +78,11 @@ def test_intervals_hold_the_truth_as_often_as_they_say(kind):
 
 def test_a_record_is_cut_into_its_collisions():
     data = exact(samples=80, timed=True, speeds=(0.2, 0.3, 0.4))
-    gap = np.full(50, -1e-4)
+    away = np.full(50, -1e-2)
+    touch = np.where(np.abs(np.arange(50) - 25) < 5, 0.08 * np.max(data["delta"]), -1e-4)  # below a tenth: no collision
     pieces, start = {"time": [], "delta": [], "force": []}, 0.0
-    for t, delta, force in zip(data["time"], data["delta"], data["force"], strict=True):
+    gaps = np.full(50, -1e-4), touch, away
+    for t, delta, force, gap in zip(data["time"], data["delta"], data["force"], gaps, strict=True):
         dt = t[1] - t[0]
         pieces["time"] += [start + t - t[0], start + t[-1] - t[0] + dt * np.arange(1, 51)]
         pieces["delta"] += [delta, gap]
@@ -109,6 +113,41 @@ def test_collisions_that_disagree_are_told():
         warnings.simplefilter("error")
         alone = identify(**soft)
     assert (alone.stiffness.high - alone.stiffness.low) < 0.5 * (found.stiffness.high - found.stiffness.low)
+
+
+def fit_of_three():
+    """Cut after the top, as κ and κa of whole collisions are independent; 2 % noise of the force, zeros known."""
+    data = collisions(np.random.default_rng(1), law=Hysteretic(2.1e8, 2.0), samples=200, noise_force=0.02)
+    most = {name: [x[:120] for x in records] for name, records in data.items()}
+    return _Fit(collisions_of(**most, time=None), 1.5, False)
+
+
+def test_errors_of_one_collision_by_itself():
+    """Of ln κ and a: s² (JᵀJ)⁻¹ with the slopes of the law by central differences; the motion has no noise."""
+    fit = fit_of_three()
+    for i, one in enumerate(fit.measured):
+        found, errors = fit.alone(i, inflation=1.0)
+        x, s = np.maximum(one.delta, 0.0) / fit.depth, one.delta_dot / fit.motions[i].entry_rate
+
+        def law(theta, x=x, s=s):
+            return np.exp(theta[0]) * x**1.5 * (1.0 + theta[1] * s)
+
+        J = np.column_stack([(law(found + h) - law(found - h)) / 2e-5 for h in 1e-5 * np.eye(2)])
+        left = law(found) - one.force / fit.strength
+        covariance = left @ left / (len(left) - 2) * np.linalg.inv(J.T @ J)
+        np.testing.assert_allclose(errors, np.sqrt(np.diag(covariance)), rtol=1e-4)
+
+
+@pytest.mark.parametrize("column", [0, 1])
+def test_intervals_widen_by_the_scatter_of_collisions(column):
+    """Birge's ratio: standard deviation over standard error where all errors are the same; 1 where they agree."""
+    fit, x = fit_of_three(), np.array([0.0, 0.3, -0.1, 0.25, 0.05])
+    values = np.where(np.arange(2) == column, x[:, None], 0.5)
+    for error, wanted in ((0.02, np.std(x, ddof=1) / 0.02), (0.5, 1.0)):
+        singles = [(one, np.full(2, error)) for one in values]
+        widening, remarks = fit._disagreement(singles)
+        assert widening == pytest.approx(wanted, rel=1e-12)
+        assert len(remarks) == (wanted > 1.0)
 
 
 @pytest.mark.drawn
