@@ -11,6 +11,7 @@ from scipy.stats import binom, chi2
 from contacts import BoucWen, Hertz, Iwan, Jenkins, identify_loop
 from contacts.identification.loop_fit import Fit, Measured
 from contacts.identification.loop_models import Sliders, Smooth
+from contacts.identification.loop_starts import _Tried
 
 S = np.linspace(0.0, 30.0, 600)
 PATH = 1e-3 * np.sin(S) * (1.0 + 0.5 * np.sin(0.21 * S))
@@ -236,6 +237,42 @@ def test_slopes_are_those_of_the_forces(model, main):
     theta = fit.theta + 1e-3
     wanted = [(fit.residual(theta + h) - fit.residual(theta - h)) / 2e-6 for h in 1e-6 * np.eye(theta.size)]
     assert np.abs(fit.jacobian(theta) - np.transpose(wanted)).max() < 1e-6
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_slider_widened_has_the_forces_it_had(side):
+    """While it slips towards one side: the zero of force takes what its limit gains; one at its limit moves off it."""
+    path = (
+        side * 1e-3 * np.concatenate((np.linspace(0.2, 1.9, 60), np.linspace(1.9, 1.0, 30), np.linspace(1.0, 2.2, 40)))
+    )
+    paths = [path, side * 1e-3 * np.linspace(-0.1, 1.6, 80), path[50:]]
+    measured = Measured(paths, [DAMPER.along(one) for one in paths], True)
+    width = DAMPER.limit / DAMPER.stiffness / measured.depth
+    stiffness = DAMPER.stiffness * measured.depth / measured.strength
+    start = np.array([np.log(stiffness), np.log(width), 0.1, 0.4 * side, -0.2 * side, 0.5 * np.pi * side])
+    fit = Fit(measured, Sliders(1, False), start)
+    fit.theta = start
+    wide = fit._widened(0, side)
+    assert wide[1] == 0.5
+    change = np.abs(fit.residual(wide) - fit.residual(start))
+    first = path.size + paths[1].size
+    assert change[:first].max() < 1e-12
+    assert change[first:].max() < 1.001e-3 * stiffness * np.exp(0.5)
+    assert np.abs(np.sin(wide[-1])) < 0.9991  # where its slope is not zero
+
+
+@pytest.mark.parametrize("chosen", [[40, 80], [48, 88]])
+def test_starts_leave_what_they_do_not_explain(chosen):
+    """Two sliders, each with a load of its own at the start of each record: |target|² - explained by linear algebra."""
+    paths, force = [PATH[40:250], PATH[270:]], JOINT.along(PATH)
+    measured = Measured(paths, [force[40:250], force[270:]], True)
+    tried = _Tried(measured, True)
+    assert len(set(tried.loads[chosen].ravel())) > 2
+    theta = tried.starts(chosen)[0]
+    left = Fit(measured, Sliders(2, True), theta, most=1).residual(theta)
+    explained = tried.explained(chosen)
+    assert explained > 0.0
+    assert left @ left == pytest.approx(measured.target @ measured.target - explained, rel=1e-9)
 
 
 def test_it_prints():

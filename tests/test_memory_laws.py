@@ -288,6 +288,15 @@ def test_what_a_law_says():
     assert STOPS.describe().count("\n") == 3
 
 
+def test_how_far_bouc_wen_is_shown():
+    """To twice the knee of a straight loading, z = 2 δ = 1 mm; where z = √(A/s) tan(√(A s) δ) to 1/π of its pole."""
+    assert BoucWen(1e4, 0.1, 2.0, 1500.0, 500.0).reach == pytest.approx(1e-3, rel=1e-12)
+    stiffening, pole = BoucWen(1e4, 0.0, 2.0, -3e5, 0.0, n=2), math.pi / 2 / math.sqrt(2.0 * 3e5)
+    assert stiffening.reach == pytest.approx(pole / math.pi, rel=1e-12)
+    force = stiffening.along([0.0, stiffening.reach])[1]
+    assert force == pytest.approx(1e4 * math.sqrt(2.0 / 3e5) * math.tan(0.5), rel=1e-9)
+
+
 def test_who_may_act_where():
     assert (JENKINS + Hertz(1e8)).one_sided is False
     assert STOPS.one_sided

@@ -90,7 +90,7 @@ class BoucWen(Law):
 
     @property
     def reach(self) -> float:  # type: ignore[override]
-        """Twice the δ at which a straight first loading would meet the bound; without one, half the way to a pole."""
+        """Twice the δ at which a straight loading meets the bound; without one, at most 1/π of the way to a pole."""
         if self.bound < math.inf:
             return 2.0 * self.bound / self.A
         shape = max(abs(self.beta + self.gamma), abs(self.beta - self.gamma))
