@@ -56,6 +56,19 @@ def test_numbers_of_a_support_that_moves_change_the_start_that_follows_it(path):
         np.testing.assert_allclose(read(found), by_differences, rtol=0.0, atol=1e-5 * np.abs(by_differences).max())
 
 
+@pytest.mark.parametrize("side", ["below", "above"])
+def test_rest_on_a_stop_without_gap(side):
+    """Two tones cancel at t = 0 to rounding only: most such runs were refused, "touched at the start", "grazes"."""
+    tones = fb.Multisine([1e-3, 4e-4], [110.0, 242.0], [0.1, 0.3])
+    stop = fb.Stop(0.25, KelvinVoigt(1e5, 20.0), gap=0.0, side=side)
+    scene = fb.Scene(fb.Beam(0.25, BAR), [fb.Clamped(0.0)], [fb.LumpedMass(0.25, mass=0.05)], stops=[stop],
+                     damping=fb.ModalDamping(0.02), base=tones)  # fmt: skip
+    path, options = "masses[0].mass", {"modes": 2, "duration": 0.05, "dt": 1e-3}
+    found = simulated(scene, **options).sensitivity(path).displacement(0.25)
+    by_differences = differences(scene, path, 1e-5, lambda run: run.displacement(0.25), **options)
+    np.testing.assert_allclose(found, by_differences, rtol=0.0, atol=1e-5 * np.abs(by_differences).max())
+
+
 @pytest.mark.parametrize("element", [Coulomb(0.3, 1e4), BoucWen(1e4, 0.2, 1.0, 2e3, 1e3)])
 def test_a_force_that_peaks_where_an_element_turns(element):
     """One mode turns at once in the stop and in the element, so that the largest force lies on the element's event."""

@@ -244,6 +244,8 @@ class _Request:
         run.engine.release()
         if solution.status is not Status.DONE:
             raise SolverError(f"the run has no derivative to its end: {solution.status.value}", solution)
+        at_start = solution.t == 0.0  # as given: rounding would move what rests on a surface off it
+        solution.q[at_start], solution.q_dot[at_start] = q, q_dot
         return solution, rows
 
     def dense_times(self) -> Array:
