@@ -21,6 +21,7 @@ from scipy.special import betainc, betaincinv
 from solvers.problem import Array
 
 S = 14  # nodes
+_AS_LARGE = 1e-13  # relative; at the ends of a stretch the clock stands still, so that all slopes vanish there
 _BEYOND = 1.02  # half widths from a panel's middle: a zero may lie between the outermost nodes of two panels
 _SAME = 1e-12  # relative difference of widths up to which they are equal
 _X, _W = np.polynomial.legendre.leggauss(S)
@@ -258,7 +259,12 @@ def largest(values: Array, ends: tuple[bool, bool]) -> tuple[int, float, float]:
         top = _top(whole, x)
         beyond = int(top > 1.0) - int(top < -1.0)
         if not beyond:
-            return panel, 0.5 * (top + 1.0), float(whole(top))
+            outer = panel == 0 and not ends[0], panel == len(values) - 1 and not ends[1]
+            at_end = max(
+                (float(whole(side)) for side, one in zip((-1.0, 1.0), outer, strict=True) if one), default=-np.inf
+            )
+            value = float(whole(top))
+            return panel, 0.5 * (top + 1.0), value if value - at_end > _AS_LARGE * abs(value) else -np.inf
         if not 0 <= panel + beyond < len(values):
             return panel, 0.5 * (beyond + 1.0), float(whole(beyond)) if ends[beyond > 0] else -np.inf
         panel, x = panel + beyond, -float(beyond)
