@@ -69,7 +69,9 @@ def _finite_slopes(system: System) -> bool:
             viscous = law.force(delta, 1.0, 1.0) - law.force(delta, 0.0, 1.0)
             if not law.jump and 0.0 < abs(viscous[1]) < 95.0 * abs(viscous[0]):
                 trouble = f"its slope is infinite at the surface: {contact.law!r}"
-                raise ValueError(f"tangent is not offered for the law of contact {i}: {trouble}")
+                raise ValueError(
+                    f"tangent is not offered for the law of contact {i}: {trouble}; take KelvinVoigt or Hysteretic"
+                )
     return True
 
 
