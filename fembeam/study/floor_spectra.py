@@ -113,7 +113,7 @@ def floor_spectra(
     >>> floor_spectra(run, ["valve", 0.2], periods=[0.05, 0.1])
     <floor spectra of valve; 0.2 m>
     """
-    several = is_listed(places) and len(places) > 0
+    several = is_listed(places) and hasattr(places, "__len__") and len(places) > 0
     require(several, "places must be a list of one or more", places, "floor_spectra", "put it in brackets")
     asked = {name: at for place in places for name, at in _along(run, place).items()}
     each = counting(progress, asked.items(), unit=" places")
