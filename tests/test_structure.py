@@ -111,6 +111,7 @@ BAD = [
     (lambda: beam_structure().rows("tp"), "a place must be a point or a node of the structure; 'tip' is the nearest"),
     (lambda: fb.Scale("mm", "ton"), "mass must be one of kg, t, g"),
     (lambda: fb.Scale(time=0.0), "time must be positive"),
+    (lambda: fb.Structure(K, M, scale="mm"), "scale must be a Scale of three units, got 'mm' in Structure"),
     (lambda: direction_of("w", "Stop"), "direction must be one of x, y, z, rx, ry, rz"),
     (lambda: direction_of((0, 0, 0), "Stop"), "not all zero"),
     (lambda: direction_of((1, 0, 0, 0), "Stop"), "two or three numbers"),

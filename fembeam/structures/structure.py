@@ -94,6 +94,8 @@ class Structure(NamedBody):
         at, named = placed(nodes, points, names, WHERE)
         length = 1.0
         if scale is not None:
+            require(isinstance(scale, Scale), "scale must be a Scale of three units", scale, WHERE,
+                    "write Scale('mm', 't', 's')")  # fmt: skip
             length, given = float(scale.length), _in_si(given, names, scale)
         values = {
             **{"K": given["K"], "M": given["M"], "C": given.get("C"), "labels": names},
