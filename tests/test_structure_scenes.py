@@ -146,6 +146,15 @@ def test_equilibrium_and_states_are_those_of_the_beam():
     for node, c in (("tip", "y"), (3, "rx")):
         number = body.scene.beam.labels.index((8 if node == "tip" else node, c))
         close(1e-3 * number, body.phi((node, c)) @ start[: len(body.omega)])
+    named = {("tip", c) if node == 8 else (node, c): value for (node, c), value in field.items()}
+    np.testing.assert_array_equal(body.state(named), start)
+    for wrong, message in (
+        ({("tip", "y"): "1 mm"}, r"the field at \('tip', 'y'\) must be a number, got '1 mm' in Model.state; give m"),
+        ({("tipp", "y"): 1e-3}, r"of dofs that exist, such as \(0, 'y'\), got \[\('tipp', 'y'\)\]"),
+        ({("root", "y"): 1e-3}, r"leave supports where they are, got \[\(0, 'y'\)\] in Model.state; leave out"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            body.state(wrong)
 
 
 def test_a_saved_run_is_the_run(runs, tmp_path):

@@ -26,7 +26,8 @@ from fembeam.scene import (
     tangent,
 )
 from fembeam.scene.signal_checks import require_array_function
-from fembeam.support import numbers, require, require_finite, warn
+from fembeam.structures import Structure
+from fembeam.support import is_pair, numbers, require, require_finite, warn
 
 if TYPE_CHECKING:
     from fembeam.model.equations import ModalEquations
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 
+HELD = 1e-6  # of the largest value of a field: no motion of a support
 MISSED = 0.01  # of a field in the mass norm; more gets a warning
 SETTLED = 1e-12  # of the forces at work: an equilibrium
 KNOWN = 0.5  # of them: rounding of the contacts' forces, at most
@@ -159,11 +161,25 @@ def _on_labels(body: BodyMatrices, field: Any) -> Vector:
     labels = body.assembled.labels
     require(isinstance(field, Mapping), "the field of a structure must be {(node, component): value}", field,
             "Model.state", "name the dofs that move")  # fmt: skip
-    unknown = [label for label in field if label not in labels]
-    require(not unknown, "the field must be of dofs that exist", unknown[:1], "Model.state", "see labels")
-    values = np.array([float(field.get(label, 0.0)) for label in labels])
-    require(bool(np.isfinite(values).all()), "the field must be finite", "NaN or infinite", "Model.state", "check it")
+    for site, value in field.items():
+        require_finite(f"the field at {site}", value, "Model.state", "give m, or rad")
+    given = {_label(body, site): float(value) for site, value in field.items()}
+    unknown = [label for label in given if label not in labels]
+    require(not unknown, f"the field must be of dofs that exist, such as {labels[0]!r}", unknown[:1], "Model.state",
+            "write (node, component)")  # fmt: skip
+    values = np.array([given.get(label, 0.0) for label in labels])
+    held = np.flatnonzero(np.diff(body.spread.tocsr().indptr) == 0)
+    moved = held[np.abs(values[held]) > HELD * np.abs(values).max()]
+    require(not moved.size, "a start must leave supports where they are", [labels[i] for i in moved[:1]], "Model.state",
+            "leave out dofs that are held")  # fmt: skip
     return np.asarray(sparse_linalg.lsqr(body.spread, values, atol=1e-15, btol=1e-15)[0])
+
+
+def _label(body: BodyMatrices, site: Any) -> Any:
+    """The dof of a site, whose node may go by the name of a structure's point."""
+    points = body.beam.points if isinstance(body.beam, Structure) else {}
+    named = is_pair(site) and isinstance(site[0], str) and site[0] in points
+    return (points[site[0]], site[1]) if named else site
 
 
 def _check_impactors(model: Model, q: Vector) -> None:

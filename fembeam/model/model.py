@@ -126,8 +126,10 @@ class Model(Printed, ModalEquations):
 
         Parameters
         ----------
-        displacement, velocity : functions of z (k,), relative to the frame; None is zero, or what follows supports
-            that move. A list gives one for each beam. Impactors start in their places with their velocities.
+        displacement, velocity : functions of z (k,), relative to the frame; of frames and structures
+            {(node, component): value} of all dofs that move, m or rad, where points of a structure may stand for
+            nodes. None is zero, or what follows supports that move. A list gives one for each beam. Impactors start
+            in their places with their velocities.
 
         Warns
         -----
@@ -135,7 +137,8 @@ class Model(Printed, ModalEquations):
 
         Raises
         ------
-        ValueError : a field is not finite; a free impactor would start inside the beam.
+        ValueError : a field is not finite, or moves a dof that is held or does not exist; a free impactor would start
+            inside the beam.
         """
         return initial_states.state(self, displacement, velocity)
 
@@ -148,9 +151,9 @@ class Model(Printed, ModalEquations):
 
         Parameters
         ----------
-        loads : {z in m: force in N, positive up} on the scene's own beam, of other bodies {(place, direction): force},
-            for as long as it settles; signals of forces and base do not act. Simulate from it to see what follows when
-            the loads go (release from a pull).
+        loads : {z in m: force in N, positive up} on the scene's own beam, of frames, structures and other bodies
+            {(place, direction): force}, for as long as it settles; signals of forces and base do not act. Simulate
+            from it to see what follows when the loads go (release from a pull).
 
         Returns
         -------
