@@ -36,6 +36,24 @@ def found():
     return speed_accuracy(models, METHODS, starts=3, duration=0.05, rounds=1)
 
 
+@pytest.mark.parametrize(
+    "study",
+    [
+        lambda scene: speed_accuracy(scene, [RK4(1e-5)]),
+        lambda scene: speed_accuracy([scene.reduce(modes=1), scene], [RK4(1e-5)]),
+        lambda scene: fb.study.peak(scene, "omega", "stops[0].gap", [1e-3, 2e-3], (60.0, 90.0)),
+        lambda scene: fb.study.backbone(scene, [1.0, 2.0], (60.0, 90.0)),
+        lambda scene: fb.study.basins(scene),
+        lambda scene: fb.study.bifurcation(scene, "omega", [60.0, 70.0]),
+        lambda scene: fb.study.stationary(scene, 1.0, 1e-3),
+        lambda scene: fb.study.ensemble(scene, 2, fb.study.characteristics),
+    ],
+)
+def test_a_scene_in_place_of_its_model_is_refused(study):
+    with pytest.raises(ValueError, match=r"model must be a Model, got Scene.* in .*; scene.reduce"):
+        study(paper_scene())
+
+
 def test_errors_fall_with_the_setting_and_reduction_errors_with_modes(found):
     by = {(p.method, p.setting, p.modes): p for p in found.points}
     for modes in (1, 3):

@@ -23,6 +23,7 @@ from fembeam.model import Model, Orbit, observed
 from fembeam.model.branch import Family
 from fembeam.plot.axis_names import parameter_unit
 from fembeam.scene import Scene, called, path_of, turns_at
+from fembeam.study.measure import require_model
 from fembeam.study.peak import check_peak
 from fembeam.study.response_curve import ResponseCurve, Seen
 from fembeam.study.result import Result, column
@@ -154,6 +155,7 @@ def backbone(
     >>> found.omega.round(1).tolist(), found.zeta.round(4).tolist()
     ([243.7, 209.7], [0.0075, 0.1016])
     """
+    require_model(model, "backbone")
     given = check_backbone(model.scene, levels, span, level, parameter)
     place = observed(model) if z is None else z
     model.phi(place)  # a place that does not exist is refused

@@ -24,6 +24,7 @@ from fembeam.model import Attractor, Model, Orbit, load_period, observed
 from fembeam.scene import Place, directed_words
 from fembeam.study.execution.checkpoint import Checkpoint, identity
 from fembeam.study.execution.executors import spread
+from fembeam.study.measure import require_model
 from fembeam.study.result import Result
 from fembeam.support import Part, is_finite, is_listed, is_whole, numbers, require, titled
 from solvers.orbits import delayed
@@ -175,6 +176,7 @@ def basins(
     comes to                 starts    share
     period 1 with 0 impacts      16  100.00%
     """
+    require_model(model, "basins")
     columns, rows = checked_points(points)
     place = observed(model) if z is None else z
     across, up = axis_of(model, x, x_span, columns, place), axis_of(model, y, y_span, rows, place)

@@ -22,7 +22,7 @@ from fembeam.plot.axis_names import axis_name, parameter_unit
 from fembeam.plot.units import motion_for
 from fembeam.scene import Place, path_of, turns_at
 from fembeam.study.execution.executors import spread
-from fembeam.study.measure import samples_per_period
+from fembeam.study.measure import require_model, samples_per_period
 from fembeam.study.result import Result
 from fembeam.support import Part, is_whole, numbers, require
 from solvers.problem import counted
@@ -110,6 +110,7 @@ def bifurcation(
     >>> bifurcation(scene.reduce(modes=1), "omega", [150.0, 160.0], settle=20, keep=4).peaks.shape
     (2, 4)
     """
+    require_model(model, "bifurcation")
     path = path_of(model.scene, parameter)
     values = np.atleast_1d(numbers("values", values, "bifurcation", "give a range such as np.linspace(60, 900, 200)"))
     require(values.size > 0 and bool(np.all(np.isfinite(values))), "values must be finite numbers", values,

@@ -22,6 +22,7 @@ from fembeam.scene import Scene, signals_of
 from fembeam.statistics import Estimate, Spectrum
 from fembeam.study.execution.checkpoint import Checkpoint, Values, identity
 from fembeam.study.execution.executors import spread
+from fembeam.study.measure import require_model
 from fembeam.study.realisations import Seed, child, noises, realisation, seed_key
 from fembeam.study.result import Result, with_units
 from fembeam.study.stationary import characteristics, units_of_characteristics
@@ -185,7 +186,7 @@ def ensemble(
     >>> len(found), found.mean.relative < 0.2
     (8, True)
     """
-    require(isinstance(model, Model), "model must be a Model", model, "ensemble", "scene.reduce(modes=…) makes one")
+    require_model(model, "ensemble")
     require(callable(quantity), "quantity must be a function of a model", quantity, "ensemble",
             "e.g. lambda model: model.simulate(50.0).contacts.peak_force.max()")  # fmt: skip
     chosen = _seeds(model, seeds)

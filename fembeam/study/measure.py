@@ -46,6 +46,11 @@ MOST = 2048  # per drive period for the lowest mode's sake
 FEWEST_SEEDS = 3
 
 
+def require_model(model: Any, where: str) -> None:
+    """Raise ValueError unless it is a model."""
+    require(isinstance(model, Model), "model must be a Model", model, where, "scene.reduce(modes=…) makes one")
+
+
 @dataclass(frozen=True)
 class Plan:
     """How every model of a study is run; `fb.study.mode_count` explains the fields."""

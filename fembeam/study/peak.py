@@ -25,6 +25,7 @@ from fembeam.model.branch import Family
 from fembeam.model.sensitivity import of_amplitude
 from fembeam.plot.axis_names import axis_name, parameter_unit
 from fembeam.scene import Scene, called, path_of, turns_at, with_value
+from fembeam.study.measure import require_model
 from fembeam.study.response_curve import ResponseCurve, Seen
 from fembeam.study.result import Result, column, with_units
 from fembeam.support import Part, counting, is_finite, numbers, require
@@ -162,6 +163,7 @@ def peak(
     >>> (found.slope > 0.0).tolist()  # the limit of slip at which the peak is lowest lies between, at 1.44 N
     [False, True]
     """
+    require_model(model, "peak")
     p = check_peak(model.scene, parameter, over, values, span)
     search = _Search(model, path_of(model.scene, parameter), path_of(model.scene, over), z, span)
     with counting(progress, p, unit=" values") as bar:

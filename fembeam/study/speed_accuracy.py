@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from itertools import pairwise
 from typing import Any
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam import plot
 from fembeam.model import Model, Run, places
+from fembeam.study.measure import require_model
 from fembeam.study.result import Result
 from fembeam.support import Part, counting, require, require_positive
 from solvers.problem import counted
@@ -204,7 +205,10 @@ def speed_accuracy(
     """
     require(hasattr(methods, "__iter__"), "methods must be a list of one or more", methods, "speed_accuracy",
             "put it in brackets")  # fmt: skip
-    models = [model] if isinstance(model, Model) else sorted(model, key=lambda m: len(m.omega))
+    models = list(model) if isinstance(model, Iterable) else [model]
+    for one in models:
+        require_model(one, "speed_accuracy")
+    models = sorted(models, key=lambda m: len(m.omega))
     _check(models, list(methods), rounds)
     duration = 10 * math.pi / float(models[0].omega[0]) if duration is None else duration
     require_positive("duration", duration, "speed_accuracy", "give s")

@@ -33,6 +33,7 @@ from fembeam.statistics.initial_transient import Settling, settling
 from fembeam.statistics.spectra import FEWEST_OF_SLOW, FINEST_RESOLUTION
 from fembeam.study.decay import correlation_time
 from fembeam.study.execution.checkpoint import Checkpoint, model_identity
+from fembeam.study.measure import require_model
 from fembeam.study.result import Result, with_units
 from fembeam.study.segments import FEWEST_SAMPLES, SHORTEST, Segment, Segments, check_duration
 from fembeam.support import Part, bar, is_whole, note, number, numbers, require, warn
@@ -455,7 +456,7 @@ def _enough(response: Response, of: Callable[[Response], Any] | None, until: flo
 
 def check(model: Model, duration: float, dt: float, until: float | None, discard: float | None) -> None:
     """Bad input, before any computing."""
-    require(isinstance(model, Model), "model must be a Model", model, "stationary", "scene.reduce(modes=…) makes one")
+    require_model(model, "stationary")
     number("duration (s)", duration, above=0.0)
     number("dt (s)", dt, above=0.0)
     if not dt < duration / FEWEST_SAMPLES:
