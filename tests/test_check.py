@@ -9,7 +9,7 @@ import pytest
 from refusals import refused_by
 
 import fembeam as fb
-from contacts import Hertz
+from contacts import Hertz, KelvinVoigt
 from fembeam.cli import main
 from fembeam.inspection import check
 from fembeam.inspection.sampling import of_run
@@ -105,6 +105,15 @@ def test_contacts_to_expect_scale_with_the_law():
     assert soft.speed == stiff.speed == 0.1
     assert stiff.peak_force / soft.peak_force == pytest.approx(100**0.4, rel=0.05)
     assert soft.time / stiff.time == pytest.approx(100**0.4, rel=0.05)
+
+
+def test_a_preload_is_not_told_to_be_soft():
+    """It is in contact for long because it begins there."""
+    drive = fb.Harmonic(1e-5, 50.0)
+    for gap in (-1e-3, 1e-6):
+        said = cantilever(stops=[fb.Stop(0.26, KelvinVoigt(200.0, 1.0), gap=gap)], base=drive).check(modes=1)
+        assert not any("so soft" in one for one in said)
+        assert "a contact outlasts" in str(said) or gap > 0.0
 
 
 def test_doubts_of_other_bodies_say_which():

@@ -111,7 +111,8 @@ def _strike(model: Model, speed: float, stop: int) -> solvers.ContactLog | None:
 def of_contacts(model: Model, touched: list[Touched]) -> list[str]:
     """What contacts make doubtful."""
     slowest = 2 * math.pi / max(float(model.omega.min()), 1e-12)
-    soft = [one.stop for one in touched if one.time > 0.5 * slowest]
+    open_at_rest = [one for one in touched if model.contact_rows[one.stop].gap >= 0.0]  # a preload lasts as it should
+    soft = [one.stop for one in open_at_rest if one.time > 0.5 * slowest]
     short = [one.stop for one in touched if one.periods <= 3 and one.time * fastest(model) < 3 * math.pi]
     found = []
     if soft:
