@@ -102,6 +102,19 @@ def test_units_of_frames_that_look_wrong_are_told():
     assert doubts(elbow(stops=[fb.Stop("C", LAW, gap=1e-3, direction="x")]).reduce(2)) == []
 
 
+def test_sections_in_mm_are_told():
+    """A slender frame or beam whose section alone is in mm: I/A² of a rectangle has no unit to tell it by."""
+    section = fb.Section.rectangle(2.1e11, 7850.0, width=80.0, height=120.0)
+    frame = fb.Frame.polyline({"A": (0, 0), "B": (3, 0), "C": (3, 4)}, section)
+    assert doubts(fb.Scene(frame, [fb.Clamped("A")]).reduce(2)) == [
+        "member 'A-B': a section 120 m high in a frame of 5 m: is it in mm?"
+    ]
+    said = doubts(fb.Scene(fb.Beam(3.0, section), [fb.Clamped(0.0)]).reduce(2))
+    assert said == ["the beam is 0.025 times as long as high: is its section in mm?"]
+    stub = fb.Frame.polyline({"A": (0, 0), "B": (3, 0), "C": (3, 0.05)}, fb.Section.circle(2.1e11, 7850.0, 0.1))
+    assert doubts(fb.Scene(stub, [fb.Clamped("A")]).reduce(2)) == []
+
+
 def test_friction_in_per_cent_and_radii_in_mm_are_told():
     shaft = fb.Frame.straight(1.0, fb.Section.circle(2.1e11, 7850.0, 0.02), bending_only=True)
     hole = fb.AnnularStop("B", LAW, 2e-4, friction=fb.Friction(20.0, 1e6), radius=10.0)

@@ -56,7 +56,12 @@ def of_frame(frame: Any) -> list[str]:
     """
     found: dict[str, str] = {}
     for one, length in zip(frame.members, frame.lengths.tolist(), strict=True):
-        for said in of_beam(one.beam(length, frame.in_plane)):
+        beam = one.beam(length, frame.in_plane)
+        height = length / _slenderness(beam)
+        if height > frame.size:
+            found.setdefault("height", f"member {one.name!r}: a section {height:.3g} m high in a frame of "
+                             f"{frame.size:.4g} m: is it in mm?")  # fmt: skip
+        for said in of_beam(beam):
             if not said.startswith("the beam is"):  # short members are common, and may have shear
                 found.setdefault(said.split("=")[0], f"member {one.name!r}: {said}")
     return list(found.values())
@@ -88,12 +93,19 @@ def of_beam(beam: Beam) -> list[str]:
     if shape.min() < 1e-5 or shape.max() > 1e3:
         worst = shape.min() if shape.min() < 1e-5 else shape.max()
         found.append(f"I/A² = {worst:.2g}, where a square has 0.08: is one of them in mm² or mm⁴?")
-    slenderness = beam.length / math.sqrt(float((I / A).max()))
-    if slenderness < 35:  # ten times the height of a rectangle
-        found.append(f"the beam is {slenderness / math.sqrt(12):.2g} times as long as high: shear is not modelled")
+    slenderness = _slenderness(beam)
+    if slenderness < 10:
+        doubt = "is its section in mm?" if slenderness < 1 else "shear is not modelled"
+        found.append(f"the beam is {slenderness:.2g} times as long as high: {doubt}")
     if beam.length >= 1000:
         found.append(f"length = {beam.length:g} m looks like mm")
     return found
+
+
+def _slenderness(beam: Beam) -> float:
+    """Length over the height √(12 I/A) of a rectangle of the same A and I, where that is highest."""
+    profile = beam.profile((np.array(beam.borders[:-1]) + np.array(beam.borders[1:])) / 2)
+    return beam.length / math.sqrt(12.0 * float((np.asarray(profile.I) / np.asarray(profile.A)).max()))
 
 
 def of_features(scene: Scene) -> list[str]:
