@@ -96,7 +96,9 @@ class Plan:
             require(not self.seeds, "seeds need a duration", None, "study", "give duration in s")
         else:
             sampled = getattr(quantity, "sampled", True)
-            require(self.dt is not None or not sampled, f"{label(quantity)} needs samples", None, "study", "give dt")
+            own = "" if hasattr(quantity, "sampled") else "; a function of contacts alone: set its sampled = False"
+            require(self.dt is not None or not sampled, f"{label(quantity)} needs samples", "dt = None", "study",
+                    f"give dt{own}")  # fmt: skip
         if self.seeds:
             signals = signals_of(scene)
             require(any(hasattr(signal, "seed") for signal in signals.values()), "seeds need noise", signals, "study",
