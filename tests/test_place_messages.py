@@ -156,6 +156,10 @@ def test_a_switch_among_numbers_is_none_of_them(make):
 
 
 def test_arrays_without_a_row_are_no_list_and_numbers_no_parameter(straight):
+    with pytest.raises(TypeError, match=r"supports\[0\] must be a Clamped or .*, got 'A' in Scene; write Clamped\(…\)"):
+        fb.Scene(BEAM, ["A"])
+    with pytest.raises(TypeError, match=r"masses\[0\] must be a LumpedMass or .* in Scene; move it to its own list"):
+        fb.Scene(BEAM, [fb.Clamped(0.0)], masses=[fb.Clamped(0.0)])
     with pytest.raises(TypeError, match=r"elements must be a list of Element, got array\(3\) in Scene"):
         fb.Scene(BEAM, elements=np.array(3))
     for bad in (None, 1.0, ["omega"]):

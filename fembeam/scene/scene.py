@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -512,5 +512,7 @@ def _listed(name: str, value: Any, kinds: tuple[type, ...]) -> tuple[Any, ...]:
     entries = tuple(value)
     for index, entry in enumerate(entries):
         if not isinstance(entry, kinds):
-            raise TypeError(f"{name}[{index}] must be a {names}, got {entry!r} in Scene; move it to its own list")
+            part = is_dataclass(entry) and not isinstance(entry, type)
+            advice = "move it to its own list" if part else f"write {kinds[0].__name__}(…)"
+            raise TypeError(f"{name}[{index}] must be a {names}, got {entry!r} in Scene; {advice}")
     return entries
