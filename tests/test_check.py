@@ -107,6 +107,15 @@ def test_contacts_to_expect_scale_with_the_law():
     assert soft.time / stiff.time == pytest.approx(100**0.4, rel=0.05)
 
 
+def test_a_record_in_ms_is_told():
+    t = 0.01 * np.arange(200)
+    for unit, few in ((1e3, True), (1.0, False)):
+        drive = fb.Record(unit * t, np.sin(20.0 * t), quantity="acceleration", detrend=True, interpolation="linear")
+        said = list(cantilever(base=drive).check(duration=1.5, dt=1e-3, modes=2))
+        record = "base: a run of 1.5 s sees 1 of 200 samples of the record, which lasts 1990 s: is its time in ms?"
+        assert (record in said) is few
+
+
 def test_a_preload_is_not_told_to_be_soft():
     """It is in contact for long because it begins there."""
     drive = fb.Harmonic(1e-5, 50.0)

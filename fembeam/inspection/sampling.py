@@ -7,10 +7,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fembeam.excitation import Record
 from fembeam.model import Model
-from fembeam.scene import persistent_drive
+from fembeam.scene import persistent_drive, signals_of
 
 FEWEST_PERIODS = 3.0  # of the lowest mode that swings, in a run
+FEWEST_SAMPLES = 8  # of a record, as many as make one
 
 
 def of_run(model: Model, duration: float | None, dt: float | None, discard: float) -> Iterator[str]:
@@ -21,6 +23,7 @@ def of_run(model: Model, duration: float | None, dt: float | None, discard: floa
                f"take {math.pi / (2 * fastest):.1g} s or less")  # fmt: skip
     if duration is None:
         return
+    yield from _of_records(model, duration)
     moving = model.omega[model.omega > 1e-6 * max(fastest, 1e-9)]
     period = 2 * math.pi / float(moving.min()) if len(moving) else 0.0
     if duration < FEWEST_PERIODS * period:
@@ -30,3 +33,12 @@ def of_run(model: Model, duration: float | None, dt: float | None, discard: floa
     slowest = float(decay[decay > 0].min()) if np.any(decay > 0) else math.inf
     if discard < 3 / slowest < 0.5 * duration and persistent_drive(model.scene):
         yield f"discard = {discard:g} s keeps the transient in statistics: it lasts about {3 / slowest:.2g} s"
+
+
+def _of_records(model: Model, duration: float) -> Iterator[str]:
+    """Records of whose samples a run sees too few."""
+    for path, signal in signals_of(model.scene).items():
+        seen = int(np.sum(signal.t <= duration)) if isinstance(signal, Record) else FEWEST_SAMPLES
+        if seen < FEWEST_SAMPLES:
+            yield (f"{path}: a run of {duration:g} s sees {seen} of {signal.t.size} samples of the record, which lasts "
+                   f"{signal.duration:.4g} s: is its time in ms?")  # fmt: skip
