@@ -164,6 +164,8 @@ def integrate(
         words = status.value + run.engine.explain(status)
         if status is Status.UNBALANCED:
             words = cancelling(system, np.hstack((solution.q, solution.q_dot))) or words
+        if status is Status.OVERDRAWN:
+            words = f"{_overdrawn(solution.record)}: {words}"
         raise SolverError(f"stopped at t = {run.time:.9g} s of {duration:g} s: {words}", solution)
     run.engine.release()
     return solution
@@ -434,15 +436,16 @@ class _Run:
             logged[i, at.FORCE] = 0.0  # the slider's way, which began with what its spring was drawn
 
 
-def _overdrawn(record: Record) -> bool:
-    """Whether F_t has come to k_t π c in a circle of radius c: ξ is known up to whole turns there, and so is ξ - s."""
-    of_friction = record.rows[record.rows[:, at.GUARD] == at.FRICTION]
+def _overdrawn(record: Record) -> str:
+    """Where F_t has come to k_t π c in a circle of radius c, as ξ and ξ - s are known up to whole turns; else empty."""
+    rows = record.rows[record.rows[:, at.GUARD] == at.FRICTION]
     for s, contact in enumerate(record.system.contacts):
         if contact.friction is not None and contact.circle:
-            largest = of_friction[of_friction[:, at.ELEMENT] == s, at.LARGEST].max(initial=0.0)
-            if largest > most_friction(contact, abs(contact.circle)):
-                return True
-    return False
+            most = most_friction(contact, abs(contact.circle))
+            largest = rows[rows[:, at.ELEMENT] == s, at.LARGEST].max(initial=0.0)
+            if largest > most:
+                return f"friction of contact {s} came to {largest:.4g} N, of {most:.4g} N at most"
+    return ""
 
 
 def _end(system: System, q0: ArrayLike, q_dot0: ArrayLike, duration: float, method: Any, memory: Any) -> Array:

@@ -535,7 +535,8 @@ def test_a_spring_that_is_drawn_by_half_a_turn_is_refused():
     shaft = Contact(EYE[:2, :2], KelvinVoigt(1e6, 0.0), 1e-3, **options)
     none = 0.0 * EYE[:2, :2]
     system = System(10.0 * EYE[:2, :2], none, none, [shaft], [([100.0, 0.0], np.ones_like)])
-    with pytest.raises(SolverError, match="drawn by half a turn"):
+    said = r"friction of contact 0 came to \d+\.\d+ N, of 29\.85 N at most: .* drawn by half a turn"  # 0.95 k_t π c
+    with pytest.raises(SolverError, match=said):
         integrate(system, [1.1e-3, 0.0], [0.0, 0.0], 0.02)
 
 
