@@ -103,6 +103,20 @@ def test_at_standstill_each_mode_is_two_circles():
     found = reduction.whirl(basis, 0.0 * G, x, y)
     np.testing.assert_allclose(found.signed[:4], [-216.4076249565131, 216.4076249565131, -1977.830202970811,
                                                   1977.830202970811], rtol=2e-9)  # fmt: skip
+    np.testing.assert_allclose(np.abs(found.sense), 1.0, rtol=1e-9)  # of the last pair too
+
+
+def test_shapes_solve_their_equations():
+    """(K - ω²M + iωG) φ = 0 and K φ = Ω² (M - iG) φ, of structures that are not round."""
+    M, _, K, G = drawn(3, 5, False, 0.3)
+    basis, rows = reduction.modal_basis(M, K), np.eye(5)
+    for found, spin in (
+        (reduction.whirl(basis, G, *rows[:2]), 1.0),
+        (reduction.critical_speeds(basis, G, *rows[:2]), None),
+    ):
+        for omega, shape in zip(found.omega, found.shapes.T, strict=True):
+            terms = K @ shape, -(omega**2) * M @ shape, 1j * omega * (spin or omega) * G @ shape
+            assert np.abs(sum(terms)).max() < 1e-10 * np.abs(terms).max()
 
 
 def test_modes_at_standstill_converge_fast():
@@ -136,6 +150,11 @@ def test_blocks_have_the_whirling_frequencies_and_no_damping():
     np.testing.assert_array_equal(blocks.c, 0.0)
 
 
+def test_as_text_it_counts_the_senses():
+    found = reduction.Whirl(np.arange(1.0, 5.0), np.array([1.0, -1.0, 0.0, -0.5]), np.zeros((1, 4), dtype=complex))
+    assert repr(found) == "<whirl of 4 modes, 1 from x to y, 2 from y to x>"
+
+
 PAIR, ROWS = reduction.Basis(np.eye(2), np.array([1.0, 2.0])), np.eye(2)
 LOOSE = reduction.Basis(np.eye(2), np.array([0.0, 2.0]))
 
@@ -143,6 +162,7 @@ test_whirl_arguments_are_refused = refused_by(
     reduction.whirl,
     (PAIR, [[0.0, 1.0], [-0.5, 0.0]], *ROWS, r"G must be skew, G = -Gᵀ; its largest \|G \+ Gᵀ\| is 0.5"),
     (PAIR, np.zeros((3, 3)), *ROWS, r"G must be \(2, 2\), as the basis has 2 dofs, got \(3, 3\)"),
+    (PAIR, TURN, ROWS[0], np.array([0.0, np.nan]), r"x and y must be finite rows"),
     (PAIR, TURN, ROWS[0], ROWS, r"rows \(k, 2\) of the same places, got \(1, 2\) and \(2, 2\)"),
 )
 test_a_loose_rotor_has_no_critical_speeds = refused_by(
