@@ -109,6 +109,8 @@ def test_sign_by_direction(cantilever):
         flipped = reduction.oriented(basis, -direction)
         assert np.all(flipped.project(direction) < 0)
         np.testing.assert_array_equal(np.abs(flipped.vectors), np.abs(basis.vectors))
+        heavy = reduction.Basis(1e-12 * basis.vectors, basis.omega)
+        assert np.all(reduction.oriented(heavy, -direction).project(direction) < 0)
 
 
 def test_sign_by_largest_displacement_nearest_the_end():
@@ -128,12 +130,13 @@ def test_a_node_at_the_direction_falls_back():
 # --- self-checks and bad input ---------------------------------------------------------------------------
 
 
-def test_wrong_vectors_are_noticed(cantilever, monkeypatch):
+@pytest.mark.parametrize("off", [1e-6, -1e-6])
+def test_wrong_vectors_are_noticed(cantilever, monkeypatch, off):
     solve = modal._solve
 
     def skewed(*given):
         omega_squared, vectors = solve(*given)
-        return omega_squared, vectors * (1 + 1e-6)
+        return omega_squared, vectors * (1 + off)
 
     monkeypatch.setattr(modal, "_solve", skewed)
     with pytest.raises(reduction.AccuracyError, match="modes must be orthonormal to 1e-09, got 2e-06"):
@@ -161,6 +164,20 @@ def test_modes_of_a_free_body_without_root():
     lowest = np.sqrt(2.0 - 2.0 * np.cos(np.pi / 10)) * np.sqrt([1e6, 1e6, 1.6e6])
     assert found[:3].tolist() == [0.0] * 3
     np.testing.assert_allclose(found[3:], lowest, rtol=1e-8)
+
+
+@pytest.mark.parametrize("mass", [1e-12, 1e12])
+@pytest.mark.parametrize("stiffness", [1e-12, 1e12])
+def test_modes_in_any_units(chain, mass, stiffness):
+    """Chains, free and on a soft mount: φ goes as 1/√mass, ω as √(stiffness/mass), and what is rigid stays so."""
+    M, K, _ = chain
+    mount, root = sparse.csr_matrix(([1e-4], ([0], [0])), (200, 200)), np.diff(np.eye(200), axis=0)
+    for own, R in ((K, None), (K, root), (K + mount, None)):
+        usual = reduction.modal_basis(M, own, 6, root=R)
+        scaled = None if R is None else np.sqrt(stiffness) * R
+        again = reduction.modal_basis(mass * M, stiffness * own, 6, root=scaled)
+        np.testing.assert_allclose(again.omega, np.sqrt(stiffness / mass) * usual.omega, rtol=1e-8)
+        np.testing.assert_allclose(np.sqrt(mass) * again.vectors, usual.vectors, atol=1e-6)
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])
@@ -212,6 +229,7 @@ test_modal_basis_rejects = refused_by(
     ((EYE, EYE[:2]), "K must be square"),
     ((np.eye(2), EYE), "M and K must have the same shape"),
     ((EYE, EYE * np.nan), "K must be finite"),
+    ((sparse.eye(3) * 1j, EYE), "M must be real numbers"),
     ((EYE + np.eye(3, k=1), EYE), "M must be symmetric, got a difference of 1 "),
     ((EYE, EYE + np.eye(3, k=1)), "K must be symmetric"),
     ((np.diag([1.0, 0.0, 1.0]), EYE), "M must be positive definite, got a pivot of 0"),

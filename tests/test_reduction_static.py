@@ -102,6 +102,31 @@ def test_nothing_is_counted_twice(cantilever):
     assert extended.effective_mass(cantilever.base_load).sum() < reduction.moved_mass(M, cantilever.base_load)
 
 
+@pytest.mark.parametrize("mass", [1e-9, 1e9])
+@pytest.mark.parametrize("stiffness", [1e-9, 1e9])
+def test_dependent_directions_count_once_in_any_units(mass, stiffness):
+    """Of a beam that is held and of a free one; one direction given twice, once in other units."""
+    for supports in ([Clamped(0.0)], []):
+        full = Scene(Beam(1.0, Section(E=stiffness, rho=mass, A=1.0, I=1.0)), supports).matrices(elements=20)
+        M, K, R = full.M, full.K, full.root
+        B = full.interpolation([1.0, 0.52, 0.1, 0.35, 1.0]).T.toarray() * [1.0, 1.0, 1.0, 1.0, 1e3]
+        assert reduction.dofs_inside(M, K, B, R) == M.shape[0] - 4
+        basis = reduction.with_residual(reduction.modal_basis(M, K, 4, root=R), M, K, B, R)
+        assert basis.count == 8
+        np.testing.assert_allclose(reduction.static_share(basis, M, K, B, R), 1.0, rtol=1e-9)
+
+
+@pytest.mark.parametrize("root", [True, False])
+def test_directions_side_by_side_in_different_units(cantilever, root):
+    M, K, R = cantilever.M, cantilever.K, cantilever.root if root else None
+    z, units = np.array([1.0, 0.98]), np.array([1.0, 1e6])
+    B = cantilever.interpolation(z).T.toarray() * units
+    basis = reduction.with_residual(reduction.modal_basis(M, K, 3, root=R), M, K, B, R)
+    near, far = np.minimum.outer(z, z), np.maximum.outer(z, z)
+    kept = basis.project(B).T @ (basis.project(B) / basis.omega[:, None] ** 2) / np.outer(units, units)
+    np.testing.assert_allclose(kept, near**2 * (3 * far - near) / 6, rtol=1e-9 if root else 2e-6)
+
+
 def test_complete_basis_has_no_residual():
     full = Scene(Beam(1.0, UNIT), [Clamped(0.0)]).matrices(elements=4)
     basis = reduction.modal_basis(full.M, full.K, root=full.root)
@@ -137,6 +162,13 @@ def test_by_frequency_and_by_mass(cantilever):
     assert reduction.fewest_modes(M, K, reduction.carrying(1.0, load, mass), R).count <= M.shape[0]
 
 
+def test_a_frequency_at_the_limit_counts():
+    """Where it is the last one known, another one of the same frequency may stand behind it."""
+    basis = reduction.Basis(np.eye(3), np.array([1.0, 2.0, 3.0]))
+    assert reduction.below(2.0)(basis) == 2
+    assert reduction.below(3.0)(basis) is None
+
+
 EYE = np.eye(3)
 
 
@@ -146,8 +178,15 @@ test_bad_input = refused(
     (lambda: reduction.craig_bampton(EYE, EYE, np.ones((3, 1)), 3), "count must be 0 to 2"),
     (lambda: reduction.craig_bampton(EYE, EYE, np.ones((3, 1)), True), "count must be 0 to 2"),
     (lambda: reduction.craig_bampton(EYE, EYE, np.full((3, 1), np.nan), 1), "finite"),
+    (lambda: reduction.craig_bampton(EYE, EYE, [[1.0, 1.0], [0.0, np.nan], [0.0, 0.0]], 1), "finite"),
+    (lambda: reduction.craig_bampton(EYE, EYE, [[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]], 1), "not zero"),
     (lambda: reduction.below(0.0), "omega_max must be positive"),
+    (lambda: reduction.below(np.inf), "omega_max must be positive and finite"),
     (lambda: reduction.carrying(1.5, EYE[0], 1.0), r"share must lie in \(0, 1\]"),
+    (lambda: reduction.carrying(0.0, EYE[0], 1.0), r"share must lie in \(0, 1\]"),
+    (lambda: reduction.carrying(0.5, EYE[0], 0.0), "mass must be positive and finite"),
+    (lambda: reduction.moved_mass(EYE, np.ones(2)), "load must be 3 finite numbers"),
+    (lambda: reduction.moved_mass(EYE, np.array([1.0, np.nan, 0.0])), "load must be 3 finite numbers"),
     (lambda: reduction.carrying(0.5, EYE[0], np.nan), "mass must be positive and finite"),
     (lambda: reduction.craig_bampton(np.eye(2), EYE, EYE[:, :1], 1), "M and K must have the same shape"),
     (lambda: reduction.fewest_modes(EYE, EYE, reduction.below(0.5)), "at least one mode"),
