@@ -49,6 +49,14 @@ def test_fields_are_one_for_each_beam():
         model.state([None])
 
 
+def test_what_a_field_of_a_structure_does_not_name_rests():
+    pair = fb.Structure(np.diag([900.0, 400.0]), np.eye(2), labels=[("a", "x"), ("b", "x")])
+    model = fb.Scene(pair).reduce("all")
+    start = model.state({("b", "x"): 1e-3}, {("a", "x"): 0.2})
+    assert [model.phi((one, "x")) @ start[:2] for one in "ab"] == pytest.approx([0.0, 1e-3])
+    assert [model.phi((one, "x")) @ start[2:] for one in "ab"] == pytest.approx([0.2, 0.0])
+
+
 def test_static_tip_load():
     model = fb.Scene(fb.Beam(L, STEEL), CLAMPED).reduce(5)
     start = model.equilibrium({L: -10.0})
@@ -77,6 +85,20 @@ def test_preload_alone_moves_the_beam():
     model = scene.reduce(3)
     f = tip_flexibility(model)
     assert model.phi(L) @ model.equilibrium()[:3] == pytest.approx(1e-3 * k * f / (1 + k * f), rel=1e-10)
+
+
+@pytest.mark.parametrize("E", [2.1e11, 1e-3])
+def test_a_lowered_support_presses_the_beam_on_its_stop(E):
+    """Half of it at the middle, where the stop carries k u: u (1 + f k) = h/2; of a beam of 4e-5 rad/s as well."""
+    section, h = fb.Section.rectangle(E, 7850.0, 0.01, 0.01), -1e-3
+    k = 50.0 * section.bending_stiffness / L**3
+    supports = [fb.Pinned(0.0), fb.Pinned(L, motion={"y": fb.Harmonic(h, 0.0)})]
+    held = fb.Scene(fb.Beam(L, section), supports).reduce(4)
+    assert held.phi(L / 2) @ held.equilibrium()[:5] == pytest.approx(0.5 * h, rel=1e-9)
+    stop = fb.Stop(L / 2, KelvinVoigt(k, 0.0), gap=0.0)
+    model = fb.Scene(fb.Beam(L, section), supports, stops=[stop]).reduce(4)
+    f = float(np.sum(model.phi(L / 2) ** 2 / model.omega**2))
+    assert model.phi(L / 2) @ model.equilibrium()[:5] == pytest.approx(0.5 * h / (1.0 + f * k), rel=1e-9)
 
 
 def test_resting_mass_finds_the_beam_it_lies_on():

@@ -197,7 +197,7 @@ def _check_impactors(model: Model, q: Vector) -> None:
 def equilibrium(model: Model, loads: Mapping[Any, float]) -> Vector:
     """Start from static equilibrium; `Model.equilibrium` explains it."""
     start, n = rest(model), len(model.omega)
-    load = model.omega**2 * start[:n] if len(model.following) else np.zeros(n)
+    load = np.zeros(n)
     for direction, g in model.scene.pulls.items():
         load = load - model.participation_along(direction) * g
     named = isinstance(loads, Mapping)
@@ -209,7 +209,7 @@ def equilibrium(model: Model, loads: Mapping[Any, float]) -> Vector:
     free = np.ones(n, dtype=bool)
     free[n - len(model.matrices.impactors) :] = start[2 * n - len(model.matrices.impactors) :] == 0.0
     q = np.zeros(n)
-    q[free] = _settled(model, load, free)
+    q[free] = _settled(model, load, free, start[:n][free])
     start[:n] = q
     return start
 
@@ -235,14 +235,16 @@ def onto_circle(contact: Any, speed: float) -> tuple[float, float]:
     return t, speed * contact.gap / (sign * ((t * w - o) @ w))
 
 
-def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
-    """Solve r(q) = f + Σ w F - ω² q = 0 by Newton steps damped like time: (1/τ + J) Δq = r.
+def _settled(model: Model, load: Vector, free: NDArray[np.bool_], rest: Vector) -> Vector:
+    """The rest + q, r(q) = f + Σ w F - ω² q = 0, by Newton steps damped like time: (1/τ + J) Δq = r.
 
+    Forces that hold the rest of moved supports are left out: those in static shapes would hide what is not settled.
     τ doubles while it goes well; the damping carries a body that nothing holds yet to the contact that will.
     """
     K, f, W = model.omega[free] ** 2, load[free], model.directions[:, free]
     rows = model.contact_rows
-    gaps = np.array([gap for contact in rows for gap in contact.gaps])
+    gaps = np.array([gap for contact in rows for gap in contact.gaps]) + W @ rest
+    rounded = np.abs(gaps) + np.abs(W) @ np.abs(rest)
     q = np.zeros(len(f))
     forces, slopes, circles = _pushed(model, -W @ q - gaps)
     residual = f + forces @ W - K * q
@@ -252,10 +254,10 @@ def _settled(model: Model, load: Vector, free: NDArray[np.bool_]) -> Vector:
         stiff = slopes.copy()
         for own, block in circles:
             stiff[own] = np.abs(block).max()
-        told = ROUNDED * stiff * (np.abs(W) @ np.abs(q) + np.abs(gaps))  # N, of δ: stiff contacts multiply its rounding
-        if _balanced(residual, scale, told, W, bool(f.any())):
+        told = ROUNDED * stiff * (np.abs(W) @ np.abs(q) + rounded)  # N, of δ: stiff contacts multiply its rounding
+        if _balanced(residual, scale, told, W, bool(f.any() or rest.any())):
             _check_memory(model, -W @ q - gaps)
-            return q
+            return rest + q
         J = np.diag(1 / tau + K) + (W.T * slopes) @ W
         for own, block in circles:
             J += W[own].T @ block @ W[own]
