@@ -15,9 +15,11 @@ import fembeam as fb
 import reduction
 import solvers
 from contacts import (
+    BoucWen,
     Coulomb,
     Hertz,
     Hysteretic,
+    Iwan,
     Jenkins,
     KelvinVoigt,
     PiecewiseLinear,
@@ -568,6 +570,32 @@ def test_an_element_with_memory_is_replayed():
     assert d[0] == pytest.approx(-0.15, rel=1e-9)
     with pytest.raises(reduction.AccuracyError, match=r"element at 1 m slips or yields before equilibrium"):
         model.equilibrium({1.0: -2.0})
+
+
+@pytest.mark.parametrize(("force", "slips"), [(9.0, False), (15.0, True), (70.0, True)])
+def test_one_slider_of_several_that_slips_is_no_equilibrium(force, slips):
+    """Of two, at 0.01 m and at 0.05 m, where 11 N and 55 N hold them and the spring beside them."""
+    body = fb.Structure([[900.0]], [[1.0]], labels=[("lever", "x")])
+    element = fb.Element("lever", Iwan([100.0, 100.0], [1.0, 5.0]), direction="x")
+    model = fb.Scene(body, elements=[element]).reduce("all")
+    if not slips:
+        start = model.equilibrium({("lever", "x"): force})
+        assert model.phi(("lever", "x")) @ start[:1] == pytest.approx(force / 1100.0, rel=1e-9)
+        return
+    with pytest.raises(reduction.AccuracyError, match=r"element at lever, x slips or yields before equilibrium"):
+        model.equilibrium({("lever", "x"): force})
+
+
+@pytest.mark.parametrize(("law", "left"), [
+    (BoucWen(1e4, 0.1, 1.0, 500.0, 500.0, 1), (1e3, 0.0)),
+    (Iwan([1e3, 2e3], [1.0, np.inf]), (2e3, 0.0)),
+    (Jenkins(1e3, 2.0), (0.0, 0.0)),
+    (KelvinVoigt(500.0, 3.0) + Jenkins(1e3, 2.0), (500.0, 3.0)),
+])  # fmt: skip
+def test_what_is_left_once_all_sliders_move(law, left):
+    model = beam([fb.Clamped(0.0)], elements=[fb.Element(1.0, law)]).reduce(2)
+    found, w = model.slipping_elements, model.phi(1.0)
+    np.testing.assert_allclose(found, np.multiply.outer(left, np.outer(w, w)), rtol=1e-9, atol=1e-9)
 
 
 def test_what_yields_before_equilibrium_is_named():

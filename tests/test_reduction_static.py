@@ -14,7 +14,7 @@ from fembeam.beams import Beam, Rayleigh, Section
 from fembeam.excitation import Harmonic
 from fembeam.model import reduce as reducing
 from fembeam.scene import Clamped, LumpedMass, PointForce, Scene, Stop
-from fembeam.structures import Frame
+from fembeam.structures import Frame, Structure
 from reduction import interface
 
 UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)
@@ -316,6 +316,33 @@ test_static_shapes_need_a_place = refused_by(
     ("residual", "static shapes need a stop, a force or a dashpot"),
     ("interface", r"or an element, got none in .*leave out interface=True, or add one"),
 )
+
+
+# --- models beside another -------------------------------------------------------------------------------
+
+
+def turned_pair(angle):
+    """Two masses whose shapes are turned by an angle."""
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    labels = [("a", "x"), ("b", "x")]
+    return Scene(Structure(turn @ np.diag([100.0, 400.0]) @ turn.T, np.eye(2), labels=labels)).reduce("all")
+
+
+def test_likeness_is_the_cosine_between_shapes():
+    for first, second in ((0.2, 0.3), (0.2, 1.2), (0.7, 0.9)):
+        found = reducing.likeness(turned_pair(first), turned_pair(second))
+        assert found == pytest.approx(np.cos(second - first), rel=1e-12)
+
+
+def test_shapes_take_the_signs_of_a_model_near():
+    """Where another entry becomes the largest, the second shape changes its sign."""
+    before, after = turned_pair(0.25 * np.pi - 0.1), turned_pair(0.25 * np.pi + 0.1)
+    assert np.sum(before.basis.vectors * after.basis.vectors, axis=0)[1] < 0.0
+    signed = reducing.signed_like(after, before)
+    for place in (("a", "x"), ("b", "x")):
+        np.testing.assert_array_equal(signed.phi(place), after.phi(place) * [1.0, -1.0])
+    np.testing.assert_allclose(np.diag(before.basis.vectors.T @ signed.basis.vectors), np.cos(0.2), rtol=1e-12)
+    assert reducing.signed_like(after, after) is after
 
 
 # --- full against reduced --------------------------------------------------------------------------------
