@@ -180,7 +180,7 @@ def synchronous_rub(
 
     Parameters
     ----------
-    system : with M, C, K, G that commute with J. spin : Ω, rad/s, of the whirl.
+    system : with M, C, K, G that commute with J; the contact is a hole round the axis. spin : Ω, rad/s, of the whirl.
     J : (n, n), a quarter turn; 0 on what does not turn. load : (n,) f₀, at t = 0, where it turns with Ω.
     near : the radius wanted, m, where there are several; None: the largest. entry_rate : m/s, as for `Model.rub`.
     lever : False leaves out c/r of the force of friction: μN on the place, as in textbooks; F_t ξ̇ is then not its
@@ -198,7 +198,7 @@ def synchronous_rub(
     p = turning.equilibrium(r, angle)
     normal, slip = turning.force(r), turning.slip
     state = np.concatenate((p, spin * J @ p))
-    delta, values = turning.side * (r - turning.contact.gap), turning.eigenvalues(r, angle)
+    delta, values = r - turning.contact.gap, turning.eigenvalues(r, angle)
     return Rub(spin, r, angle, delta, normal, slip * normal, turning.sliding_speed, values, radii, state)
 
 
@@ -219,14 +219,9 @@ class _Turning:
         return self.system.contacts[0]
 
     @property
-    def side(self) -> float:
-        """1, of an outer circle -1: δ = ±(r - c)."""
-        return -1.0 if self.contact.outer else 1.0
-
-    @property
     def arm(self) -> float:
-        """R, m, negative of an outer circle; 0 without."""
-        return self.side * self.contact.radius if self.contact.radius is not None else 0.0
+        """R, m; 0 without."""
+        return self.contact.radius or 0.0
 
     @property
     def sliding_speed(self) -> float:
@@ -262,22 +257,20 @@ class _Turning:
 
     def force(self, r: Any) -> Any:
         """N, of radii (k,) too."""
-        delta = self.side * (r - self.contact.gap)
+        delta = r - self.contact.gap
         found = self.contact.law.force(np.maximum(delta, 0.0), 0.0, self.entry_rate)
         return np.where(delta > 0.0, found, 0.0) if np.ndim(r) else float(np.squeeze(found)) * (delta > 0.0)
 
     def resisted(self, r: Any) -> Any:
         """The whirl without contact that is needed for a radius, in the direction of the place."""
-        return r + self.compliance * self.force(r) * (self.side + 1j * self.slip * self.share(r))
+        return r + self.compliance * self.force(r) * (1.0 + 1j * self.slip * self.share(r))
 
     def radii(self) -> tuple[float, ...]:
         """All radii in contact, ascending; those closer together than the trials are not told apart."""
         from scipy.optimize import brentq
 
         c, free = self.contact.gap, abs(self.free)
-        deepest = c if self.contact.outer else DEEPEST * max(c, free)
-        deltas = np.append(0.0, np.geomspace(LEAST * c, deepest * (1.0 - LEAST), TRIED))
-        tried = np.sort(c + self.side * deltas)
+        tried = c + np.append(0.0, np.geomspace(LEAST * c, DEEPEST * max(c, free), TRIED))
 
         def apart(r: Any) -> Any:
             return np.abs(self.resisted(r)) - free
@@ -290,7 +283,7 @@ class _Turning:
         """(2,) unit vectors along the radius and across it, and the way w of the force -N w on the place."""
         along = np.array([math.cos(angle), math.sin(angle)])
         across = QUARTER @ along
-        return along, across, self.side * along + self.slip * self.share(r) * across
+        return along, across, along + self.slip * self.share(r) * across
 
     @property
     def torque(self) -> Vector:
@@ -306,13 +299,11 @@ class _Turning:
     def eigenvalues(self, r: float, angle: float) -> NDArray[np.complex128]:
         """(2n,) 1/s, the least damped first."""
         law: Any = self.contact.law if self.contact.friction is None else self.contact.law.law  # type: ignore[attr-defined]
-        slope, rate = tangent(law, self.side * (r - self.contact.gap), 0.0, self.entry_rate)
+        slope, rate = tangent(law, r - self.contact.gap, 0.0, self.entry_rate)
         along, across, way = self.pushed(r, angle)
         W, normal, share = self.contact.direction, self.force(r), self.slip * self.share(r)
-        grown = np.outer(W.T @ way + self.torque, self.side * along @ W)  # of N, by δ
-        bend = np.outer(self.side * across - share * along, across) / r - self.lever * share / r * np.outer(
-            across, along
-        )
+        grown = np.outer(W.T @ way + self.torque, along @ W)  # of N, by δ
+        bend = np.outer(across - share * along, across) / r - self.lever * share / r * np.outer(across, along)
         stiffness = self.dynamic + slope * grown + normal * W.T @ bend @ W
         M, J = np.asarray(self.system.M), self.J
         damping = self.system.by_rate + 2.0 * self.spin * M @ J + rate * grown
