@@ -252,6 +252,9 @@ def test_any_number_of_a_scene_can_be_varied(model, name, value):
 def test_extremes_of_a_sampled_sine_and_common_periods():
     t = np.linspace(0.0, 2.0, 41)
     assert extremes_of(t, np.sin(9 * t), 9 * np.cos(9 * t)) == pytest.approx((-1.0, 1.0), abs=2e-4)
+    for first, last in ((0.1, 1.4), (3.0, 1.7)):  # the top lies behind the last sample, or before the first
+        part = np.linspace(min(first, last), max(first, last), 8)
+        assert extremes_of(part, np.sin(part), np.cos(part)) == pytest.approx((np.sin(first), np.sin(last)))
     tones = [fb.Multisine([1.0, 1.0], [2.0, 3.0]), fb.Harmonic(1.0, 0.0)]
     assert common_period(tones) == pytest.approx(2.0 * math.pi)
 

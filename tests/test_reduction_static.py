@@ -13,6 +13,7 @@ from contacts import Hertz, KelvinVoigt
 from fembeam.beams import Beam, Rayleigh, Section
 from fembeam.excitation import Harmonic
 from fembeam.model import reduce as reducing
+from fembeam.model.mode_table import mode_rows
 from fembeam.scene import Clamped, LumpedMass, PointForce, Scene, Stop
 from fembeam.structures import Frame, Structure
 from reduction import interface
@@ -259,6 +260,26 @@ def test_by_frequency_mass_and_all():
     full = scene.reduce("all", elements=10)
     assert len(full.omega) == full.matrices.M.shape[0]
     assert full.effective_mass.sum() == pytest.approx(full.moving_mass, rel=1e-9)
+    first, second = full.omega[:2]
+    assert len(scene.reduce(omega_max=0.5 * (first + second)).omega) == 1
+
+
+def test_rows_of_modes_of_a_light_cantilever():
+    """f = (βL)²/2π √(EI/ρA)/L², and of its 0.2 kg the shares 4 (σ/βL)² of a clamped beam."""
+    section = Section(E=1e4, rho=0.2, A=1.0, I=1e-4)
+    for number, row in enumerate(mode_rows(Scene(Beam(1.0, section), [Clamped(0.0)]).reduce(2))):
+        root, sigma = ((1.8751040687, 0.7340955138), (4.6940911330, 1.0184673188))[number]
+        assert row["hz"] == pytest.approx(root**2 * np.sqrt(1.0 / 0.2) / (2.0 * np.pi), rel=1e-6)
+        assert row["share"] == pytest.approx(4.0 * (sigma / root) ** 2, rel=1e-5)
+        assert row["effective_mass"] == pytest.approx(0.2 * row["share"], rel=1e-9)
+
+
+def test_all_modes_beside_a_beam_need_its_elements():
+    pair = Structure(np.eye(2), np.eye(2), labels=[("a", "x"), ("b", "x")])
+    mixed = Scene(pair, bodies=[Scene(Beam(1.0, UNIT), [Clamped(0.0)])])
+    with pytest.raises(ValueError, match="'all' with elements given"):
+        mixed.reduce("all")
+    assert mixed.reduce("all", elements=3).counts == ((2, 0), (6, 0))
 
 
 def test_strike_foretells_contact_time():
