@@ -69,6 +69,19 @@ def test_rest_on_a_stop_without_gap(side):
     np.testing.assert_allclose(found, by_differences, rtol=0.0, atol=1e-5 * np.abs(by_differences).max())
 
 
+@pytest.mark.parametrize("path", ["impactors[0].velocity", "impactors[0].mass"])
+def test_a_speed_at_the_start_moves_no_stop_off_its_surface(path):
+    """Dashpots on both couple places with speeds, so that dδ(0) was 3e-37 m for 0: refused, "touched at the start"."""
+    ball = fb.Impactor(0.25, 0.05, -1.0, KelvinVoigt(1e5, 5.0), gap=1e-3, stiffness=100.0, damping=1.0)
+    scene = fb.Scene(fb.Beam(0.25, BAR), [fb.Clamped(0.0)], stops=[fb.Stop(0.2, KelvinVoigt(1e5, 20.0), gap=0.0)],
+                     impactors=[ball], dashpots=[fb.Dashpot(0.2, 5.0)], base=fb.Harmonic(1e-3, 110.0))  # fmt: skip
+    options = {"modes": 4, "duration": 0.02, "dt": 1e-3}
+    found = simulated(scene, **options).sensitivity(path).displacement(0.1)
+    step = 1e-5 * abs(value_of(scene, path))
+    by_differences = differences(scene, path, step, lambda run: run.displacement(0.1), **options)
+    np.testing.assert_allclose(found, by_differences, rtol=0.0, atol=1e-5 * np.abs(by_differences).max())
+
+
 @pytest.mark.parametrize("element", [Coulomb(0.3, 1e4), BoucWen(1e4, 0.2, 1.0, 2e3, 1e3)])
 def test_a_force_that_peaks_where_an_element_turns(element):
     """One mode turns at once in the stop and in the element, so that the largest force lies on the element's event."""

@@ -149,7 +149,7 @@ def _at_knot(flow: Flow, t: float, row: Array, acting: Acting, motion: tuple[Any
     d_border = d_delta.copy()
     d_border[flow.own] -= flow.by.of_knot(s, border)
     grazes = rate * rate <= 2.0 * abs(acceleration) * GRAZING * span
-    if t == 0.0 and grazes and not np.any(d_border[flow.own]):
+    if t == 0.0 and grazes and not np.any(flow.leaves_at_start(s, border)):
         return np.zeros(flow.columns)  # at rest on the surface: it begins at once
     if grazes:
         what = f"is entered with {abs(rate):.3g} m/s" if up and not border else "turns on a knot"

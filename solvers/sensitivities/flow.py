@@ -27,6 +27,7 @@ from solvers.sensitivities.nearby import Change
 from solvers.sensitivities.panels import Panels, S, moved, propagator, running
 from solvers.sensitivities.stretches import Acting, Motion
 
+_ROUNDING = 1e-9  # of a sum of changes, relative to its terms
 _INSIDE = 1e-10  # relative distance kept from a knot, where the slope of a law may be that of the next segment
 
 
@@ -44,6 +45,7 @@ class Flow:
         self.y = blocks.inverse @ start
         self.columns = start.shape[1]
         self.own = slice(self.columns - len(by), self.columns)  # of the parameters
+        self.places = start[:n, self.own]  # of q at the start, as given: in decoupled form speeds round into it
         self.latched = latched  # (l, m) of every element
         self.entry, self.impulse = (np.zeros((len(contacts), self.columns)) for _ in range(2))
         self.largest = np.zeros((len(contacts), self.columns))  # change of each element's forces so far
@@ -122,6 +124,15 @@ class Flow:
         found = delta_slopes @ moved_rows, delta_slopes @ sped + rate_slopes @ moved_rows
         found[0][self.own] -= np.sign(self.system.contacts[s].circle) * self.by.elements[s].clearance
         return found
+
+    def leaves_at_start(self, s: int, border: int) -> Array:
+        """(d,) whether parameters move δ off a border at t = 0: by more than 1e-9 of the sums that tell it."""
+        one, motion = self.by.elements[s], self.motion_of(0.0, s)
+        slopes, q = motion.delta_slopes[:, 0], self.motion.at(np.zeros(1))[0][:, 0]
+        terms = [-slopes @ self.rows[s] * self.places.T, -slopes @ one.rows * q, -one.offsets * slopes]
+        rest = np.sign(self.system.contacts[s].circle) * one.clearance, self.by.of_knot(s, border)
+        summed = np.concatenate([*terms, -np.transpose(rest)], axis=1)
+        return np.abs(summed.sum(axis=1)) > _ROUNDING * np.abs(summed).sum(axis=1)
 
     def xi_change(self, t: float, s: int, told: float | None = None) -> Array:
         """dξ (m,) of an element with friction at fixed time; of ξ as it is ``told``, which may count more turns."""

@@ -418,7 +418,7 @@ class _Walk:
         for s, (span, contact) in enumerate(zip(self.asked.span, self.asked.system.contacts, strict=True)):
             near = abs(self.flow.motion_of(0.0, s).delta[0]) <= GRAZING * span
             bends = not self.acting.segment[s] or (contact.law.jump and not contact.always)
-            if near and bends and np.any(self.flow.change(0.0, s)[0][self.flow.own]):
+            if near and bends and np.any(self.flow.leaves_at_start(s, 0)):
                 raise NoDerivativeError(
                     f"no derivative: {called(self.flow.system, s)} is touched at the start, "
                     "so that it differs on both sides; begin off the surface"
