@@ -115,6 +115,20 @@ def test_tangent_over_many_borders(laws):
     assert abs(found - wanted).max() < 3e-7 * max(1.0, abs(wanted).max())
 
 
+@pytest.mark.parametrize("place", [0, 1, 2], ids=["A", "beta", "gamma"])
+def test_tangent_by_a_number_that_moves_a_corner_of_what_is_latched(place):
+    """Bouc and Wen's z is latched as zero, or kept beyond: derivatives were off by 9 to 12 % at any step."""
+    numbers, x, duration, step = np.array([1.0, 3.0, 1.0]), np.array([0.0, 0.0, 0.0, 1.0, -0.5, 0.3]), 12.0, 1e-6
+
+    def changed(h):
+        return beam(element(BoucWen(20.0, 0.2, *(numbers + h * np.eye(3)[place])), -1.0, -0.5, 0.3))
+
+    found = end(changed(0.0), x, duration, tangent=Parameter(changed(-step), changed(step), step))[1]
+    assert len(found.transitions) > 15
+    wanted = central(lambda h: end_of(changed(h), duration)(x), 1e-5)
+    np.testing.assert_allclose(found.tangent[:, -1], wanted, rtol=0.0, atol=1e-6 * abs(wanted).max())
+
+
 OF_SIZE = {  # laws whose motion of another size is the same but for the unit of length
     "Jenkins": lambda size: Jenkins(50.0, 0.4 * size),
     "Coulomb": lambda size: Coulomb(0.4 * size, 50.0, 0.5 * size, 0.1),

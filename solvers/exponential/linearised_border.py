@@ -32,6 +32,7 @@ from solvers.exponential.circles.friction_derivative import pass_slider
 _LEFT_BEHIND = 1e-6  # margin, in units of its terms, below which its border is not reached but left behind
 _SHARE, _SMALL = 1e-7, 1e-8  # steps of differences, relative to the number, and at least to its terms; margins bend
 _UNKNOWN, _TRIALS = 1e-10, 4  # step from which that of a latched number, of unknown size, is found in so many trials
+_CORRECTIONS = 3  # by which a nearby law's border is met to rounding
 _JUMP = 1e4  # ratio of the slopes of both sides from which one is that of a jump
 
 
@@ -110,19 +111,34 @@ def _is_left_behind(run, s, j, delta, rate, by):
 
 
 @merged
-def _explicit(run, s, j, delta, rate, out):
+def _latch_there(run, side, s, j, delta, rate, slope, margin):
+    """Latch by the law of one side where it meets the border itself, as what is latched may have a corner there.
+
+    Returns δ there, less that of the run; ``slope`` and ``margin`` are those of the run.
+    """
+    row, further = side.parameters[s], 0.0
+    for _ in range(_CORRECTIONS if slope != 0.0 else 0):
+        further -= (_margin(run, side, s, j, delta + further, rate, row) - margin) / slope
+    call_renewal(side.renewal[s], j, delta + further, rate, run.past.entry_rate[s], row)
+    return further
+
+
+@merged
+def _explicit(run, s, j, delta, rate, slope, maps, out):
     """Changes of the margin and of the latched numbers per unit of a parameter of the laws, which latch them, too."""
-    problem, ahead, behind, entry = run.problem, run.ahead, run.behind, run.past.entry_rate[s]
-    most, width = problem.latched.shape[1], 2.0 * run.variation.law_step
+    problem, ahead, behind, width = run.problem, run.ahead, run.behind, 2.0 * run.variation.law_step
+    margin = _margin(run, problem, s, j, delta, rate, problem.parameters[s])
     change = _margin(run, ahead, s, j, delta, rate, ahead.parameters[s])
     change = (change - _margin(run, behind, s, j, delta, rate, behind.parameters[s])) / width
-    call_renewal(ahead.renewal[s], j, delta, rate, entry, ahead.parameters[s])
-    call_renewal(behind.renewal[s], j, delta, rate, entry, behind.parameters[s])
-    for i in range(most):
-        place, out[i] = problem.latched[s, i], 0.0
-        if place >= 0:
-            out[i] = (ahead.parameters[s, place] - behind.parameters[s, place]) / width
-            ahead.parameters[s, place] = behind.parameters[s, place] = problem.parameters[s, place]
+    further = _latch_there(run, ahead, s, j, delta, rate, slope, margin)
+    further -= _latch_there(run, behind, s, j, delta, rate, slope, margin)
+    own = 0
+    for i in range(problem.latched.shape[1]):
+        own += 1 if problem.latched[s, i] >= 0 else 0
+    for i in range(own):
+        place = problem.latched[s, i]
+        change_there = ahead.parameters[s, place] - behind.parameters[s, place]
+        out[i] = (change_there - maps[i * (2 + own)] * further) / width
     return change
 
 
@@ -150,12 +166,15 @@ def pass_border(run, s, j):
         own += 1 if problem.latched[s, i] >= 0 else 0
     entry, row = past.entry_rate[s], problem.parameters[s]
     call_renewal_gradient(problem.by_renewal[s], j, delta, rate, entry, row, maps)
+    by_law_change, laws_change = 0.0, run.variation.law_step > 0.0
+    if laws_change:
+        by_law_change = _explicit(run, s, j, delta, rate, by[0], maps, explicit)
     jump = force_at(problem, s, delta, rate, entry, derivatives.batch)
     call_renewal(problem.renewal[s], j, delta, rate, entry, row)
     jump = force_at(problem, s, delta, rate, entry, derivatives.batch) - jump
-    by_law_change, laws_change = 0.0, run.variation.law_step > 0.0
-    if laws_change:
-        by_law_change = _explicit(run, s, j, delta, rate, explicit)
+    for i in range(own if laws_change else 0):
+        place = problem.latched[s, i]
+        run.ahead.parameters[s, place] = run.behind.parameters[s, place] = row[place]
     for c in range(derivatives.y.shape[0]):
         d_delta, d_rate = change_of(run, past.x, c, s, 0, t), change_of(run, past.x, c, s, 1, t)
         change, known = by[0] * d_delta + by[1] * d_rate, derivatives.latched[c, s * most : (s + 1) * most]
