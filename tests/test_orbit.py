@@ -75,6 +75,16 @@ def test_starts_that_settle_slowly_are_on_no_unstable_orbit():
     assert all(one.orbit is None or one.orbit.stable for one in found)
 
 
+def test_an_orbit_within_a_contact_where_the_period_begins_is_one_attractor():
+    """Its state there does not tell the entry rate that the law has latched: one of period 2 was counted as two."""
+    bar = fb.Section.rectangle(2.0e11, 7800.0, width=0.02, height=0.003)
+    scene = fb.Scene(fb.Beam(0.25, bar), [fb.Clamped(0.0)], [fb.LumpedMass(0.25, mass=0.05)],
+                     stops=[fb.Stop(0.25, Hysteretic(4.6e6, 0.2), 1e-5)], damping=fb.ModalDamping(0.015),
+                     base=fb.Harmonic(1e-3, 580.0, 0.3))  # fmt: skip
+    (found,) = scene.reduce(2).attractors(starts=8, longest=4)
+    assert (found.period, found.impacts, found.count) == (2, 1, 8)
+
+
 def test_bad_numbers_of_a_search_for_attractors_are_refused(model):
     """With longest=0 all motion was "not periodic"; 3.0 starts failed inside."""
     for name in ("longest", "starts"):

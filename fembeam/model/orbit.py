@@ -384,10 +384,11 @@ def _same(a: Orbit | None, b: Orbit | None, T: float) -> bool:
 
 
 def _passes(orbit: Orbit, x: Vector, T: float, within: float) -> bool:
-    """Whether an orbit passes near a state at the beginning of a load's period, of the state's size."""
-    y, n2 = orbits.at_zero(orbit.found), len(orbit.state)
-    for _ in range(orbit.period):
-        if np.linalg.norm(x[:n2] - y[:n2]) <= within * np.linalg.norm(x[:n2]):
-            return True
-        y = orbits.state_after(orbit.model.system, y, T, orbit.found.method)
-    return False
+    """Whether an orbit passes near a state at the beginning of a load's period, of the state's size.
+
+    All from its phase: a state within a contact does not tell the entry rate that some laws latch.
+    """
+    found, size = orbit.found, within * np.linalg.norm(x[: len(orbit.state)])
+    times = np.arange(1, orbit.period + 1) * T - found.phase
+    states = orbits.states_at(found, np.where(times > 0.0, times, times + found.period).tolist())
+    return any(np.linalg.norm((x - y)[: len(orbit.state)]) <= size for y in states)
