@@ -125,7 +125,10 @@ def _latch_there(run, side, s, j, delta, rate, slope, margin):
 
 @merged
 def _explicit(run, s, j, delta, rate, slope, maps, out):
-    """Changes of the margin and of the latched numbers per unit of a parameter of the laws, which latch them, too."""
+    """Changes of the margin and of the latched numbers per unit of a parameter of the laws, which latch them, too.
+
+    What nearby laws latch is left in ``run.ahead`` and ``run.behind``, for the caller to put back.
+    """
     problem, ahead, behind, width = run.problem, run.ahead, run.behind, 2.0 * run.variation.law_step
     margin = _margin(run, problem, s, j, delta, rate, problem.parameters[s])
     change = _margin(run, ahead, s, j, delta, rate, ahead.parameters[s])

@@ -259,16 +259,19 @@ def largest(values: Array, ends: tuple[bool, bool]) -> tuple[int, float, float]:
         top = _top(whole, x)
         beyond = int(top > 1.0) - int(top < -1.0)
         if not beyond:
-            outer = panel == 0 and not ends[0], panel == len(values) - 1 and not ends[1]
-            at_end = max(
-                (float(whole(side)) for side, one in zip((-1.0, 1.0), outer, strict=True) if one), default=-np.inf
-            )
-            value = float(whole(top))
-            return panel, 0.5 * (top + 1.0), value if value - at_end > _AS_LARGE * abs(value) else -np.inf
+            left_out = panel == 0 and not ends[0], panel == len(values) - 1 and not ends[1]
+            return panel, 0.5 * (top + 1.0), _above_ends(whole, top, left_out)
         if not 0 <= panel + beyond < len(values):
             return panel, 0.5 * (beyond + 1.0), float(whole(beyond)) if ends[beyond > 0] else -np.inf
         panel, x = panel + beyond, -float(beyond)
     return panel, 0.5 * (x + 1.0), float(Legendre(coefficients(values[panel]))(x))  # a kink between two panels
+
+
+def _above_ends(whole: Legendre, top: float, left_out: tuple[bool, bool]) -> float:
+    """Value of a polynomial at its top; -inf if that is, but for rounding, the value at an end that is left out."""
+    value = float(whole(top))
+    ends = [float(whole(side)) for side, one in zip((-1.0, 1.0), left_out, strict=True) if one]
+    return value if value - max(ends, default=-np.inf) > _AS_LARGE * abs(value) else -np.inf
 
 
 def _top(whole: Legendre, x: float) -> float:
