@@ -48,8 +48,8 @@ _LOCK = threading.Lock()
 def part(place: int, result: Any, *plain: Any) -> Callable[[Any], Any]:
     """Decorator of the function called at ``problem.parts[place]``.
 
-    Its first argument is the problem, others that are packed come next, then those of the types ``plain``. With a
-    problem that is not packed, as stepping methods have it, the function is called as one of `inner`.
+    Its first argument is the problem, or the named tuple ``run`` that begins with it, then come those of the types
+    ``plain``. With a problem that is not packed, as stepping methods have it, the function is called as one of `inner`.
     """
 
     def declared(function: Any) -> Any:
@@ -65,9 +65,9 @@ def addresses_of(problem: type) -> Any:
         return _ADDRESSES.setdefault(problem, np.zeros(PLACES, dtype=np.int64))
 
 
-def load(kinds: Mapping[str, types.NamedTuple], places: Iterable[int]) -> None:
-    """Compile parts, or load their machine code; ``kinds`` are the types of packed arguments by their names."""
-    problem = kinds["problem"].instance_class
+def load(kinds: Mapping[str, types.Type], places: Iterable[int]) -> None:
+    """Compile parts, or load their machine code; ``kinds`` are the types of the first argument by its name."""
+    problem = kinds["problem"].kind.instance_class
     addresses = addresses_of(problem)
     for place in places:
         if not addresses[place]:
@@ -77,33 +77,34 @@ def load(kinds: Mapping[str, types.NamedTuple], places: Iterable[int]) -> None:
                 addresses[place] = _LOADED[problem, place].address
 
 
-def _compiled(kinds: Mapping[str, types.NamedTuple], function: Any, result: Any, plain: tuple[Any, ...]) -> Any:
+def _compiled(kinds: Mapping[str, types.Type], function: Any, result: Any, plain: tuple[Any, ...]) -> Any:
     """The C function of a part."""
-    names = function.__code__.co_varnames[: function.__code__.co_argcount - len(plain)]
-    return c_function(result(*(PackedType(kinds[name]) for name in names), *plain))(function)
+    return c_function(result(kinds[function.__code__.co_varnames[0]], *plain))(function)
 
 
 def _call_at(place: int, result: Any, plain: tuple[Any, ...], unpacked: Any) -> Any:
     """An intrinsic that calls a part with its arguments."""
 
     @intrinsic
-    def call(typingctx, problem, *others):
+    def call(typingctx, first, *others):
+        problem = first.types[0] if isinstance(first, types.NamedTuple) else first
         if not isinstance(problem, PackedType):
-            return _call_inner(typingctx, unpacked, problem, others)
-        rest = types.Tuple((*others[: len(others) - len(plain)], *plain))
+            return _call_inner(typingctx, unpacked, first, others)
+        rest = types.Tuple(plain)
 
         def codegen(context, builder, signature, arguments):
             find = context.get_getattr(problem, "parts")
-            addresses = find(context, builder, problem, arguments[0], "parts")
+            value = arguments[0] if first is problem else builder.extract_value(arguments[0], 0)
+            addresses = find(context, builder, problem, value, "parts")
             kind = types.Array(types.int64, 1, "C")
             data = context.make_array(kind)(context, builder, addresses).data
             address = builder.load(builder.gep(data, [ir.IntType(64)(place)]))
-            expected = [context.get_value_type(kind) for kind in (problem, *rest)]
+            expected = [context.get_value_type(kind) for kind in (first, *plain)]
             function = ir.FunctionType(context.get_value_type(result), expected).as_pointer()
-            values = [builder.extract_value(arguments[1], i) for i in range(len(rest))]
+            values = [builder.extract_value(arguments[1], i) for i in range(len(plain))]
             return builder.call(builder.inttoptr(address, function), [arguments[0], *values])
 
-        return result(problem, rest), codegen
+        return result(first, rest), codegen
 
     return call
 

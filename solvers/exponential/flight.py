@@ -93,11 +93,12 @@ def join(problem, parts, x):
 
 
 @inlined
-def cross_cell(problem, tables, x, cell, result):
+def cross_cell(run, x, cell, result):
     """Write into ``result`` p and v of the blocks one whole cell of the sampled signals after x, eight blocks at once.
 
     The response to the signals is summed first, since it does not depend on the cell before.
     """
+    problem, tables = run.problem, run.tables
     width = x.shape[1]
     for i in range(0, width, WIDTH):
         place, rate = splat8(0.0), splat8(0.0)
@@ -141,11 +142,12 @@ def taylor_step(terms, x, span, size, weights, sums):
 
 
 @inner
-def fly_series(problem, tables, x, t, span, signal_terms, terms):
+def fly_series(run, x, t, span, signal_terms, terms):
     """Move p and v of the blocks by ``span`` <= SERIES_REACH/|λ|max within a cell, by a Taylor series of 14 terms.
 
     The derivatives of p, then v, are left in the rows of ``terms``.
     """
+    problem, tables = run.problem, run.tables
     width = x.shape[1]
     derive_signals(problem, t, signal_terms)
     for i in range(0, width, WIDTH):
@@ -171,12 +173,12 @@ def fly_series(problem, tables, x, t, span, signal_terms, terms):
 
 
 @inner
-def fly_tabulated(problem, tables, level, x, signal_terms):
+def fly_tabulated(run, level, x, signal_terms):
     """A tabulated step of the blocks' p and v under signals with given derivatives at its start."""
-    propagate_split(tables, level, x)
+    propagate_split(run.tables, level, x)
     width = 2 * x.shape[1]
-    for j in range(problem.table_dt.size):
-        rows = tables.signal[level, problem.table_load[j]]
+    for j in range(run.problem.table_dt.size):
+        rows = run.tables.signal[level, run.problem.table_load[j]]
         for i in range(0, width, WIDTH):
             total = load8(x, i)
             for order in range(6):
@@ -204,14 +206,14 @@ def safe_time(g, v, bound):
 
 
 @inlined
-def motion_of_row(problem, tables, row, x):
+def motion_of_row(run, row, x):
     """Displacement less gap, and rate, of a row from the blocks' p and v."""
-    rows, delta, rate = tables.stop_rows[row], splat8(0.0), splat8(0.0)
+    rows, delta, rate = run.tables.stop_rows[row], splat8(0.0), splat8(0.0)
     for i in range(0, x.shape[1], WIDTH):
         p, v = load8(x[0], i), load8(x[1], i)
         delta += load8(rows[0], i) * p + load8(rows[1], i) * v
         rate += load8(rows[2], i) * p + load8(rows[3], i) * v
-    return sum8(delta) - problem.gap[row], sum8(rate)
+    return sum8(delta) - run.problem.gap[row], sum8(rate)
 
 
 @inlined

@@ -84,6 +84,7 @@ from solvers.exponential.circles.friction_derivative import (
 from solvers.exponential.contact.crossings import side_at
 from solvers.exponential.contact.landing_step import landing_step, start_landing
 from solvers.exponential.contact.node_response import LANDED, START
+from solvers.exponential.energy.flight_tables import ENERGY_TABLES
 from solvers.exponential.linearised_border import pass_border
 from solvers.exponential.linearised_step import (
     DERIVATIVES,
@@ -93,7 +94,7 @@ from solvers.exponential.linearised_step import (
     change_by_latched,
     linearise_step,
 )
-from solvers.exponential.preparation import SCRATCH, TABLES
+from solvers.exponential.preparation import SCRATCH, TABLES, Run
 from solvers.exponential.responses import propagate
 from solvers.exponential.tables import FORCE
 from solvers.problem.friction import CODE, FREE, SLIDES
@@ -103,6 +104,7 @@ _OFF = 1e-10  # relative distance from a knot at which a law is evaluated on one
 
 _problem, _planar_problem = unpacker(PROBLEM), unpacker(PLANAR_PROBLEM)
 _tables, _state, _scratch = unpacker(TABLES), unpacker(STATE), unpacker(SCRATCH)
+_energy_tables = unpacker(ENERGY_TABLES)
 _derivatives, _variation = unpacker(DERIVATIVES), unpacker(VARIATION)
 
 
@@ -200,10 +202,10 @@ def _update_sides(run, x):
     Where a landing begins or ends the force may be zero, or rounding; so the force of larger size is kept. Returns
     whether the side of a law has changed by this.
     """
-    problem, tables, past, scratch, changed = run.problem, run.tables, run.past, run.scratch, False
-    for s in range(problem.law.size):
-        if past.segment[s] > 0 and tables.bend[s] == FORCE:
-            force, before = side_at(problem, tables, past, s, x, scratch.trial), scratch.before_cut[s]
+    past, scratch, changed = run.past, run.scratch, False
+    for s in range(run.problem.law.size):
+        if past.segment[s] > 0 and run.tables.bend[s] == FORCE:
+            force, before = side_at(run.here, s, x, scratch.trial), scratch.before_cut[s]
             if abs(force) > abs(before):
                 changed |= (force > 0.0) != (before > 0.0)
                 scratch.before_cut[s] = force
@@ -283,18 +285,15 @@ def _stage_rates(run, w, factor, out):
 @merged
 def _land(run, row):
     """Move all columns over a landing: the variational equation on the stages of its Runge–Kutta step."""
-    problem, tables, past, scratch, derivatives = run.problem, run.tables, run.past, run.scratch, run.derivatives
+    problem, past, scratch, derivatives = run.problem, run.past, run.scratch, run.derivatives
     variable, stop, size = int(row[FIRST]), int(row[SECOND]), 2 * problem.k.size
     w, width, span = scratch.stages[START], past.x.size, row[SPAN]
-    start_landing(problem, tables, past, scratch, stop, variable)
+    start_landing(run.here, stop, variable)
     for s in range(problem.law.size):
         scratch.before_cut[s] = 0.0
     _update_sides(run, past.x)
     while True:
-        landing_step(
-            *(problem, tables, False, np.int64(STAGES), variable, stop, span, w, past.segment, past.entry_rate),
-            *(scratch.before_cut, scratch.stages),
-        )
+        landing_step(run.here, False, np.int64(STAGES), variable, stop, span, w, scratch.before_cut, scratch.stages)
         if not _update_sides(run, scratch.stages[LANDED]):
             break
     trial = scratch.stages[STAGES + 1]
@@ -341,11 +340,11 @@ def _follow(run, state, modes, begins):
 @merged
 def _linearise(problem, ahead, behind, addresses, modes, begins):
     """Move the derivatives with the problem, and those whose laws have the value of the parameter ahead and behind."""
-    _, _, _, tables_at, state_at, scratch_at, past_at, derivatives_at, variation_at = addresses
-    run = Linearised(
-        *(problem, ahead, behind, _tables(tables_at), _state(past_at)),
-        *(_scratch(scratch_at), _derivatives(derivatives_at), _variation(variation_at)),
-    )
+    _, _, _, tables_at, energy_at, state_at, scratch_at, past_at, derivatives_at, variation_at = addresses
+    tables, past, scratch = _tables(tables_at), _state(past_at), _scratch(scratch_at)
+    here = Run(problem, tables, _energy_tables(energy_at), past, scratch)
+    known = _derivatives(derivatives_at), _variation(variation_at)
+    run = Linearised(here, problem, ahead, behind, tables, past, scratch, *known)
     _follow(run, _state(state_at), modes, begins)
 
 
@@ -365,9 +364,10 @@ def _linearise_plane(addresses, modes, begins):
 def linearise_of(planar: bool) -> Any:
     """Compiled for a type of problem: it moves derivatives along the event record of a run, and empties the record.
 
-    Its arguments: addresses, those of the fields of `Linearised`, the state of the run behind its tables; blocks from
-    ``modes`` on are tones; whether the run begins. The derivatives end at the time that the run has reached.
+    Its arguments: addresses, those of the three problems, of the other fields of a `Run` and then of the state reached,
+    of derivatives and variation; blocks from ``modes`` on are tones; whether the run begins. The derivatives
+    end at the time that the run has reached.
     """
-    return entry(types.void(types.UniTuple(types.int64, 9), types.int64, types.boolean))(
+    return entry(types.void(types.UniTuple(types.int64, 10), types.int64, types.boolean))(
         _linearise_plane if planar else _linearise_line
     )

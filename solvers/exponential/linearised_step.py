@@ -72,6 +72,7 @@ DERIVATIVES, VARIATION = packed_type(Derivatives), packed_type(Variation)
 class Linearised(NamedTuple):
     """All that the functions of this derivative share, packed; called ``run`` there."""
 
+    here: Any  # the `Run` at the time the derivatives have reached; its fields are here, too
     problem: Any
     ahead: Any  # the problem whose laws have the value of the parameter ahead
     behind: Any
@@ -110,7 +111,7 @@ def _by_parameter(run, s):
         out[i] = 0.0
     if run.variation.law_step == 0.0:
         return
-    motion = motion_of(run.ahead, scratch, s)
+    motion = motion_of(run.here, s)
     copy(motion[0], scratch.clipped, S)
     contact_forces(run.ahead, s, scratch.clipped, motion[1], entry_rate, out)
     contact_forces(run.behind, s, scratch.clipped, motion[1], entry_rate, scratch.trial)
@@ -134,7 +135,7 @@ def _signal_slopes(run, node_set, level, t):
         for i in range(S):
             response[0, i], response[1, i] = 0.0, 0.0
         for load in problem.table_load:
-            matrix = pair_response(problem, tables, scratch, node_set, level, r, rows + load)
+            matrix = pair_response(run.here, node_set, level, r, rows + load)
             combine(matrix, derivatives.signal[load], S, response, response)
 
 
@@ -166,13 +167,13 @@ def _solve(run, node_set, level, column, shift):
     problem, tables, past, scratch, derivatives = run.problem, run.tables, run.past, run.scratch, run.derivatives
     place, size, rows, through = 0, 2 * problem.k.size, problem.gap.size, uses_blocks(tables)
     if through:
-        free_block_motion(problem, tables, scratch, node_set, level, derivatives.y[column])
+        free_block_motion(run.here, node_set, level, derivatives.y[column])
     for r in range(rows):
         s, motion = problem.element[r], scratch.motion[r]
         if past.segment[s] == 0:
             continue
         if through:
-            motion_at_nodes(problem, scratch, r, 0.0, motion)
+            motion_at_nodes(run.here, r, 0.0, motion)
         else:
             combine(tables.free[tables.kind[node_set], level, r], derivatives.y[column], size, None, motion)
         if rubs(problem, s):
@@ -202,16 +203,16 @@ def _move_column(run, node_set, level, y, part):
     if part < np.inf:
         for u in range(scratch.force.shape[0]):
             copy(derivatives.force[u], scratch.force[u], S)
-        state_within(problem, tables, past, scratch, node_set, tables.contact_step[level], 0.0, part, y, False, False)
+        state_within(run.here, node_set, tables.contact_step[level], 0.0, part, y, False, False)
         return
     propagate_blocks(problem, tables.contact_propagator[level, 0], tables.contact_propagator[level, 1], y)
     if uses_blocks(tables):
-        add_end_response(problem, tables, past, scratch, derivatives.force, node_set, level, y)
+        add_end_response(run.here, derivatives.force, node_set, level, y)
     for u in range(0 if uses_blocks(tables) else scratch.force.shape[0]):
         if u < problem.gap.size and not acts(problem, past, u):
             continue
         for j in range(S):
-            row = tables.end_response[weighting_of(problem, tables, node_set, u), level, u, j]
+            row = tables.end_response[weighting_of(run.here, node_set, u), level, u, j]
             for e in range(2 * problem.k.size):
                 y[e] += row[e] * derivatives.force[u, j]
 
@@ -222,24 +223,24 @@ def linearise_step(run, row, modes):
     problem, tables, past, scratch, derivatives = run.problem, run.tables, run.past, run.scratch, run.derivatives
     node_set, level, t = int(row[FIRST]), int(row[SECOND]), row[BEGAN]
     size = 2 * problem.k.size
-    free_response(problem, tables, past, scratch, node_set, level)
+    free_response(run.here, node_set, level)
     forces = row[HEAD + past.x.size :]
     for r in range(problem.gap.size):
         copy(forces[r * S : (r + 1) * S], scratch.force[r], S)
     for r in range(problem.gap.size):
         if acts(problem, past, r):
-            respond(problem, tables, past, scratch, node_set, level, r)
+            respond(run.here, node_set, level, r)
     for s in range(problem.law.size):
         if past.segment[s] > 0:
             if rubs(problem, s):
                 rubbing_by_parameter(run, s)
                 continue
             if is_circle(problem, s):
-                radial_forces(problem, tables, past, scratch, s)
-            motion = motion_of(problem, scratch, s)
+                radial_forces(run.here, s)
+            motion = motion_of(run.here, s)
             _by_parameter(run, s)
             by_latched(run, s, S, motion[0], motion[1])
-    factorise(scratch.jacobian, scratch.pivots, linearise(problem, tables, past, scratch, node_set, level))
+    factorise(scratch.jacobian, scratch.pivots, linearise(run.here, node_set, level))
     moving = tables.time_exponent[node_set] > 1.0
     part = row[SPAN] if row[KIND] == PART else np.inf
     if moving:
@@ -247,11 +248,9 @@ def linearise_step(run, row, modes):
         end = scratch.x_new
         if part < np.inf:
             copy(past.x, end, past.x.size)
-            state_within(
-                problem, tables, past, scratch, node_set, tables.contact_step[level], 0.0, part, end, False, False
-            )
+            state_within(run.here, node_set, tables.contact_step[level], 0.0, part, end, False, False)
         else:
-            end_state(problem, tables, past, scratch, node_set, level)
+            end_state(run.here, node_set, level)
         rhs(problem, row[ENDED], end, past.segment, past.entry_rate, derivatives.rate[1], derivatives.batch)
         _signal_slopes(run, node_set, level, t)
     for c in range(derivatives.y.shape[0]):

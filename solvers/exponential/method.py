@@ -58,7 +58,7 @@ from solvers.exponential.contact.step import advance_contact
 from solvers.exponential.energy.check import FIRST, has_gained, note_energy, own_energy
 from solvers.exponential.energy.flight_balance import account_state, start_account
 from solvers.exponential.energy.flight_tables import ENERGY_TABLES, NO_ENERGY_TABLES
-from solvers.exponential.preparation import SCRATCH, TABLES, Prepared, prepare_run, shorten
+from solvers.exponential.preparation import SCRATCH, TABLES, Prepared, Run, prepare_run, shorten
 from solvers.exponential.safe_steps import fly
 from solvers.problem import Array, Forcing, Status, System
 from solvers.problem.matrices import number
@@ -73,18 +73,19 @@ def _advance(problem, tables_at, state_at, scratch_at, energy_at, budget):
     """Advance the state to the end of the run or for about ``budget`` steps; returns a status code."""
     tables, state, scratch = _tables(tables_at), _state(state_at), _scratch(scratch_at)
     energy_tables, control = _energy_tables(energy_at), scratch.control
+    run = Run(problem, tables, energy_tables, state, scratch)
     if not control[BEGUN]:
         control[BEGUN], control[BALANCED] = 1, 1 if energy_tables.active > 0.0 else 0
-        scratch.energy[FIRST] = own_energy(problem, tables, state.x)
-        note_signals(problem, tables, scratch)
+        scratch.energy[FIRST] = own_energy(run, state.x)
+        note_signals(run)
         begin_contacts(problem, state)
         log_begin(problem, state)
         if in_contact(state):
-            begin_steps(problem, tables, state, scratch, latest_entered(state))
+            begin_steps(run, latest_entered(state))
     begun, rows = state.count[STEPS] + state.count[REJECTED], most_rows(problem)
     while state.count[STEPS] + state.count[REJECTED] - begun < budget:
         if state.now[T] >= state.now[T_END]:
-            note_energy(problem, tables, state, scratch)
+            note_energy(run)
             return DONE
         if state.count[LOGGED] + rows > state.log.shape[0]:
             return LOG_FULL
@@ -95,21 +96,21 @@ def _advance(problem, tables_at, state_at, scratch_at, energy_at, budget):
         between = in_contact(state) and not control[NEW]  # within a contact borders are reached by landings only
         if not between and switch_on_surface(problem, state, True):
             if in_contact(state):
-                begin_steps(problem, tables, state, scratch, latest_entered(state))
+                begin_steps(run, latest_entered(state))
             continue
         if in_contact(state):
-            code = advance_contact(problem, tables, energy_tables, state, scratch)
+            code = advance_contact(run)
             if code != RUNNING:
                 return code
             continue
         if energy_tables.active > 0.0:
-            start_account(problem, state, scratch)
-        stop = fly(problem, tables, energy_tables, state, scratch, budget)
+            start_account(run)
+        stop = fly(run, budget)
         if energy_tables.active > 0.0:
-            account_state(problem, tables, energy_tables, state, scratch)
+            account_state(run)
         if stop >= 0:
             switch(problem, state, stop, np.int64(1))  # a literal would be compiled for itself
-            begin_steps(problem, tables, state, scratch, stop)
+            begin_steps(run, stop)
     return RUNNING
 
 

@@ -11,7 +11,7 @@ from numba import types
 
 from solvers.compiled.fields import packed_type, shapes_of
 from solvers.compiled.kernels import Problem, type_of
-from solvers.compiled.packed import Layout, Packed, PackedTemplate, aligned
+from solvers.compiled.packed import Layout, Packed, PackedTemplate, PackedType, aligned
 from solvers.compiled.parts import BORDERS, CIRCLES, ENERGY, EVERY_RUN, FRICTION, KINKS, MANY_STOPS, TWO_STOPS, load
 from solvers.compiled.state import (
     NO_ROWS,
@@ -40,7 +40,7 @@ from solvers.problem.run_arguments import output_arrays
 
 TABLES, SCRATCH = packed_type(Tables), packed_type(Scratch)
 _KNOWN = "energy", "accuracy"  # arrays of the scratch that Python reads or writes
-_KINDS = {"tables": TABLES, "state": STATE, "scratch": SCRATCH, "energy_tables": ENERGY_TABLES}
+_SHARED = TABLES, ENERGY_TABLES, STATE, SCRATCH
 
 
 _MOST_KEPT = 1 << 26  # bytes of tables of the energy balance
@@ -48,9 +48,20 @@ _MOST_SHORTENED = 2  # times that contact steps are shortened: to 1e-10 of the u
 _ROUNDING_OF_TIME = 1e-16  # of the duration: shorter steps are none
 
 
+class Run(NamedTuple):
+    """All that the compiled functions of a run share, packed; called ``run`` there."""
+
+    problem: Any  # `Problem` or `PlanarProblem`: blocks, rows and laws
+    tables: Any  # `Tables`: responses of the blocks for the lengths of the steps
+    energy_tables: Any  # `EnergyTables`: those of the balance, `NO_ENERGY_TABLES` where none is kept
+    state: Any  # `State`: what the run has reached, and its outputs
+    scratch: Any  # `Scratch`: what one step leaves to the next, and working arrays
+
+
 def load_parts(problem: types.NamedTuple, places: Iterable[int]) -> None:
     """Compile functions that are called at their addresses, or load their machine code; see `compiled.parts`."""
-    load({"problem": problem, **_KINDS}, places)
+    packed = [PackedType(kind) for kind in (problem, *_SHARED)]
+    load({"problem": packed[0], "run": types.NamedTuple(packed, Run)}, places)
 
 
 class Workspace:

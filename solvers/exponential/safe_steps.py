@@ -72,8 +72,9 @@ def _bound_signals(problem, cell, count, bounds):
 
 
 @inlined
-def _acceleration_bound(problem, tables, r, norms, signal_bounds, horizon):
+def _acceleration_bound(run, r, norms, signal_bounds, horizon):
     """B: bound of |δ̈| of row r over the time ``horizon``, signals included."""
+    problem, tables = run.problem, run.tables
     n = problem.k.size
     total = dot(tables.acceleration_weight[r], norms, n)
     for j in range(problem.table_dt.size):
@@ -84,51 +85,55 @@ def _acceleration_bound(problem, tables, r, norms, signal_bounds, horizon):
 
 
 @inlined
-def _target(tables, state, first):
+def _target(run, first):
     """Time at which a step must end: the end, or an output time too late to be evaluated from the step's start."""
+    state = run.state
     t_end, second = state.now[T_END], state.due[min(state.count[SAMPLED] + 1, state.out.shape[0])]
-    if tables.fastest * (first - state.now[T]) > SERIES_REACH:
+    if run.tables.fastest * (first - state.now[T]) > SERIES_REACH:
         return min(first, t_end)
-    return t_end if tables.fastest * (second - first) <= SERIES_REACH else min(second, t_end)
+    return t_end if run.tables.fastest * (second - first) <= SERIES_REACH else min(second, t_end)
 
 
 @inner
-def _sample(problem, tables, energy_tables, state, scratch, t):
+def _sample(run, t):
     """Write the outputs due within the step that began at t; ``split_state[2]``, the motion then, moves along.
 
     With sampled signals the energy balance of the state is that at t, and is integrated along; otherwise
     `account_output` computes it.
     """
-    size, with_energy, before = 2 * problem.k.size, energy_tables.active > 0.0, state.x
+    problem, state = run.problem, run.state
+    size, with_energy, before = 2 * problem.k.size, run.energy_tables.active > 0.0, state.x
     accounted = with_energy and problem.table_dt.size > 0
     while state.due[state.count[SAMPLED]] < state.now[T]:
         wanted, row = state.due[state.count[SAMPLED]], state.out[state.count[SAMPLED]]
         copy(before[size:], row[size:], state.x.size - size)
-        fly_within(problem, tables, scratch, 2, t, wanted - t, accounted, energy_tables, row)
-        join(problem, scratch.split_state[2], row)
+        fly_within(run, 2, t, wanted - t, accounted, row)
+        join(problem, run.scratch.split_state[2], row)
         if accounted:
             before = row
         elif with_energy:
-            account_output(problem, tables, energy_tables, state, scratch, wanted, row)
+            account_output(run, wanted, row)
         state.count[SAMPLED], t = state.count[SAMPLED] + 1, wanted
 
 
 @merged
-def _sample_here(problem, tables, energy_tables, state, scratch):
+def _sample_here(run):
     """Write the output that is due in the present state."""
+    state = run.state
     row = state.out[state.count[SAMPLED]]
     copy(state.x, row, state.x.size)
-    if energy_tables.active > 0.0:
-        account_output(problem, tables, energy_tables, state, scratch, state.now[T], row)
+    if run.energy_tables.active > 0.0:
+        account_output(run, state.now[T], row)
     state.count[SAMPLED] += 1
 
 
 @inner
-def _fly_unsampled(problem, tables, state, scratch, longest, budget):
+def _fly_unsampled(run, longest, budget):
     """Tabulated steps without signals or output, until a stop is near, ``longest`` has passed or the budget is spent.
 
     Returns the number of steps, and the safe time left.
     """
+    problem, tables, state, scratch = run.problem, run.tables, run.state, run.scratch
     x, flown, rounding, count = scratch.split_state[0], 0.0, 0.0, 0
     split(problem, state.x, x)
     while True:
@@ -137,10 +142,10 @@ def _fly_unsampled(problem, tables, state, scratch, longest, budget):
             scratch.per_row[r] = weighted_norms(tables.acceleration_weight[r], tables, x)
         for s in range(problem.law.size):
             if is_circle(problem, s):
-                span = min(span, span_of_circle(problem, tables, scratch, s, x))
+                span = min(span, span_of_circle(run, s, x))
                 continue
             row = row_of(problem, s)
-            delta, rate = motion_of_row(problem, tables, row, x)
+            delta, rate = motion_of_row(run, row, x)
             span = min(span, safe_time(-delta, -rate, scratch.per_row[row]))
         if span < tables.flight_step[tables.flight_step.size - 1] or count >= budget:
             break
@@ -156,8 +161,9 @@ def _fly_unsampled(problem, tables, state, scratch, longest, budget):
 
 
 @inlined
-def _bound_cells(problem, tables, scratch, x, cell, count):
+def _bound_cells(run, x, cell, count):
     """Bound the interpolation errors e of all rows for the next ``count`` cells; returns whether a stop may be near."""
+    problem, tables, scratch = run.problem, run.tables, run.scratch
     _bound_signals(problem, cell, count, scratch.signal_bounds)
     for r in range(problem.gap.size):
         error = weighted_norms(tables.cell_error[r], tables, x)
@@ -165,25 +171,27 @@ def _bound_cells(problem, tables, scratch, x, cell, count):
             by_signal = tables.cell_error_signal[r, problem.table_load[j]]
             error += scratch.signal_bounds[j] * (by_signal[0] + count * by_signal[1])
         scratch.per_row[r] = error
-    return _is_any_near(problem, tables, scratch, x)
+    return _is_any_near(run, x)
 
 
 @inlined
-def _is_any_near(problem, tables, scratch, x):
+def _is_any_near(run, x):
     """Whether any stop may be reached within a cell that ends in x, by its error e; also if the state is not finite."""
+    problem = run.problem
     near = False
     for s in range(problem.law.size):
         row = row_of(problem, s)
         if is_circle(problem, s):
-            near |= circle_is_near(problem, tables, scratch, s, x)
+            near |= circle_is_near(run, s, x)
         else:
-            near |= not motion_of_row(problem, tables, row, x)[0] + scratch.per_row[row] < 0.0
+            near |= not motion_of_row(run, row, x)[0] + run.scratch.per_row[row] < 0.0
     return near
 
 
 @merged
-def _cross_cells(problem, tables, energy_tables, state, scratch, most):
+def _cross_cells(run, most):
     """Cross whole cells while no stop is near; returns how many, ``most`` at most."""
+    problem, energy_tables, state, scratch = run.problem, run.energy_tables, run.state, run.scratch
     h, x, current, now, with_energy = problem.table_dt[0], scratch.split_state, 0, state.now, energy_tables.active > 0.0
     begin, offset = cell_of(problem, now[T])
     end = min(int(now[T_END] / h), begin + most, problem.table_start[1] - problem.table_start[0] - 1)
@@ -191,23 +199,23 @@ def _cross_cells(problem, tables, energy_tables, state, scratch, most):
     if abs(offset) < 1e-7 * h:
         split(problem, state.x, x[0])
         if with_energy:
-            account_state(problem, tables, energy_tables, state, scratch)
+            account_state(run)
         while cell < end:
             if cell == bounded:
                 bounded = min(cell + _GROUP, end)
-                if _bound_cells(problem, tables, scratch, x[current], cell, bounded - cell):
+                if _bound_cells(run, x[current], cell, bounded - cell):
                     break
-            cross_cell(problem, tables, x[current], cell, x[1 - current])
-            if _is_any_near(problem, tables, scratch, x[1 - current]):
+            cross_cell(run, x[current], cell, x[1 - current])
+            if _is_any_near(run, x[1 - current]):
                 break
             cell += 1
             if state.due[state.count[SAMPLED]] < cell * h:
                 now[T] = min(cell * h, now[T_END])
                 copy_split(x[current], x[2])
-                _sample(problem, tables, energy_tables, state, scratch, (cell - 1) * h)
+                _sample(run, (cell - 1) * h)
             if with_energy:
-                whole, begin_of_cell = tables.flight_step.size, (cell - 1) * h
-                exchanged = account_step(problem, tables, energy_tables, scratch, whole, begin_of_cell, current)
+                whole, begin_of_cell = run.tables.flight_step.size, (cell - 1) * h
+                exchanged = account_step(run, whole, begin_of_cell, current)
                 add_to_balance(problem, state.x, exchanged)
             current = 1 - current
         if cell > begin:
@@ -215,23 +223,24 @@ def _cross_cells(problem, tables, energy_tables, state, scratch, most):
             now[T] = min(cell * h, now[T_END])
             state.count[STEPS] += cell - begin
             if with_energy:
-                start_account(problem, state, scratch)
+                start_account(run)
     return cell - begin
 
 
 @inlined
-def _safe_span(problem, tables, state, scratch, span, horizon, renew_bounds):
+def _safe_span(run, span, horizon, renew_bounds):
     """``span``, or the shorter time within which no stop can be reached.
 
     ``renew_bounds`` of |δ̈| for the ``horizon`` first.
     """
+    problem, state, scratch = run.problem, run.state, run.scratch
     if renew_bounds:
         energy_norms(problem, state.x, scratch.norms)
         for r in range(problem.gap.size):
-            scratch.per_row[r] = _acceleration_bound(problem, tables, r, scratch.norms, scratch.signal_bounds, horizon)
+            scratch.per_row[r] = _acceleration_bound(run, r, scratch.norms, scratch.signal_bounds, horizon)
     for s in range(problem.law.size):
         if is_circle(problem, s):
-            span = min(span, span_of_circle_at(problem, state, scratch, s))
+            span = min(span, span_of_circle_at(run, s))
             continue
         g, v = -indentation(problem, s, state.x), -indentation_rate(problem, s, state.x)
         span = min(span, safe_time(g, v, scratch.per_row[row_of(problem, s)]))
@@ -249,11 +258,12 @@ def _place_in_cell(problem, t):
 
 
 @merged
-def _fly_step(problem, tables, state, scratch, span, target, place):
+def _fly_step(run, span, target, place):
     """Move by up to ``span``: Taylor step with a search for roots, whole cell, or table. (time, stop or -1).
 
     ``place`` is the `_place_in_cell` of the start.
     """
+    problem, tables, state, scratch = run.problem, run.tables, run.state, run.scratch
     size, now, stop, x = 2 * problem.k.size, state.now, -1, scratch.split_state
     sampled, (cell, offset, rest) = problem.table_dt.size > 0, place
     dt_cell = problem.table_dt[0] if sampled else np.inf
@@ -269,12 +279,12 @@ def _fly_step(problem, tables, state, scratch, span, target, place):
     elif span == rest and abs(offset) < 1e-7 * dt_cell:
         h = rest
         split(problem, state.x, x[0])
-        cross_cell(problem, tables, x[0], cell, x[1])
+        cross_cell(run, x[0], cell, x[1])
         join(problem, x[1], state.x)
     elif sampled and tables.fastest * span <= SERIES_REACH:
         h = span
         split(problem, state.x, x[0])
-        fly_series(problem, tables, x[0], now[T], h, scratch.signal_terms, scratch.terms)
+        fly_series(run, x[0], now[T], h, scratch.signal_terms, scratch.terms)
         join(problem, x[0], state.x)
     else:
         level = level_within(tables, span)
@@ -282,7 +292,7 @@ def _fly_step(problem, tables, state, scratch, span, target, place):
         if sampled:
             split(problem, state.x, x[0])
             derive_signals(problem, now[T], scratch.signal_terms)
-            fly_tabulated(problem, tables, level, x[0], scratch.signal_terms)
+            fly_tabulated(run, level, x[0], scratch.signal_terms)
             join(problem, x[0], state.x)
         else:
             propagate_blocks(problem, tables.flight_propagator[level, 0], tables.flight_propagator[level, 1], state.x)
@@ -290,46 +300,47 @@ def _fly_step(problem, tables, state, scratch, span, target, place):
 
 
 @merged
-def fly(problem, tables, energy_tables, state, scratch, budget):
+def fly(run, budget):
     """Fly until a stop is reached (returns its index), to the end (-1), or until the budget is spent (-2)."""
+    problem, state = run.problem, run.state
     now, due = state.now, state.due
-    sampled, with_energy, count = problem.table_dt.size > 0, energy_tables.active > 0.0, 0
+    sampled, with_energy, count = problem.table_dt.size > 0, run.energy_tables.active > 0.0, 0
     while count < budget:
         if sampled:
-            count += _cross_cells(problem, tables, energy_tables, state, scratch, budget - count)
+            count += _cross_cells(run, budget - count)
         if due[state.count[SAMPLED]] <= now[T]:
-            _sample_here(problem, tables, energy_tables, state, scratch)
+            _sample_here(run)
         if now[T] >= now[T_END]:
             return -1
 
         # --- the time up to the next output, the end, or the end of the signals' cell
         first = due[state.count[SAMPLED]]
-        target = _target(tables, state, first)
+        target = _target(run, first)
         begin, span, place = now[T], target - now[T], _place_in_cell(problem, now[T])
         cell, _, rest = place
         if sampled:
-            _bound_signals(problem, cell, 1, scratch.signal_bounds)
+            _bound_signals(problem, cell, 1, run.scratch.signal_bounds)
         # --- the time within which no stop can be reached
         if first == np.inf and not sampled:  # neither outputs nor cells limit the steps
-            steps, span = _fly_unsampled(problem, tables, state, scratch, span, budget)
+            steps, span = _fly_unsampled(run, span, budget)
             if steps >= budget:
                 return -2
         else:
             span = min(span, rest)
             if first <= begin + span:
                 if with_energy and sampled:
-                    account_state(problem, tables, energy_tables, state, scratch)
-                split(problem, state.x, scratch.split_state[2])
-            span = _safe_span(problem, tables, state, scratch, span, rest, sampled or count % _REFRESH == 0)
-        h, stop = _fly_step(problem, tables, state, scratch, span, target, place)
+                    account_state(run)
+                split(problem, state.x, run.scratch.split_state[2])
+            span = _safe_span(run, span, rest, sampled or count % _REFRESH == 0)
+        h, stop = _fly_step(run, span, target, place)
         move_clock(now, h)
         now[T] = min(now[T], target)
         state.count[STEPS] += 1
         count += 1
         if first < now[T]:
-            _sample(problem, tables, energy_tables, state, scratch, begin)
+            _sample(run, begin)
         if with_energy and sampled and cell_of(problem, now[T])[0] != cell:
-            account_state(problem, tables, energy_tables, state, scratch)
+            account_state(run)
         if stop >= 0:
             return stop
     return -2

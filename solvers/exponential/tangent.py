@@ -26,6 +26,7 @@ from solvers.compiled.state import (
     radii_of,
 )
 from solvers.exponential.contact.nodes import S
+from solvers.exponential.energy.flight_tables import NO_ENERGY_TABLES
 from solvers.exponential.linearised import linearise_of
 from solvers.exponential.linearised_step import DERIVATIVES, VARIATION, Derivatives, Variation
 from solvers.exponential.preparation import places_among_tones
@@ -72,7 +73,8 @@ class Tangent:
         self.packed.append(Packed.of(self.change.variation, VARIATION))
         here, ahead, behind, variation = (packed.address for packed in self.packed)
         derivatives, past = (words + start for start in layout.starts)
-        self.addresses = here, ahead, behind, *engine.addresses[1:], past, derivatives, variation
+        tables, *run = engine.addresses[1:]
+        self.addresses = here, ahead, behind, tables, NO_ENERGY_TABLES.address, *run, past, derivatives, variation
         self.linearise = linearise_of(isinstance(problem, PlanarProblem))
         self.log_scale = 0.0  # the derivatives are exp(log_scale) times the arrays
         self.begun = False

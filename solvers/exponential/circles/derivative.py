@@ -79,7 +79,7 @@ def radial_residual(run, node_set, level, c, s, shift, place):
     ``scratch.motion`` holds the change of motion of both rows without that of the forces.
     """
     scratch, tables, derivatives, variation = run.scratch, run.tables, run.derivatives, run.variation
-    row, turned, parameter = run.problem.first[s], turned_of(run.problem, scratch, s), is_parameter(run, c)
+    row, turned, parameter = run.problem.first[s], turned_of(run.here, s), is_parameter(run, c)
     for i in range(S):
         t = run.past.now[T] + tables.contact_step[level] * tables.times[node_set, i]
         along = derivatives.entry[c, s] * scratch.slope[s, 2, i]

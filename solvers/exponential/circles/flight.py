@@ -37,38 +37,39 @@ def _safe_in_circle(radius, uu, uv, vv, bound):
 
 
 @part(CIRCLE_SPAN, REAL, types.int64, MATRIX)
-def span_of_circle(problem, tables, scratch, s, x):
+def span_of_circle(run, s, x):
     """The same from the blocks' p and v; ``scratch.per_row`` bounds the accelerations of the rows."""
-    row = problem.first[s]
-    u, u_dot = motion_of_row(problem, tables, row, x)
-    w, w_dot = motion_of_row(problem, tables, row + 1, x)
-    bound = math.hypot(scratch.per_row[row], scratch.per_row[row + 1])
+    row = run.problem.first[s]
+    u, u_dot = motion_of_row(run, row, x)
+    w, w_dot = motion_of_row(run, row + 1, x)
+    bound = math.hypot(run.scratch.per_row[row], run.scratch.per_row[row + 1])
     uu, uv, vv = u * u + w * w, u * u_dot + w * w_dot, u_dot * u_dot + w_dot * w_dot
-    return _safe_in_circle(problem.radius[s], uu, uv, vv, bound)
+    return _safe_in_circle(run.problem.radius[s], uu, uv, vv, bound)
 
 
 @part(CIRCLE_SPAN_AT, REAL, types.int64)
-def span_of_circle_at(problem, state, scratch, s):
+def span_of_circle_at(run, s):
     """The same from the state."""
+    problem = run.problem
     row, size = problem.first[s], 2 * problem.k.size
-    uu, uv, vv, bound = 0.0, 0.0, 0.0, math.hypot(scratch.per_row[row], scratch.per_row[row + 1])
+    uu, uv, vv, bound = 0.0, 0.0, 0.0, math.hypot(run.scratch.per_row[row], run.scratch.per_row[row + 1])
     for r in range(row, row + 2):
-        u = dot(problem.read[r], state.x, size) - problem.gap[r]
-        v = dot(problem.read_rate[r], state.x, size)
+        u = dot(problem.read[r], run.state.x, size) - problem.gap[r]
+        v = dot(problem.read_rate[r], run.state.x, size)
         uu, uv, vv = uu + u * u, uv + u * v, vv + v * v
     return _safe_in_circle(problem.radius[s], uu, uv, vv, bound)
 
 
 @part(CIRCLE_NEAR, types.boolean, types.int64, MATRIX)
-def circle_is_near(problem, tables, scratch, s, x):
+def circle_is_near(run, s, x):
     """Whether a circle may be met on a cell with this end; ``scratch.per_row`` bounds the rows' error of interpolation.
 
     Always True of an outer circle, which the straight line between two places outside may cross.
     """
-    row = problem.first[s]
-    u, w = motion_of_row(problem, tables, row, x)[0], motion_of_row(problem, tables, row + 1, x)[0]
-    reach = math.hypot(u, w) + math.hypot(scratch.per_row[row], scratch.per_row[row + 1])
-    return not reach < problem.radius[s]
+    row = run.problem.first[s]
+    u, w = motion_of_row(run, row, x)[0], motion_of_row(run, row + 1, x)[0]
+    reach = math.hypot(u, w) + math.hypot(run.scratch.per_row[row], run.scratch.per_row[row + 1])
+    return not reach < run.problem.radius[s]
 
 
 @part(CIRCLE_ROOT, types.void, types.int64, MATRIX, VECTOR)

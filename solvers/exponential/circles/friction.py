@@ -72,8 +72,9 @@ def nearest_turn(xi, known, radius):
 
 
 @inner
-def xi_continued(problem, scratch, s, t, x, i):
+def xi_continued(run, s, t, x, i):
     """ξ in the state x at time t, at the turn that continues ξ at node i."""
+    problem, scratch = run.problem, run.scratch
     slider, first = slider_of(problem, s), row_of(problem, s)
     u, _, w, _, turned, _ = rows_at(problem, s, x)
     if not is_circle(problem, s):
@@ -151,8 +152,9 @@ def _xi_at_nodes(problem, scratch, s):
 
 
 @inlined
-def _add_friction(problem, scratch, s):
+def _add_friction(run, s):
     """Add F_t ∂ξ/∂y to the forces on the rows at the nodes."""
+    problem, scratch = run.problem, run.scratch
     first, out, force = row_of(problem, s), scratch.law_force, load8(scratch.slid[s, TANGENTIAL], 0)
     if not is_circle(problem, s):
         store8(out[first + 1], 0, splat8(0.0) - force)
@@ -177,37 +179,39 @@ def _spring_forces(radius, slider, slid):
 
 
 @inner
-def _forces(problem, tables, state, scratch, s):
+def _forces(run, s):
     """Write N and the forces on the rows at the nodes into ``scratch.law_force``, F_t into ``scratch.slid``."""
+    problem, scratch = run.problem, run.scratch
     slider, radius, slid, place = slider_of(problem, s), radius_of(problem, s), scratch.slid[s], place_of(problem, s)
     if is_circle(problem, s):
-        radial_forces(problem, tables, state, scratch, s)
+        radial_forces(run, s)
     else:
         motion = scratch.motion[place]
         above(motion[0], problem.knots[s, 0], scratch.clipped)
-        law_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], scratch.law_force[place])
-        state.count[CALLS] += S
+        law_forces(problem, s, S, scratch.clipped, motion[1], run.state.entry_rate[s], scratch.law_force[place])
+        run.state.count[CALLS] += S
     if slider[CODE] == STICK:
         _xi_at_nodes(problem, scratch, s)
         _spring_forces(radius, slider, slid)
     else:
         store8(slid[TANGENTIAL], 0, splat8(friction_by_normal(slider)) * positive8(load8(scratch.law_force[place], 0)))
-    _add_friction(problem, scratch, s)
+    _add_friction(run, s)
 
 
 @part(RUB_FORCES, types.void, types.int64)
-def rubbing_forces(problem, tables, state, scratch, s):
+def rubbing_forces(run, s):
     """`_forces`, called at an address."""
-    _forces(problem, tables, state, scratch, s)
+    _forces(run, s)
 
 
 @part(RUB_GUESS, types.void, types.int64)
-def guess_rubbing_forces(problem, tables, state, scratch, s):
+def guess_rubbing_forces(run, s):
     """First guess of the forces on the rows at the nodes: those for the free response."""
+    problem, scratch = run.problem, run.scratch
     for r in range(row_of(problem, s), row_of(problem, s + 1)):
         copy(scratch.free[r, 0], scratch.motion[r, 0], S)
         copy(scratch.free[r, 1], scratch.motion[r, 1], S)
-    _forces(problem, tables, state, scratch, s)
+    _forces(run, s)
     for r in range(row_of(problem, s), row_of(problem, s + 1)):
         copy(scratch.law_force[r], scratch.force[r], S)
 
@@ -283,8 +287,9 @@ def row_slopes(problem, s, motion, i, rate, normal, tangential, by_delta, by_rat
 
 
 @part(RUB_NEWTON, types.void, *[types.int64] * 4)
-def linearise_rubbing(problem, tables, state, scratch, node_set, level, s, begin):
+def linearise_rubbing(run, node_set, level, s, begin):
     """Write the rows of Newton's matrix that belong to an element with friction, from its row ``begin`` on."""
+    problem, scratch = run.problem, run.scratch
     first, m, slopes, column = row_of(problem, s), count_of(problem, s), scratch.row_slopes[9 * s : 9 * s + 9], 0
     place = place_of(problem, s)
     for i in range(S):
@@ -293,7 +298,7 @@ def linearise_rubbing(problem, tables, state, scratch, node_set, level, s, begin
             *(scratch.slid[s, TANGENTIAL, i], scratch.slope[s, 0, i], scratch.slope[s, 1, i], slopes),
         )
     for u in range(problem.gap.size):
-        if not acts(problem, state, u):
+        if not acts(problem, run.state, u):
             continue
         for a in range(m):
             for i in range(S):
@@ -301,7 +306,7 @@ def linearise_rubbing(problem, tables, state, scratch, node_set, level, s, begin
                     own = u == first + a and i == j
                     scratch.jacobian[begin + a * S + i, column + j] = 1.0 if own else 0.0
         for b in range(m):
-            matrix = pair_response(problem, tables, scratch, node_set, level, first + b, u)
+            matrix = pair_response(run, node_set, level, first + b, u)
             for a in range(m):
                 slope = slopes[a * m + b]
                 for i in range(S):
@@ -313,11 +318,12 @@ def linearise_rubbing(problem, tables, state, scratch, node_set, level, s, begin
 
 
 @inner
-def _work_of_friction(problem, tables, scratch, node_set, level, s, begin, end):
+def _work_of_friction(run, node_set, level, s, begin, end):
     """∫ F_t dξ, J, over the step just solved, in which ξ goes from ``begin`` to ``end``; see `step_integrals`."""
-    slider, slid, h = slider_of(problem, s), scratch.slid[s], tables.contact_step[level]
+    tables = run.tables
+    slider, slid, h = slider_of(run.problem, s), run.scratch.slid[s], tables.contact_step[level]
     if slider[CODE] == STICK:
-        radius = radius_of(problem, s)
+        radius = radius_of(run.problem, s)
         first, last = spring_stretch(radius, slider, begin), spring_stretch(radius, slider, end)
         return 0.5 * slider[STIFFNESS] * (last - first) * (last + first)
     if resolves_rates(tables, node_set, s, h):
@@ -326,44 +332,47 @@ def _work_of_friction(problem, tables, scratch, node_set, level, s, begin, end):
 
 
 @part(RUB_WORK, REAL, *[types.int64] * 3)
-def work_with_friction(problem, tables, state, scratch, node_set, level, s):
+def work_with_friction(run, node_set, level, s):
     """Work of N, J, over the step just solved; work, impulse and slip distance of friction are added to the state."""
-    slider, slid, h = slider_of(problem, s), scratch.slid[s], tables.contact_step[level]
-    account, t = problem.friction[s, 1], state.now[T]
-    begin = xi_continued(problem, scratch, s, t, state.x, 0)
-    end = xi_continued(problem, scratch, s, t + h, scratch.x_new, S - 1)
-    work = _work_of_friction(problem, tables, scratch, node_set, level, s, begin, end)
-    impulse = h * sum8(weights_of(tables, node_set, s) * load8(slid[TANGENTIAL], 0))
+    state = run.state
+    slider, slid, h = slider_of(run.problem, s), run.scratch.slid[s], run.tables.contact_step[level]
+    account, t = run.problem.friction[s, 1], state.now[T]
+    begin = xi_continued(run, s, t, state.x, 0)
+    end = xi_continued(run, s, t + h, run.scratch.x_new, S - 1)
+    work = _work_of_friction(run, node_set, level, s, begin, end)
+    impulse = h * sum8(weights_of(run.tables, node_set, s) * load8(slid[TANGENTIAL], 0))
     state.x[account] += work
     state.x[account + 1] += impulse
     state.x[account + 2] += slip_sign(slider) * (end - begin)
-    rows = work_in_circle(problem, tables, state, scratch, node_set, level, s)
+    rows = work_in_circle(run, node_set, level, s)
     return rows - work + slider[ARM] * slider[SPIN] * impulse
 
 
 @inlined
-def _motion_at(problem, scratch, r, i):
+def _motion_at(run, r, i):
     """Displacement and rate of a row at point i of a panel."""
+    problem = run.problem
     u, v = -problem.gap[r], 0.0
     for e in range(2 * problem.k.size):
-        u += problem.read[r, e] * scratch.along[e, i]
-        v += problem.read_rate[r, e] * scratch.along[e, i]
+        u += problem.read[r, e] * run.scratch.along[e, i]
+        v += problem.read_rate[r, e] * run.scratch.along[e, i]
     return u, v
 
 
 @part(RUB_WITHIN, types.UniTuple(REAL, 5), types.int64, types.int64)
-def work_within_rubbing(problem, tables, scratch, s, first):
+def work_within_rubbing(run, s, first):
     """(work and impulse of N, work and impulse of F_t, slip distance) over a panel of the step.
 
     Motion and forces are given as for `work_within_circle`.
     """
-    row, radius, slider, weights = row_of(problem, s), radius_of(problem, s), slider_of(problem, s), tables.gauss[1]
+    problem, scratch = run.problem, run.scratch
+    row, radius, slider, weights = row_of(problem, s), radius_of(problem, s), slider_of(problem, s), run.tables.gauss[1]
     work, impulse, friction_work, friction_impulse, slip_distance, turning = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(S):
-        u, u_dot = _motion_at(problem, scratch, row, i)
-        w, w_dot = _motion_at(problem, scratch, row + 1, i)
+        u, u_dot = _motion_at(run, row, i)
+        w, w_dot = _motion_at(run, row + 1, i)
         if count_of(problem, s) > 2:
-            turning = -_motion_at(problem, scratch, row + 2, i)[1]
+            turning = -_motion_at(run, row + 2, i)[1]
         f, g = scratch.between[first + row, i], scratch.between[first + row + 1, i]
         rate, normal, tangential, xi_rate = u_dot, f, -g, -w_dot
         if radius != 0.0:

@@ -182,8 +182,9 @@ def pass_slider(run, s, j):
 
 
 @inner
-def store_row_directions(problem, scratch, s):
+def store_row_directions(run, s):
     """Store ∂δ/∂y and ∂ξ/∂y of the rows at the nodes before ``scratch.motion`` is overwritten by changes."""
+    problem, scratch = run.problem, run.scratch
     first = row_of(problem, s)
     for i in range(S):
         u, w = scratch.motion[first, 0, i], scratch.motion[first + 1, 0, i]
@@ -210,8 +211,8 @@ def rubbing_by_parameter(run, s):
     The changes go to ``derivatives.by_rows`` at the first two rows of the element.
     """
     problem, past, scratch, derivatives, variation = run.problem, run.past, run.scratch, run.derivatives, run.variation
-    rubbing_forces(problem, run.tables, past, scratch, s)
-    store_row_directions(problem, scratch, s)
+    rubbing_forces(run.here, s)
+    store_row_directions(run.here, s)
     if variation.law_step == 0.0:
         return
     first, place = row_of(problem, s), place_of(problem, s)

@@ -87,28 +87,29 @@ _FADED, _MOST_RADIANS = 100.0, 1e5  # e^-100 counts as zero; more radians in a r
 
 
 @merged
-def _single_power_law(problem, tables, state):
+def _single_power_law(run):
     """The stop in contact, if it is the only one, on a line, frictionless, with a tabulated power law; else -1."""
     alone, count = -1, 0
-    for s in range(state.segment.size):
-        if state.segment[s] > 0:
+    for s in range(run.state.segment.size):
+        if run.state.segment[s] > 0:
             alone, count = s, count + 1
-    inlined_law = count == 1 and tables.power_law[alone, EXPONENT] > 0.0 and not is_circle(problem, alone)
-    inlined_law &= not rubs(problem, alone)
+    inlined_law = count == 1 and run.tables.power_law[alone, EXPONENT] > 0.0 and not is_circle(run.problem, alone)
+    inlined_law &= not rubs(run.problem, alone)
     return alone if inlined_law else -1
 
 
 @merged
-def _iterate(problem, tables, state, scratch, node_set, level):
+def _iterate(run, node_set, level):
     """One fixed-point iteration for the forces of all stops in contact.
 
     Returns Σ change² and Σ force² over the nodes, in units of `Scratch.force_tolerance`.
     """
+    problem, scratch = run.problem, run.scratch
     change, largest = 0.0, 0.0
-    respond_all(problem, tables, state, scratch, node_set, level)
+    respond_all(run, node_set, level)
     for s in range(problem.law.size):
-        if state.segment[s] > 0:
-            node_forces(problem, tables, state, scratch, s)
+        if run.state.segment[s] > 0:
+            node_forces(run, s)
             unit = 1.0 / scratch.force_tolerance[s] ** 2
             for r in range(row_of(problem, s), row_of(problem, s + 1)):
                 moved, size = replace_values(scratch.force[r], scratch.law_force[r])
@@ -117,24 +118,25 @@ def _iterate(problem, tables, state, scratch, node_set, level):
 
 
 @merged
-def _set_accuracy(problem, tables, state, scratch, h):
+def _set_accuracy(run, h):
     """Set each stop's force tolerance, N: it changes no indentation rate by more than a twentieth of its tolerance.
 
     Returns whether a dashpot is so strong that the fixed-point iteration would diverge, by its slope in the last Newton
     iteration.
     """
+    problem, scratch = run.problem, run.scratch
     stiff = False
     for s in range(problem.law.size):
-        if state.segment[s] > 0:
+        if run.state.segment[s] > 0:
             sensitivity = 1e-300
             for u in range(row_of(problem, s), row_of(problem, s + 1)):
                 for r in range(problem.gap.size):
                     sensitivity = max(
-                        sensitivity, abs(tables.accelerance[r, u]) / scratch.reference_speed[element_of(problem, r)]
+                        sensitivity, abs(run.tables.accelerance[r, u]) / scratch.reference_speed[element_of(problem, r)]
                     )
                 copy(scratch.force[u], scratch.guess[u], S)
             scratch.force_tolerance[s] = 0.05 * scratch.accuracy[RTOL] / (h * sensitivity)
-            stiff |= h * own_accelerance(problem, tables, s) * scratch.viscous[s] > 1.0
+            stiff |= h * own_accelerance(run, s) * scratch.viscous[s] > 1.0
     for s in range(problem.law.size if not stiff else 0):
         scratch.viscous[s] = 0.0
     return stiff
@@ -150,16 +152,17 @@ def _is_last(change, before):
 
 
 @part(SOLVE, types.boolean, types.int64, types.int64)
-def solve_forces(problem, tables, state, scratch, node_set, level):
+def solve_forces(run, node_set, level):
     """Solve for the forces by fixed-point iteration, else by Newton's method; returns whether this has converged."""
-    if _set_accuracy(problem, tables, state, scratch, tables.contact_step[level]):
-        return newton(problem, tables, state, scratch, node_set, level)
-    before, alone = 0.0, _single_power_law(problem, tables, state)
+    tables, scratch = run.tables, run.scratch
+    if _set_accuracy(run, tables.contact_step[level]):
+        return newton(run, node_set, level)
+    before, alone = 0.0, _single_power_law(run)
     s = max(alone, 0)  # without such a stop what follows is not used
-    law, row, unit = tables.power_law[s], row_of(problem, s), 1.0 / scratch.force_tolerance[s] ** 2
-    own = pair_response(problem, tables, scratch, node_set, level, row, row)
+    law, row, unit = tables.power_law[s], row_of(run.problem, s), 1.0 / scratch.force_tolerance[s] ** 2
+    own = pair_response(run, node_set, level, row, row)
     stiffness, rooted, damping = law[STIFFNESS], law[EXPONENT] == 1.5, law[DAMPING]
-    factor, cut = law[FACTOR] / state.entry_rate[s], tables.bend[s] == FORCE
+    factor, cut = law[FACTOR] / run.state.entry_rate[s], tables.bend[s] == FORCE
     for iteration in range(MOST_ITERATIONS):
         if alone >= 0:
             change, largest = iterate_power_law(
@@ -167,9 +170,9 @@ def solve_forces(problem, tables, state, scratch, node_set, level):
                 *(stiffness, rooted, factor, damping, cut),
             )
             change, largest = change * unit, largest * unit
-            state.count[CALLS] += S
+            run.state.count[CALLS] += S
         else:
-            change, largest = _iterate(problem, tables, state, scratch, node_set, level)
+            change, largest = _iterate(run, node_set, level)
         if not change < np.inf:
             break
         if iteration == 0:
@@ -180,20 +183,20 @@ def solve_forces(problem, tables, state, scratch, node_set, level):
         if iteration > 2 and change > 0.36 * before:  # r > 0.6
             break
         before = change
-    for r in range(problem.gap.size):
+    for r in range(run.problem.gap.size):
         copy(scratch.guess[r], scratch.force[r], S)
-    return newton(problem, tables, state, scratch, node_set, level)
+    return newton(run, node_set, level)
 
 
 @merged
-def _largest_force(problem, tables, state, scratch, s):
+def _largest_force(run, s):
     """Largest force of a stop on the step, N, and its stiffness ∂F/∂δ there, N/m."""
-    force, motion = force_of(problem, scratch, s), motion_of(problem, scratch, s)
-    if problem.knots[s, 0] == 0.0:
+    force, motion = force_of(run, s), motion_of(run, s)
+    if run.problem.knots[s, 0] == 0.0:
         largest = max(largest8(load8(force, 0)), 0.0)
-        return largest, tables.exponent[s] * largest / max(largest8(load8(motion[0], 0)), 1e-300)
-    law_slopes_at_nodes(problem, state, scratch, s)
-    return largest_size(force), largest_size(scratch.slope[s, 0])
+        return largest, run.tables.exponent[s] * largest / max(largest8(load8(motion[0], 0)), 1e-300)
+    law_slopes_at_nodes(run, s)
+    return largest_size(force), largest_size(run.scratch.slope[s, 0])
 
 
 @inlined
@@ -203,72 +206,76 @@ def _slope_changes(slope, largest):
 
 
 @merged
-def _left_out(problem, tables, state, scratch, node_set, u, largest):
+def _left_out(run, node_set, u, largest):
     """Estimate of the part of the force on row u, N, that its polynomial leaves out.
 
     On an entry step the nodes are those of Gauss's rule for the stop that enters, not for the others, whose forces are
     estimated at half the order.
     """
-    s = element_of(problem, u)
+    scratch = run.scratch
+    s = element_of(run.problem, u)
     if node_set == 0 or s == node_set - 1:
         left_out = unresolved_part(scratch.summary[u], largest, S // 2)
     else:
-        combine(tables.tail[node_set], scratch.force[u], S, None, scratch.trial)
+        combine(run.tables.tail[node_set], scratch.force[u], S, None, scratch.trial)
         left_out = unresolved_part(scratch.trial, largest, 1)
-    if node_set == 0 and u == row_of(problem, s) and tables.power_law[s, EXPONENT] == 0.0:
-        left_out += 0.01 * _hidden_kink(problem, state, scratch, s, largest)
+    if node_set == 0 and u == row_of(run.problem, s) and run.tables.power_law[s, EXPONENT] == 0.0:
+        left_out += 0.01 * _hidden_kink(run, s, largest)
     return left_out
 
 
 @merged
-def _memory_error(problem, state, scratch, node_set, s, left_out, largest, stiffness):
+def _memory_error(run, node_set, s, left_out, largest, stiffness):
     """Error of the work of element s by the part of its force left out, in units of its tolerance; 0 without memory."""
+    problem, scratch = run.problem, run.scratch
     error = 0.0
     if node_set > 0 and s != node_set - 1 and problem.border_count[s] > 0:
-        error = error_of_work(problem, state, scratch, s, left_out, largest, (stiffness, 0.0))
+        error = error_of_work(run, s, left_out, largest, (stiffness, 0.0))
     elif node_set == 0 and problem.border_count[s] > 0 and problem.knots[s, 0] < 0.0:
         viscous = largest_size(scratch.slope[s, 1])
         if _slope_changes(scratch.slope[s, 0], stiffness) or _slope_changes(scratch.slope[s, 1], viscous):
-            error = error_of_work(problem, state, scratch, s, left_out, largest, (stiffness, viscous))
+            error = error_of_work(run, s, left_out, largest, (stiffness, viscous))
     return error
 
 
 @merged
-def _find_unresolved(problem, tables, state, scratch, node_set, level, u):
+def _find_unresolved(run, node_set, level, u):
     """Write the impulse, N s, that the polynomial of the force on row u leaves out into ``scratch.unresolved``.
 
     Returns its `_memory_error`.
     """
+    problem, tables, scratch = run.problem, run.tables, run.scratch
     s, n, h = element_of(problem, u), problem.k.size, tables.contact_step[level]
     combine(tables.summary[node_set], scratch.force[u], S, None, scratch.summary[u])
     if is_circle(problem, s) and u == row_of(problem, s):
         own = place_of(problem, s)
         combine(tables.summary[node_set], scratch.law_force[own], S, None, scratch.summary[own])
-    largest, stiffness = _largest_force(problem, tables, state, scratch, s)
-    unresolved, error = _left_out(problem, tables, state, scratch, node_set, u, largest), 0.0
+    largest, stiffness = _largest_force(run, s)
+    unresolved, error = _left_out(run, node_set, u, largest), 0.0
     if unresolved != 0.0:
-        error = _memory_error(problem, state, scratch, node_set, s, unresolved, largest, stiffness)
+        error = _memory_error(run, node_set, s, unresolved, largest, stiffness)
         if unresolved > _TOO_MUCH * scratch.force_tolerance[s]:
-            rounding = _force_rounding(problem, state, scratch, s)
+            rounding = _force_rounding(run, s)
             unresolved = max(unresolved - rounding, _LITTLE * scratch.force_tolerance[s])
-        ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], state.x, n)
+        ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], run.state.x, n)
         damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # nothing damps motion across a radius
         if rubs(problem, s):
             damped, stiffness = False, max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
-        span = h * _undamped_part(problem, tables, scratch, node_set, h, s) if damped else h
+        span = h * _undamped_part(run, node_set, h, s) if damped else h
         scratch.unresolved[u] = span * (unresolved + _MEAN_OF_RIPPLE * stiffness * ripple)
     return error
 
 
 @part(ERROR, REAL, types.int64, types.int64)
-def step_error(problem, tables, state, scratch, node_set, level):
+def step_error(run, node_set, level):
     """Largest error of an indentation rate over the step just solved, in units of its tolerance rtol × speed."""
-    h, worst = tables.contact_step[level], 0.0
+    problem, scratch = run.problem, run.scratch
+    h, worst = run.tables.contact_step[level], 0.0
     for u in range(problem.gap.size):
         scratch.unresolved[u] = 0.0
-        if acts(problem, state, u):
-            worst = max(worst, _find_unresolved(problem, tables, state, scratch, node_set, level, u))
-    worst = max(worst, _sum_errors(problem, tables, state, scratch, node_set, h))
+        if acts(problem, run.state, u):
+            worst = max(worst, _find_unresolved(run, node_set, level, u))
+    worst = max(worst, _sum_errors(run, node_set, h))
     for r in range(problem.gap.size):
         speed = scratch.reference_speed[element_of(problem, r)]
         if r < row_of(problem, element_of(problem, r)) + 2:  # the third row, of rotation, keeps the reference speed
@@ -278,19 +285,20 @@ def step_error(problem, tables, state, scratch, node_set, level):
             worst = error
             if error != error:
                 return worst
-    if state.event_record.shape[0]:
-        worst = max(worst, _derivative_error(problem, tables, state, scratch, node_set, level))
+    if run.state.event_record.shape[0]:
+        worst = max(worst, _derivative_error(run, node_set, level))
     return worst
 
 
 @merged
-def _force_rounding(problem, state, scratch, s):
+def _force_rounding(run, s):
     """Rounding of a force, N, by that of δ and δ̇: no shorter step resolves more of it.
 
     A stiff stop on a structure that has moved far has few digits of its δ, and one at rest that is hardly touched none.
     A spring of friction has those of ξ, which all rows of its contact make.
     """
-    motion, slope, least = motion_of(problem, scratch, s), scratch.slope[s], surface_tolerance(problem, s, state.x)
+    problem, state, scratch = run.problem, run.state, run.scratch
+    motion, slope, least = motion_of(run, s), scratch.slope[s], surface_tolerance(problem, s, state.x)
     rounding = _OF_SURFACE * (least - _FLOOR)
     least = least if problem.knots[s, 0] == 0.0 else -np.inf  # at δ = 0 a slope may be infinite
     for i in range(S):
@@ -305,7 +313,7 @@ def _force_rounding(problem, state, scratch, s):
 
 
 @merged
-def _derivative_error(problem, tables, state, scratch, node_set, level):
+def _derivative_error(run, node_set, level):
     """Error of the derivative of a step, in units of rtol: the step must resolve what the contacts stiffen.
 
     A motion at rest, or slow, lets steps grow, but neighbouring motions oscillate. Collocation at eight nodes of Gauss
@@ -314,12 +322,13 @@ def _derivative_error(problem, tables, state, scratch, node_set, level):
     once its motion has decayed since the last event; then only the slow decay rate k/c counts. Blocks that the nodes do
     not resolve oscillate beside a motion that hardly has them; what the slopes do to them counts too.
     """
-    h, square, unresolved = tables.contact_step[level], 0.0, 0.0
+    problem, state, scratch = run.problem, run.state, run.scratch
+    h, square, unresolved = run.tables.contact_step[level], 0.0, 0.0
     out, since = scratch.local_motion[FORCES], state.now[T] - max(state.now[LAST_EVENT], 0.0)
     for s in range(problem.law.size):
         if state.segment[s] == 0:
             continue
-        motion, mobility = motion_of(problem, scratch, s), 0.0
+        motion, mobility = motion_of(run, s), 0.0
         copy(motion[0], scratch.clipped, S)
         slopes = out[:S], out[S : 2 * S], out[2 * S :]
         contact_gradient(problem, s, scratch.clipped, motion[1], state.entry_rate[s], slopes[0], slopes[1], slopes[2])
@@ -327,8 +336,8 @@ def _derivative_error(problem, tables, state, scratch, node_set, level):
         if rubs(problem, s):
             stiffness = max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
         for r in range(row_of(problem, s), row_of(problem, s + 1)):
-            mobility += abs(tables.accelerance[r, r])
-            unresolved += h * _unresolved_blocks(problem, tables, r, node_set, level, stiffness, damping)
+            mobility += abs(run.tables.accelerance[r, r])
+            unresolved += h * _unresolved_blocks(run, r, node_set, level, stiffness, damping)
         stiffness, damping = stiffness * mobility, damping * mobility
         faded = damping**2 > 4.0 * stiffness and damping * since > _FADED and damping * state.now[T_END] > _MOST_RADIANS
         square += (stiffness / damping if faded else math.sqrt(stiffness) + damping) ** 2
@@ -339,8 +348,9 @@ def _derivative_error(problem, tables, state, scratch, node_set, level):
 
 
 @merged
-def _unresolved_blocks(problem, tables, r, node_set, level, stiffness, damping):
+def _unresolved_blocks(run, r, node_set, level, stiffness, damping):
     """Rate, per s, at which a block that oscillates between the nodes is moved wrongly by the slopes at row r."""
+    problem, tables = run.problem, run.tables
     alias, n, worst = tables.alias[tables.kind[node_set], level], problem.k.size, 0.0
     for b in range(int(tables.own_blocks)):
         slope = stiffness + damping * math.sqrt(problem.k[b])
@@ -349,18 +359,18 @@ def _unresolved_blocks(problem, tables, r, node_set, level, stiffness, damping):
 
 
 @merged
-def _undamped_part(problem, tables, scratch, node_set, h, s):
+def _undamped_part(run, node_set, h, s):
     """Part of the step, 0 to 1, over which errors of a rate survive the stop's dashpot up to the end.
 
         ∫ exp(-∫ d dσ') dσ, the inner integral from σ to 1, d = h × accelerance × slope of the law by the rate,
 
     with d constant around each node. The last nodes decide; the dashpot of a stop that is being left vanishes there.
     """
-    part, transmitted, accelerance = 0.0, 1.0, own_accelerance(problem, tables, s)
+    part, transmitted, accelerance = 0.0, 1.0, own_accelerance(run, s)
     for k in range(S):
         i = S - 1 - k
-        share = tables.plain[node_set, i]
-        damped = share * h * accelerance * max(scratch.slope[s, 1, i], 0.0)
+        share = run.tables.plain[node_set, i]
+        damped = share * h * accelerance * max(run.scratch.slope[s, 1, i], 0.0)
         factor = math.exp(-damped)
         part += transmitted * share * ((1.0 - factor) / damped if damped > 1e-6 else 1.0)
         transmitted *= factor
@@ -368,35 +378,37 @@ def _undamped_part(problem, tables, scratch, node_set, h, s):
 
 
 @merged
-def _sum_errors(problem, tables, state, scratch, node_set, h):
+def _sum_errors(run, node_set, h):
     """Errors of the rates of all rows, m/s, by unresolved forces and signals, into ``scratch.per_row``.
 
     Returns the largest error of the blocks' motion by an unresolved signal, in units of its tolerance.
     """
+    problem, scratch = run.problem, run.scratch
     rows, error, worst = problem.gap.size, scratch.per_row, 0.0
     for r in range(rows):
         error[r] = 0.0
     for j in range(problem.table_dt.size):
-        unresolved = h * unresolved_signal(problem, tables, scratch, node_set, j, state.now[T], h)
-        worst = max(worst, _driven_error(problem, tables, state, scratch, j, unresolved))
+        unresolved = h * unresolved_signal(run, node_set, j, run.state.now[T], h)
+        worst = max(worst, _driven_error(run, j, unresolved))
         for r in range(rows):
-            error[r] += abs(tables.load_acceleration[r, problem.table_load[j]]) * unresolved
+            error[r] += abs(run.tables.load_acceleration[r, problem.table_load[j]]) * unresolved
     for u in range(rows):
         if scratch.unresolved[u] != 0.0:
             for r in range(rows):
-                error[r] += abs(tables.accelerance[r, u]) * scratch.unresolved[u]
+                error[r] += abs(run.tables.accelerance[r, u]) * scratch.unresolved[u]
     return worst
 
 
 @merged
-def _driven_error(problem, tables, state, scratch, j, unresolved):
+def _driven_error(run, j, unresolved):
     """Error of the blocks that sampled signal j drives by an unresolved impulse, in units of rtol × their energy norm.
 
     A load far from all stops, or on another body, moves none of them, so that their rates do not show it. Each block
     counts by its share of the load: blocks that move but are not driven are no measure. Driven blocks at rest are
     measured by `Scratch.driven_speed`.
     """
-    n, norm, x, x_new = problem.k.size, tables.load_norm[problem.table_load[j]], state.x, scratch.x_new
+    problem, scratch = run.problem, run.scratch
+    n, norm, x, x_new = problem.k.size, run.tables.load_norm[problem.table_load[j]], run.state.x, scratch.x_new
     load, before, after = 0.0, 0.0, 0.0
     for b in range(n):
         share, k = norm[b] * norm[b], problem.k[b]
@@ -410,25 +422,27 @@ def _driven_error(problem, tables, state, scratch, j, unresolved):
 
 
 @inner
-def note_signals(problem, tables, scratch):
+def note_signals(run):
     """Set what every sampled signal can drive within a cell of its table, as its largest value there would."""
+    problem = run.problem
     for j in range(problem.table_dt.size):
         largest, square = 0.0, 0.0
         for node in range(problem.table_start[j], problem.table_start[j + 1]):
             largest = max(largest, abs(problem.table[node, 0]))
-        for norm in tables.load_norm[problem.table_load[j]]:
+        for norm in run.tables.load_norm[problem.table_load[j]]:
             square += norm * norm
-        scratch.driven_speed[j] = largest * math.sqrt(square) * min(problem.table_dt[j], 1.0 / tables.fastest)
+        run.scratch.driven_speed[j] = largest * math.sqrt(square) * min(problem.table_dt[j], 1.0 / run.tables.fastest)
 
 
 @merged
-def _hidden_kink(problem, state, scratch, s, largest):
+def _hidden_kink(run, s, largest):
     """Largest difference, N, of law and polynomial at the ends of a smooth step; 0 if the coefficients explain it.
 
     Otherwise the law has a kink between that end and the next node, within a fiftieth of the step, as a called law
     with clamp=True; or it saturates within that time, as hysteresis of a knee that is small beside the motion does
     after a border.
     """
+    problem, state, scratch = run.problem, run.state, run.scratch
     delta, rate = scratch.clipped[0:2], scratch.trial[0:2]
     delta[0], rate[0] = indentation_and_rate(problem, s, scratch.x_new)
     delta[1] = off_knots(problem, s, state.segment[s], indentation(problem, s, state.x))
@@ -440,17 +454,18 @@ def _hidden_kink(problem, state, scratch, s, largest):
 
 
 @inner
-def end_state(problem, tables, state, scratch, node_set, level):
+def end_state(run, node_set, level):
     """Write the block coordinates at the end of the step into ``scratch.x_new``."""
+    problem, tables, state, scratch = run.problem, run.tables, run.state, run.scratch
     x, n = scratch.x_new, problem.k.size
     if uses_blocks(tables):
         for e in range(2 * n):
             x[e] = 0.0
-        add_end_response(problem, tables, state, scratch, scratch.force, node_set, level, x)
+        add_end_response(run, scratch.force, node_set, level, x)
     first = True
     for u in range(0 if uses_blocks(tables) else scratch.force.shape[0]):
         if u >= problem.gap.size or acts(problem, state, u):
-            rows = tables.end_response[weighting_of(problem, tables, node_set, u), level, u]
+            rows = tables.end_response[weighting_of(run, node_set, u), level, u]
             if first:
                 combine(rows, scratch.force[u], S, None, x)
             else:

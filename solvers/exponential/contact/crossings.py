@@ -104,16 +104,17 @@ def _rate_changes_sign(rates, begin, end, up, down):
 
 
 @merged
-def _leaves_between_points(problem, tables, scratch, node_set, h, s, lower, upper):
+def _leaves_between_points(run, node_set, h, s, lower, upper):
     """Whether δ of stop s leaves [lower, upper] at a node or the end of the step, or between two of them."""
-    motion = motion_of(problem, scratch, s)
+    scratch = run.scratch
+    motion = motion_of(run, s)
     t, delta, rate = 0.0, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
     for i in range(S + 1):
         if i < S:
-            after, delta_new, rate_new = h * tables.times[node_set, i], motion[0, i], motion[1, i]
+            after, delta_new, rate_new = h * run.tables.times[node_set, i], motion[0, i], motion[1, i]
         else:
-            after, delta_new = h, indentation(problem, s, scratch.x_new)
-            rate_new = indentation_rate(problem, s, scratch.x_new)
+            after, delta_new = h, indentation(run.problem, s, scratch.x_new)
+            rate_new = indentation_rate(run.problem, s, scratch.x_new)
         if _cubic_leaves(after - t, delta, rate, delta_new, rate_new, lower, upper):
             return True
         t, delta, rate = after, delta_new, rate_new
@@ -121,14 +122,15 @@ def _leaves_between_points(problem, tables, scratch, node_set, h, s, lower, uppe
 
 
 @part(BOUNDS, types.void, REAL)
-def _bound_rates(problem, tables, state, scratch, h):
+def _bound_rates(run, h):
     """Bounds of |δ̈| of all rows on the step into ``per_row``, m/s², with forces of twice their largest node value."""
+    problem, tables, scratch = run.problem, run.tables, run.scratch
     n, rows = problem.k.size, problem.gap.size
-    energy_norms(problem, state.x, scratch.norms)
+    energy_norms(problem, run.state.x, scratch.norms)
     for r in range(rows):
         scratch.per_row[r] = 0.0
     for u in range(scratch.force.shape[0] if problem.table_dt.size else rows):
-        if u < rows and not acts(problem, state, u):
+        if u < rows and not acts(problem, run.state, u):
             continue
         largest, push = 0.0, push_of(problem, u)
         for i in range(S):
@@ -143,69 +145,72 @@ def _bound_rates(problem, tables, state, scratch, h):
 
 
 @merged
-def _cannot_reach(problem, state, scratch, s, h):
+def _cannot_reach(run, s, h):
     """Whether a stop out of contact cannot be reached on the step; its motion is set to that at the start."""
-    if is_circle(problem, s):
-        return stays_in_circle(problem, state, scratch, s, h)
-    delta, rate, row = scratch.start_motion[s, 0], scratch.start_motion[s, 1], row_of(problem, s)
+    scratch = run.scratch
+    if is_circle(run.problem, s):
+        return stays_in_circle(run, s, h)
+    delta, rate, row = scratch.start_motion[s, 0], scratch.start_motion[s, 1], row_of(run.problem, s)
     store8(scratch.motion[row, 0], 0, splat8(delta))
     store8(scratch.motion[row, 1], 0, splat8(rate))
     return delta + h * max(rate, 0.0) + 0.5 * h * h * scratch.per_row[row] < 0.0
 
 
 @merged
-def _follow(problem, tables, state, scratch, node_set, level, s, forces_added):
+def _follow(run, node_set, level, s, forces_added):
     """Compute the motion of a stop out of contact at the nodes.
 
     With many stops the response to the forces is first added to the motion of the blocks, unless ``forces_added``;
     returns whether it has been.
     """
-    by_blocks = uses_blocks(tables)
+    problem, scratch = run.problem, run.scratch
+    by_blocks = uses_blocks(run.tables)
     if by_blocks and not forces_added:
-        add_block_motion(problem, tables, state, scratch, node_set, level, CONTINUING, scratch.block_motion)
-        add_block_motion(problem, tables, state, scratch, node_set, level, ENTERING, scratch.block_motion)
+        add_block_motion(run, node_set, level, CONTINUING, scratch.block_motion)
+        add_block_motion(run, node_set, level, ENTERING, scratch.block_motion)
     for r in range(row_of(problem, s), row_of(problem, s + 1)):
         if by_blocks:
-            motion_at_nodes(problem, scratch, r, problem.gap[r], scratch.motion[r])
+            motion_at_nodes(run, r, problem.gap[r], scratch.motion[r])
         else:
-            respond(problem, tables, state, scratch, node_set, level, r)
+            respond(run, node_set, level, r)
     if is_circle(problem, s):
-        radial_nodes(problem, scratch, s)
+        radial_nodes(run, s)
     return forces_added or by_blocks
 
 
 @part(LEAVES, types.boolean, types.int64, types.int64)
-def leaves_segment(problem, tables, state, scratch, node_set, level):
+def leaves_segment(run, node_set, level):
     """Whether any stop may cross a border of its segment on the step."""
+    problem, tables, state = run.problem, run.tables, run.state
     h, by_blocks = tables.contact_step[level], uses_blocks(tables)
     forces_added = np.bool_(0)  # a literal would be compiled for itself
     if by_blocks:
-        _bound_rates(problem, tables, state, scratch, h)
+        _bound_rates(run, h)
     for s in range(problem.law.size):
         segment, ripple = state.segment[s], 0.0
         upper, lower = problem.knots[s, segment], -np.inf
         if segment > 0 and problem.knots[s, segment - 1] == -np.inf and upper == np.inf:
             continue
         if segment == 0:
-            if by_blocks and _cannot_reach(problem, state, scratch, s, h):
+            if by_blocks and _cannot_reach(run, s, h):
                 continue
-            forces_added = _follow(problem, tables, state, scratch, node_set, level, s, forces_added)
+            forces_added = _follow(run, node_set, level, s, forces_added)
             alias = tables.alias[tables.kind[node_set], level]
-            ripple = ripple_of_stop(problem, tables, s, alias, state.x)
+            ripple = ripple_of_stop(run, s, alias, state.x)
         else:
             lower = problem.knots[s, segment - 1]
-        motion = motion_of(problem, scratch, s)
-        (delta, end), within = indentation_and_rate(problem, s, scratch.x_new), load8(motion[0], 0)
+        motion = motion_of(run, s)
+        (delta, end), within = indentation_and_rate(problem, s, run.scratch.x_new), load8(motion[0], 0)
         lowest, highest = min(delta, least8(within)), max(delta, largest8(within))
-        sign_changes = _rate_changes_sign(motion[1], scratch.start_motion[s, 1], end, segment > 0, upper < np.inf)
+        sign_changes = _rate_changes_sign(motion[1], run.scratch.start_motion[s, 1], end, segment > 0, upper < np.inf)
         if not sign_changes and lower <= lowest and highest + ripple <= upper:
             continue
         tolerance = OUTSIDE * surface_tolerance(problem, s, state.x)
         if not (lower - tolerance <= lowest and highest + ripple <= upper + tolerance):
             return True
-        if segment == 0 and largest_indentation(problem, tables, state, scratch, node_set, h, s) > upper + tolerance:
+        if segment == 0 and largest_indentation(run, node_set, h, s) > upper + tolerance:
             return True
-        if _leaves_between_points(problem, tables, scratch, node_set, h, s, lower - tolerance, upper + tolerance):
+        if _leaves_between_points(run, node_set, h, s, lower - tolerance, upper + tolerance):
             return True
     return False
 
@@ -226,50 +231,54 @@ def power_force(tables, s, delta, rate, entry_rate):
 
 
 @inlined
-def _sides(tables, state, s, n, delta, rate, out):
+def _sides(run, s, n, delta, rate, out):
     """Event function of a bend, δ̇ or the force before its cut, at n points with δ >= 0, into ``out``."""
+    tables = run.tables
     if tables.bend[s] == RATE:
         copy(rate, out, n)
     elif tables.power_law[s, EXPONENT] > 0.0:
         for i in range(n):
-            out[i] = power_force(tables, s, delta[i], rate[i], state.entry_rate[s])
+            out[i] = power_force(tables, s, delta[i], rate[i], run.state.entry_rate[s])
     else:
-        call_force(tables.uncut[s], n, delta, rate, state.entry_rate[s], tables.uncut_parameters[s], (out,))
+        call_force(tables.uncut[s], n, delta, rate, run.state.entry_rate[s], tables.uncut_parameters[s], (out,))
 
 
 @part(SIDE, REAL, types.int64, VECTOR, VECTOR)
-def side_at(problem, tables, state, s, x, batch):
+def side_at(run, s, x, batch):
     """The same in the state x; ``batch`` holds three numbers."""
+    problem = run.problem
     batch[0] = max(indentation(problem, s, x), problem.knots[s, 0])
     batch[1] = indentation_rate(problem, s, x)
-    _sides(tables, state, s, 1, batch[0:1], batch[1:2], batch[2:3])
+    _sides(run, s, 1, batch[0:1], batch[1:2], batch[2:3])
     return batch[2]
 
 
 @inner
-def choose_sides(problem, tables, state, scratch):
+def choose_sides(run):
     """Set the side of its bend for every contact that begins now."""
-    for s in range(problem.law.size):
-        if tables.bend[s] > 0.0 and state.segment[s] > 0 and state.active[s, T_IN] == state.now[T]:
-            scratch.side[s] = -1.0 if side_at(problem, tables, state, s, state.x, scratch.trial) < 0.0 else 1.0
+    state = run.state
+    for s in range(run.problem.law.size):
+        if run.tables.bend[s] > 0.0 and state.segment[s] > 0 and state.active[s, T_IN] == state.now[T]:
+            run.scratch.side[s] = -1.0 if side_at(run, s, state.x, run.scratch.trial) < 0.0 else 1.0
 
 
 @inner
-def first_bend(problem, tables, state, scratch, node_set, level, is_new):
+def first_bend(run, node_set, level, is_new):
     """(time after the start of the step, stop) of the first bend that the step just tried crosses, or (inf, -1).
 
     A stop that begins on its bend (``is_new``), or has crossed it as another stop landed, gets the side of the first
     node. An event function within its tolerance crosses nothing.
     """
+    tables, scratch = run.tables, run.scratch
     first, stop, h = np.inf, -1, tables.contact_step[level]
-    for s in range(problem.law.size):
-        if tables.bend[s] == 0.0 or state.segment[s] == 0:
+    for s in range(run.problem.law.size):
+        if tables.bend[s] == 0.0 or run.state.segment[s] == 0:
             continue
-        values, begin = scratch.bend_values, side_at(problem, tables, state, s, state.x, scratch.trial)
-        motion = motion_of(problem, scratch, s)
-        above(motion[0], problem.knots[s, 0], scratch.clipped)
-        _sides(tables, state, s, S, scratch.clipped, motion[1], values)
-        values[S] = side_at(problem, tables, state, s, scratch.x_new, scratch.trial)
+        values, begin = scratch.bend_values, side_at(run, s, run.state.x, scratch.trial)
+        motion = motion_of(run, s)
+        above(motion[0], run.problem.knots[s, 0], scratch.clipped)
+        _sides(run, s, S, scratch.clipped, motion[1], values)
+        values[S] = side_at(run, s, scratch.x_new, scratch.trial)
         largest = abs(begin)
         for i in range(S + 1):
             largest = max(largest, abs(values[i]))
@@ -281,9 +290,9 @@ def first_bend(problem, tables, state, scratch, node_set, level, is_new):
         begins_on = scratch.side[s] * begin < 0.0 or (is_new and abs(begin) <= ON_BORDER * largest)
         if begins_on and scratch.side[s] * values[0] < -ROUNDING * largest:
             scratch.side[s] = -scratch.side[s]
-        time = _bend_at_nodes(tables, scratch, node_set, h, s, begin, largest)
+        time = _bend_at_nodes(run, node_set, h, s, begin, largest)
         if time == np.inf:
-            time = _bend_between_nodes(problem, tables, state, scratch, node_set, h, s, begin, largest)
+            time = _bend_between_nodes(run, node_set, h, s, begin, largest)
         if time < first:
             first, stop = time, s
             scratch.bend_values[S + 1] = largest
@@ -291,11 +300,11 @@ def first_bend(problem, tables, state, scratch, node_set, level, is_new):
 
 
 @inlined
-def _bend_at_nodes(tables, scratch, node_set, h, s, begin, largest):
+def _bend_at_nodes(run, node_set, h, s, begin, largest):
     """Time after the start at which the event function of stop s has changed sides at a node or the end, or inf."""
-    values, side, before, t = scratch.bend_values, scratch.side[s], begin, 0.0
+    values, side, before, t = run.scratch.bend_values, run.scratch.side[s], begin, 0.0
     for i in range(S + 1):
-        after = h * tables.times[node_set, i] if i < S else h
+        after = h * run.tables.times[node_set, i] if i < S else h
         if side * values[i] < -ROUNDING * largest:
             share = before / (before - values[i]) if side * before > 0.0 else 0.0
             return t + share * (after - t)
@@ -304,32 +313,34 @@ def _bend_at_nodes(tables, scratch, node_set, h, s, begin, largest):
 
 
 @inner
-def _bend_between_nodes(problem, tables, state, scratch, node_set, h, s, begin, largest):
+def _bend_between_nodes(run, node_set, h, s, begin, largest):
     """The time of a minimum between nodes on the wrong side, where all nodes are on the right one; or inf."""
+    scratch = run.scratch
     values, side, there = scratch.bend_values, scratch.side[s], scratch.numbers
     tolerance = max(ROUNDING * largest, -2.0 * side * begin)
     for i in range(S):
         before, after = values[i - 1] if i > 0 else begin, values[i + 1]
         if side * values[i] > min(side * before, side * after, WATCHED_BELOW * largest):
             continue
-        motion_around(problem, tables, state, scratch, node_set, h, s, i)
-        above(scratch.local_motion[DELTAS], problem.knots[s, 0], scratch.clipped)
-        _sides(tables, state, s, S, scratch.clipped, scratch.local_motion[RATES], there)
+        motion_around(run, node_set, h, s, i)
+        above(scratch.local_motion[DELTAS], run.problem.knots[s, 0], scratch.clipped)
+        _sides(run, s, S, scratch.clipped, scratch.local_motion[RATES], there)
         for j in range(S):
             there[j] *= -side
         deep, place = maximum_and_place(there, 1.0, scratch.clipped)
         if deep > tolerance and place > LOCAL[0]:
-            return time_of_place(tables, node_set, h, i, place)
+            return time_of_place(run.tables, node_set, h, i, place)
     return np.inf
 
 
 @inlined
-def _leaves_on_landing(problem, state, s, w, x, slopes, long):
+def _leaves_on_landing(run, s, w, x, slopes, long):
     """Stop s if its δ has left its segment where a landing ends, `TOO_LONG` if it has done so in between, or `CLEAR`.
 
     ``slopes`` are its δ̇ in the states w and x; a landing that is not ``long`` is not looked into.
     """
-    width, segment = state.x.size, state.segment[s]
+    problem = run.problem
+    width, segment = run.state.x.size, run.state.segment[s]
     a, b, tolerance = indentation(problem, s, w), indentation(problem, s, x), surface_tolerance(problem, s, x)
     upper = problem.knots[s, segment] + tolerance
     lower = problem.knots[s, segment - 1] - tolerance if segment > 0 else -np.inf
@@ -341,78 +352,82 @@ def _leaves_on_landing(problem, state, s, w, x, slopes, long):
 
 
 @inlined
-def _crosses_bend(problem, tables, state, scratch, s, w, x):
+def _crosses_bend(run, s, w, x):
     """Whether a stop crosses its bend on a landing that is not on it."""
+    problem, scratch = run.problem, run.scratch
     side = scratch.side[s]
-    before = side * side_at(problem, tables, state, s, w, scratch.trial)
-    if side * side_at(problem, tables, state, s, x, scratch.trial) < -_AS_ANOTHER_LANDS * abs(before):
+    before = side * side_at(run, s, w, scratch.trial)
+    if side * side_at(run, s, x, scratch.trial) < -_AS_ANOTHER_LANDS * abs(before):
         return True
-    turns = tables.bend[s] == RATE and not is_circle(problem, s)
-    return turns and _turns_inside(problem, scratch.stages, s, side, _AS_ANOTHER_LANDS * abs(before), state.x.size)
+    turns = run.tables.bend[s] == RATE and not is_circle(problem, s)
+    return turns and _turns_inside(problem, scratch.stages, s, side, _AS_ANOTHER_LANDS * abs(before), run.state.x.size)
 
 
 @inlined
-def _passes_cut(problem, tables, state, scratch, stop, s, w, x):
+def _passes_cut(run, stop, s, w, x):
     """Whether a force that is cut at zero falls to zero, or is no longer cut, on a landing of ``stop`` on a knot.
 
     The force of a light dashpot may change its sign behind the last stage.
     """
-    if _pulls_inside(scratch.stages, work_column(problem, s) + 1, state.x.size):
+    scratch = run.scratch
+    if _pulls_inside(scratch.stages, work_column(run.problem, s) + 1, run.state.x.size):
         return True
     if s != stop:
         return False
     if scratch.side[s] > 0.0:
-        return side_at(problem, tables, state, s, x, scratch.trial) < 0.0
-    return scratch.side[s] < 0.0 and _pushes_at_end(problem, tables, state, scratch, s, w, x)
+        return side_at(run, s, x, scratch.trial) < 0.0
+    return scratch.side[s] < 0.0 and _pushes_at_end(run, s, w, x)
 
 
 @inlined
-def _peaks_on_landing(problem, tables, state, scratch, stop, s, slopes):
+def _peaks_on_landing(run, stop, s, slopes):
     """Whether δ or the force of stop s has a maximum inside a landing; δ of one with a bend at δ̇ = 0 may end on it."""
     # a law that opens may have a border where δ̇ falls to zero
-    rest = -_AS_ANOTHER_LANDS * slopes[0] if problem.opening[s] >= 0 else 0.0
-    if slopes[0] > 0.0 and slopes[1] < rest and (s != stop or tables.bend[s] != RATE):
+    rest = -_AS_ANOTHER_LANDS * slopes[0] if run.problem.opening[s] >= 0 else 0.0
+    if slopes[0] > 0.0 and slopes[1] < rest and (s != stop or run.tables.bend[s] != RATE):
         return True
-    column, known = work_column(problem, s) + 1, state.active[s, PEAK_FORCE]
-    return force_turns(scratch.stages, column, state.x.size, known, 1.0)
+    column, known = work_column(run.problem, s) + 1, run.state.active[s, PEAK_FORCE]
+    return force_turns(run.scratch.stages, column, run.state.x.size, known, 1.0)
 
 
 @inner
-def before_landing(problem, tables, state, scratch, stop, bends, w, x):
+def before_landing(run, stop, bends, w, x):
     """Whether anything but the landing of ``stop`` happens between the states w and x, which end in times.
 
     Returns `CLEAR`, `TOO_LONG`, or another stop that has left its segment. ``bends`` tells that the landing is on a
     bend or border; then a maximum of δ of ``stop`` counts, too. No peak may lie inside a landing, which has no dense
     output.
     """
-    width = state.x.size
+    problem, tables = run.problem, run.tables
+    width = run.state.x.size
     long = x[width] - w[width] > 4.0 * shortest_step(tables)
     for s in range(problem.law.size):
         slopes = 0.0, 0.0
         if s != stop or bends:
             slopes = indentation_rate(problem, s, w), indentation_rate(problem, s, x)
         if s != stop:
-            found = _leaves_on_landing(problem, state, s, w, x, slopes, long)
+            found = _leaves_on_landing(run, s, w, x, slopes, long)
             if found != CLEAR:
                 return found
-        if not long or state.segment[s] == 0 or is_open(problem, s) or not begins_and_ends(problem, s):
+        if not long or run.state.segment[s] == 0 or is_open(problem, s) or not begins_and_ends(problem, s):
             continue
-        if s != stop and tables.bend[s] > 0.0 and _crosses_bend(problem, tables, state, scratch, s, w, x):
+        if s != stop and tables.bend[s] > 0.0 and _crosses_bend(run, s, w, x):
             return TOO_LONG
-        if not bends and tables.bend[s] == FORCE and _passes_cut(problem, tables, state, scratch, stop, s, w, x):
+        if not bends and tables.bend[s] == FORCE and _passes_cut(run, stop, s, w, x):
             return TOO_LONG
-        if _peaks_on_landing(problem, tables, state, scratch, stop, s, slopes):
+        if _peaks_on_landing(run, stop, s, slopes):
             return TOO_LONG
     return CLEAR
 
 
 @merged
-def _pushes_at_end(problem, tables, state, scratch, s, w, x):
+def _pushes_at_end(run, s, w, x):
     """Whether a law that is cut at zero in the state w pushes just inside of where a landing ends, in the state x."""
-    batch = scratch.trial
+    problem = run.problem
+    batch = run.scratch.trial
     batch[0] = max(indentation(problem, s, x), _JUST_INSIDE * indentation(problem, s, w))
     batch[1] = indentation_rate(problem, s, x)
-    _sides(tables, state, s, 1, batch[0:1], batch[1:2], batch[2:3])
+    _sides(run, s, 1, batch[0:1], batch[1:2], batch[2:3])
     return batch[2] > 0.0
 
 

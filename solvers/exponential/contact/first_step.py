@@ -38,12 +38,13 @@ _PRESSED_SHARE = 1e-3  # of `pressed_speed` as a reference speed: a stop at rest
 
 
 @part(BEGIN, types.void, types.int64)
-def begin_steps(problem, tables, state, scratch, stop):
+def begin_steps(run, stop):
     """Set reference speeds, level and nodes of the next step after ``stop`` has entered, changed its segment, or left.
 
     The reference speed of a stop that enters or is open is the largest of |δ̇|, a tenth of the bound of |δ̇| by the
     energy of the blocks, and 1e-3 of `pressed_speed`, m/s.
     """
+    problem, state, scratch = run.problem, run.state, run.scratch
     control, others = scratch.control, False
     energy_norms(problem, state.x, scratch.norms)
     for s in range(problem.law.size):
@@ -52,36 +53,36 @@ def begin_steps(problem, tables, state, scratch, stop):
         if in_contact_before:
             scratch.reference_speed[s] = max(scratch.reference_speed[s], speed)
         else:
-            reached = 0.1 * dot(tables.rate_weight[row_of(problem, s)], scratch.norms, problem.k.size)
+            reached = 0.1 * dot(run.tables.rate_weight[row_of(problem, s)], scratch.norms, problem.k.size)
             if is_circle(problem, s) or rubs(problem, s):
-                second = dot(tables.rate_weight[row_of(problem, s) + 1], scratch.norms, problem.k.size)
+                second = dot(run.tables.rate_weight[row_of(problem, s) + 1], scratch.norms, problem.k.size)
                 reached = math.hypot(reached, 0.1 * second)
-            pressed = _PRESSED_SHARE * pressed_speed(problem, tables, state, s, scratch.trial)
+            pressed = _PRESSED_SHARE * pressed_speed(run, s, scratch.trial)
             scratch.reference_speed[s] = max(speed, reached, pressed, _LEAST_SPEED)
         for j in range(problem.border_count[s] if s == stop or not in_contact_before else 0):
             scratch.noise[s, j] = UNKNOWN
         others |= in_contact_before
     control[NODE_SET], control[NEW] = 0, SEGMENT
     if state.segment[stop] > 0 and state.active[stop, T_IN] == state.now[T]:
-        wanted = _first_step(problem, tables, state, scratch, stop)
+        wanted = _first_step(run, stop)
         control[NEXT_LEVEL] = max(wanted, control[NEXT_LEVEL]) if others else wanted
-        control[NODE_SET], control[NEW], control[STOP] = entry_nodes(problem, tables, state, stop, wanted), ENTRY, stop
-    choose_sides(problem, tables, state, scratch)
-    state_peaks(problem, state, scratch, state.x)
+        control[NODE_SET], control[NEW], control[STOP] = entry_nodes(run, stop, wanted), ENTRY, stop
+    choose_sides(run)
+    state_peaks(run, state.x)
 
 
 @merged
-def _contact_time(problem, tables, scratch, s, speed):
+def _contact_time(run, s, speed):
     """Duration, s, of an impact at a speed on one stop alone: T = 3.2 δ_m/v, where the law stores the energy at δ_m."""
     speed = max(speed, _LEAST_SPEED)
-    accelerance = max(own_accelerance(problem, tables, s), 1e-300)
+    accelerance = max(own_accelerance(run, s), 1e-300)
     target = 0.5 * speed * speed / accelerance
-    law, p = tables.power_law[s], tables.exponent[s]
+    law, p = run.tables.power_law[s], run.tables.exponent[s]
     if law[EXPONENT] > 0.0 and law[STIFFNESS] > 0.0:
         return 3.2 * (target * (p + 1.0) / law[STIFFNESS]) ** (1.0 / (p + 1.0)) / speed
     deepest = 1e-3 * speed
     for _ in range(4):
-        energy = force_at(problem, s, deepest, 0.0, speed, scratch.trial) * deepest / (p + 1.0)
+        energy = force_at(run.problem, s, deepest, 0.0, speed, run.scratch.trial) * deepest / (p + 1.0)
         if not energy > 0.0 or abs(target - energy) < 0.1 * target:
             break
         deepest *= (target / energy) ** (1.0 / (p + 1.0))
@@ -89,22 +90,24 @@ def _contact_time(problem, tables, scratch, s, speed):
 
 
 @merged
-def _first_step(problem, tables, state, scratch, stop):
+def _first_step(run, stop):
     """Level of the first step of a contact: a share of the duration of an impact on this stop alone."""
-    speed = abs(indentation_rate(problem, stop, state.x))
-    duration = _contact_time(problem, tables, scratch, stop, max(speed, 1e-3 * scratch.reference_speed[stop]))
+    scratch = run.scratch
+    speed = abs(indentation_rate(run.problem, stop, run.state.x))
+    duration = _contact_time(run, stop, max(speed, 1e-3 * scratch.reference_speed[stop]))
     if scratch.first_step_share[stop] == 0.0:
-        scratch.first_step_share[stop] = min(0.1, 4.0 / (tables.fastest * duration))
+        scratch.first_step_share[stop] = min(0.1, 4.0 / (run.tables.fastest * duration))
     scratch.duration[stop] = duration
-    return level_of(tables, scratch.first_step_share[stop] * duration)
+    return level_of(run.tables, scratch.first_step_share[stop] * duration)
 
 
 @merged
-def entry_nodes(problem, tables, state, stop, level):
+def entry_nodes(run, stop, level):
     """Node set of the next step: that of a stop just entered, whose force has broken powers, first ``stop``; else 0."""
-    found, just_now = 0, 1e-6 * tables.contact_step[level]
+    problem, state = run.problem, run.state
+    found, just_now = 0, 1e-6 * run.tables.contact_step[level]
     for s in range(state.segment.size):
-        if state.segment[s] == 1 and tables.time_exponent[1 + s] > 1.0 and (found == 0 or s == stop):
+        if state.segment[s] == 1 and run.tables.time_exponent[1 + s] > 1.0 and (found == 0 or s == stop):
             rate = indentation_rate(problem, s, state.x)
             if indentation(problem, s, state.x) <= just_now * rate + 4.0 * surface_tolerance(problem, s, state.x):
                 found = 1 + s

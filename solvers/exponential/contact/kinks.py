@@ -50,57 +50,59 @@ def _time_to_kink(problem, t, horizon):
 
 
 @inlined
-def _promising(problem, tables, state, scratch, variable):
+def _promising(run, variable):
     """Length, s, of a landing in time above which it would hardly be within the tolerance."""
-    longest = longest_time(problem, tables, state, scratch)
-    for s in range(problem.law.size):
-        if state.segment[s] > 0:
-            longest = min(longest, promising_time(scratch, variable, s))
+    longest = longest_time(run)
+    for s in range(run.problem.law.size):
+        if run.state.segment[s] > 0:
+            longest = min(longest, promising_time(run.scratch, variable, s))
     return longest
 
 
 @merged
-def _land(problem, tables, state, scratch, time):
+def _land(run, time):
     """Try to land a ``time`` ahead; returns whether it was done."""
-    control, stop, variable, span = scratch.control, latest_entered(state), np.int64(TIME), time
+    scratch = run.scratch
+    control, stop, variable, span = scratch.control, latest_entered(run.state), np.int64(TIME), time
     if control[NEW] == ENTRY and control[NODE_SET] > 0:
         stop, variable = control[NODE_SET] - 1, np.int64(SINCE)
-        span = time ** (1.0 / tables.time_exponent[stop + 1])
-    if time > _promising(problem, tables, state, scratch, variable):
+        span = time ** (1.0 / run.tables.time_exponent[stop + 1])
+    if time > _promising(run, variable):
         return False
-    start_landing(problem, tables, state, scratch, stop, variable)
+    start_landing(run, stop, variable)
     w, x = scratch.stages[START], scratch.stages[LANDED]
-    take_step(problem, tables, state, scratch, variable, stop, span)
-    if not error_in_time(problem, state, scratch, time) <= 1.0:
+    take_step(run, variable, stop, span)
+    if not error_in_time(run, time) <= 1.0:
         return False
-    if before_landing(problem, tables, state, scratch, np.int64(-1), np.bool_(1), w, x) != CLEAR:
+    if before_landing(run, np.int64(-1), np.bool_(1), w, x) != CLEAR:
         return False
-    if problem.parts[PASSED] and passed(problem, state, scratch, np.int64(-1), np.int64(-1), w, x)[0] != -1:
+    if run.problem.parts[PASSED] and passed(run, np.int64(-1), np.int64(-1), w, x)[0] != -1:
         return False
-    return accept_landing(problem, tables, state, scratch, variable, stop, np.inf, span)
+    return accept_landing(run, variable, stop, np.inf, span)
 
 
 @part(TO_KINK, REAL, REAL)
-def step_to_kink(problem, tables, state, scratch, horizon):
+def step_to_kink(run, horizon):
     """Time, s, to the next kink of a sampled load, inf if that is beyond the ``horizon``; 0 if the step was done."""
-    time, control = _time_to_kink(problem, state.now[T], horizon), scratch.control
-    if time == np.inf or not _land(problem, tables, state, scratch, time):
+    state = run.state
+    time, control = _time_to_kink(run.problem, state.now[T], horizon), run.scratch.control
+    if time == np.inf or not _land(run, time):
         return time
     state.count[STEPS] += 1
     control[NEW] = SEGMENT
-    control[NODE_SET] = entry_nodes(problem, tables, state, latest_entered(state), control[NEXT_LEVEL])
+    control[NODE_SET] = entry_nodes(run, latest_entered(state), control[NEXT_LEVEL])
     return 0.0
 
 
 @inner
-def land_on_kink_or_limit(problem, tables, state, scratch, level):
+def land_on_kink_or_limit(run, level):
     """Longest step, s, that sampled loads allow; 0 if a step to their next kink has been done.
 
     It ends at this kink, if a step of a level reaches so far, and at most a cell beyond the end of the run.
     """
-    remaining = state.now[T_END] - state.now[T]
-    longest = remaining + problem.table_dt[0]
-    if problem.table.shape[1] > 3:
-        horizon = min(tables.contact_step[level], remaining)
-        longest = min(longest, step_to_kink(problem, tables, state, scratch, horizon))
+    remaining = run.state.now[T_END] - run.state.now[T]
+    longest = remaining + run.problem.table_dt[0]
+    if run.problem.table.shape[1] > 3:
+        horizon = min(run.tables.contact_step[level], remaining)
+        longest = min(longest, step_to_kink(run, horizon))
     return longest

@@ -9,7 +9,6 @@ from numba import types
 
 from solvers.compiled.dop853_tableau import STAGES, A
 from solvers.compiled.kernels import (
-    INTEGERS,
     MATRIX,
     REAL,
     VECTOR,
@@ -50,12 +49,18 @@ _CHOICE = types.boolean, types.int64, types.int64, types.int64  # with_energy, c
 
 
 @inner
-def _force_of_law(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batch):
+def _force_of_law(run, s, delta, delta_dot, side, batch):
     """Force, N, of stop s by its law's compiled function, which is evaluated within its segment, not on a knot.
 
     A law cut at zero is taken without the cut if the step begins on its pushing side, ``side`` > 0, else as zero.
     """
-    batch[0], batch[1], batch[2] = off_knots(problem, s, segment, max(delta, problem.knots[s, 0])), delta_dot, 0.0
+    problem, tables = run.problem, run.tables
+    entry_rate = run.state.entry_rate[s]
+    batch[0], batch[1], batch[2] = (
+        off_knots(problem, s, run.state.segment[s], max(delta, problem.knots[s, 0])),
+        delta_dot,
+        0.0,
+    )
     if tables.bend[s] != FORCE:
         law_forces(problem, s, 1, batch[0:1], batch[1:2], entry_rate, batch[2:3])
     elif side > 0.0:
@@ -64,16 +69,18 @@ def _force_of_law(problem, tables, s, segment, delta, delta_dot, side, entry_rat
 
 
 @merged
-def _force(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batch):
+def _force(run, s, delta, delta_dot, side, batch):
     """Force, N, of stop s; power laws are evaluated here, others called. No cut at zero acts within the step."""
+    tables = run.tables
     if tables.power_law[s, EXPONENT] > 0.0 and (tables.bend[s] != FORCE or side > 0.0):
-        return power_force(tables, s, max(delta, 0.0), delta_dot, entry_rate)
-    return _force_of_law(problem, tables, s, segment, delta, delta_dot, side, entry_rate, batch)
+        return power_force(tables, s, max(delta, 0.0), delta_dot, run.state.entry_rate[s])
+    return _force_of_law(run, s, delta, delta_dot, side, batch)
 
 
 @merged
-def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_rate, side, out, batch):
+def _rate(run, with_energy, variable, stop, span, w, side, out, batch):
     """Write d[state, t, u]/d(variable) × ``span`` at w = [state, t, u] into ``out``; returns the law calls."""
+    problem, segment = run.problem, run.state.segment
     n, calls, pace = problem.k.size, 0, np.nan
     size, t = 2 * n, width_of(problem)
     for b in range(n):
@@ -83,7 +90,7 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
         value, load = table_value(problem, j, w[t]), problem.load[problem.table_load[j]]
         for e in range(size):
             out[e] += load[e] * value
-    out[size], out[size + 1] = powers(problem, tables, w[t], w) if with_energy else (0.0, 0.0)
+    out[size], out[size + 1] = powers(run, w[t], w) if with_energy else (0.0, 0.0)
     for s in range(problem.law.size):
         force, rate, rows = 0.0, 0.0, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         if segment[s] > 0:
@@ -92,7 +99,7 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
                 delta, rate = delta_of(radius_of(problem, s), rows)
             else:
                 delta, rate = indentation_and_rate(problem, s, w)
-            force = _force(problem, tables, s, segment[s], delta, rate, side[s], entry_rate[s], batch)
+            force = _force(run, s, delta, rate, side[s], batch)
             calls += 1
             if s == stop:
                 pace = rate
@@ -106,7 +113,7 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
         out[work], out[work + 1] = force * rate, force
     factor = span
     if variable in (ROOT, SINCE):
-        kappa = tables.time_exponent[1 + stop]
+        kappa = run.tables.time_exponent[1 + stop]
         factor = factor * kappa * raised(w[t + 1], kappa - 1.0)
     if variable in (INDENTATION, ROOT):
         factor /= pace if segment[stop] > 0 else indentation_rate(problem, stop, w)
@@ -117,8 +124,8 @@ def _rate(problem, tables, with_energy, variable, stop, span, w, segment, entry_
     return calls
 
 
-@part(LANDING_STEP, types.int64, *_CHOICE, REAL, VECTOR, INTEGERS, VECTOR, VECTOR, MATRIX)
-def landing_step(problem, tables, with_energy, count, variable, stop, span, w, segment, entry_rate, side, work):
+@part(LANDING_STEP, types.int64, *_CHOICE, REAL, VECTOR, VECTOR, MATRIX)
+def landing_step(run, with_energy, count, variable, stop, span, w, side, work):
     """One step of ``count`` stages and length ``span`` in the variable from ``w`` to ``work[LANDED]``; law calls.
 
     Its order is 8 with the stages of DOP853, which stay in ``work``; 2 with two of the midpoint rule or 4 with four of
@@ -130,19 +137,18 @@ def landing_step(problem, tables, with_energy, count, variable, stop, span, w, s
     for i in range(count):
         combine(stages, tableau[i], i, w, trial)
         counts = with_energy and tableau[count, i] != 0.0  # in the balance, whose own rates it does not change
-        calls += _rate(
-            problem, tables, counts, variable, stop, span, trial, segment, entry_rate, side, stages[i], batch
-        )
+        calls += _rate(run, counts, variable, stop, span, trial, side, stages[i], batch)
     combine(stages, tableau[count], count, w, trial)
     return calls
 
 
 @inner
-def start_landing(problem, tables, state, scratch, stop, variable):
+def start_landing(run, stop, variable):
     """Write [state, t, u] at the start of a landing of ``stop`` into ``scratch.stages[START]``; u is 0 for `SINCE`."""
-    w, size, delta = scratch.stages[START], state.x.size, max(indentation(problem, stop, state.x), 0.0)
+    state = run.state
+    w, size, delta = run.scratch.stages[START], state.x.size, max(indentation(run.problem, stop, state.x), 0.0)
     copy(state.x, w, size)
-    kappa, root = tables.time_exponent[1 + stop], math.sqrt(delta)
+    kappa, root = run.tables.time_exponent[1 + stop], math.sqrt(delta)
     w[size], w[size + 1] = state.now[T], root if kappa == 2.0 else delta ** (1.0 / kappa)
     if variable == SINCE:
         w[size + 1] = 0.0

@@ -37,29 +37,30 @@ def enters(problem, node_set, u):
 
 
 @inlined
-def weighting_of(problem, tables, node_set, u):
+def weighting_of(run, node_set, u):
     """Index of the weighting of input u, a force or signal, on a step with these nodes."""
-    return tables.entering[node_set] if enters(problem, node_set, u) else tables.kind[node_set]
+    return run.tables.entering[node_set] if enters(run.problem, node_set, u) else run.tables.kind[node_set]
 
 
 @merged
-def pair_response(problem, tables, scratch, node_set, level, r, u):
+def pair_response(run, node_set, level, r, u):
     """(S, 2S): displacement and rate of row r at the nodes from the node values of input u."""
-    weighting = weighting_of(problem, tables, node_set, u)
-    if uses_blocks(tables):
-        matrix = scratch.pair_pool[_pool_index(problem, tables, scratch, weighting, level, r, u)]
+    weighting = weighting_of(run, node_set, u)
+    if uses_blocks(run.tables):
+        matrix = run.scratch.pair_pool[_pool_index(run, weighting, level, r, u)]
     else:
-        matrix = tables.forced[weighting, level, u, r]
+        matrix = run.tables.forced[weighting, level, u, r]
     return matrix
 
 
 @part(PAIR, types.int64, *[types.int64] * 4)
-def _pool_index(problem, tables, scratch, weighting, level, r, u):
+def _pool_index(run, weighting, level, r, u):
     """Index of the same response in ``scratch.pair_pool``; it replaces another pair with the same index if need be."""
-    key = ((weighting * tables.contact_step.size + level) * problem.gap.size + r) * scratch.force.shape[0] + u + 1
+    problem, scratch = run.problem, run.scratch
+    key = ((weighting * run.tables.contact_step.size + level) * problem.gap.size + r) * scratch.force.shape[0] + u + 1
     place = key % scratch.pool_keys.size
     if scratch.pool_keys[place] != key:
-        rows = tables.block_response[weighting, level]
+        rows = run.tables.block_response[weighting, level]
         fill_pair(
             *(problem.k, problem.c, push_of(problem, u), problem.read[r], problem.read_rate[r]),
             *(rows, scratch.pair_weights, scratch.pair_pool[place]),
@@ -69,10 +70,11 @@ def _pool_index(problem, tables, scratch, weighting, level, r, u):
 
 
 @part(FREE_BLOCKS, types.void, types.int64, types.int64, VECTOR)
-def free_block_motion(problem, tables, scratch, node_set, level, x):
+def free_block_motion(run, node_set, level, x):
     """Write p and v of all blocks at the nodes, from the state x at the start of the step and without forces."""
-    n, block_motion = problem.k.size, scratch.block_motion
-    ahead = tables.node_propagator[tables.kind[node_set], level]
+    problem = run.problem
+    n, block_motion = problem.k.size, run.scratch.block_motion
+    ahead = run.tables.node_propagator[run.tables.kind[node_set], level]
     for b in range(n):
         p, v = splat8(x[b]), splat8(x[n + b])
         alpha, beta = load8(ahead[0, b], 0), load8(ahead[1, b], 0)
@@ -81,29 +83,31 @@ def free_block_motion(problem, tables, scratch, node_set, level, x):
 
 
 @inner
-def _sum_pushes(problem, tables, state, scratch, force, node_set, group):
+def _sum_pushes(run, force, node_set, group):
     """Rates of the blocks by one group of inputs at the nodes, into ``scratch.block_force``; False if none acts."""
-    rows, size, own, found = problem.gap.size, problem.k.size, tables.block_response.shape[3] // 2, False
+    problem = run.problem
+    rows, size, own, found = problem.gap.size, problem.k.size, run.tables.block_response.shape[3] // 2, False
     for u in range(force.shape[0]):
-        if (u >= rows) != (group == SIGNALS) or (u < rows and not acts(problem, state, u)):
+        if (u >= rows) != (group == SIGNALS) or (u < rows and not acts(problem, run.state, u)):
             continue
         if enters(problem, node_set, u) != (group == ENTERING):
             continue
         push = push_of(problem, u)
         values = load8(force[u], 0)
         for e in range(2 * own):
-            before = load8(scratch.block_force[e], 0) if found else splat8(0.0)
-            store8(scratch.block_force[e], 0, before + splat8(push[e if e < own else e - own + size]) * values)
+            before = load8(run.scratch.block_force[e], 0) if found else splat8(0.0)
+            store8(run.scratch.block_force[e], 0, before + splat8(push[e if e < own else e - own + size]) * values)
         found = True
     return found
 
 
 @part(PUSHED_BLOCKS, types.void, *[types.int64] * 3, MATRIX)
-def add_block_motion(problem, tables, state, scratch, node_set, level, group, motion):
+def add_block_motion(run, node_set, level, group, motion):
     """Add the response to one group of inputs, signals or forces, to the blocks' motion at the nodes."""
-    if not _sum_pushes(problem, tables, state, scratch, scratch.force, node_set, group):
+    problem, tables = run.problem, run.tables
+    if not _sum_pushes(run, run.scratch.force, node_set, group):
         return
-    n, own, block_force = problem.k.size, tables.block_response.shape[3] // 2, scratch.block_force
+    n, own, block_force = problem.k.size, tables.block_response.shape[3] // 2, run.scratch.block_force
     weighting = tables.entering[node_set] if group == ENTERING else tables.kind[node_set]
     for j in range(S):
         rows = tables.block_response[weighting, level, j]
@@ -116,50 +120,54 @@ def add_block_motion(problem, tables, state, scratch, node_set, level, group, mo
 
 
 @part(PUSHED_END, types.void, MATRIX, types.int64, types.int64, VECTOR)
-def add_end_response(problem, tables, state, scratch, force, node_set, level, x):
+def add_end_response(run, force, node_set, level, x):
     """Add the response to all forces and signals, at the end of the step, to the state x."""
+    problem, tables = run.problem, run.tables
     n, own = problem.k.size, tables.block_response.shape[3] // 2
     for group in range(0 if problem.table_dt.size else 1, 3):
-        if not _sum_pushes(problem, tables, state, scratch, force, node_set, group):
+        if not _sum_pushes(run, force, node_set, group):
             continue
         weighting = tables.entering[node_set] if group == ENTERING else tables.kind[node_set]
         ending = tables.block_end_response[weighting, level]
         for b in range(own):
-            p, v = load8(scratch.block_force[b], 0), load8(scratch.block_force[own + b], 0)
+            p, v = load8(run.scratch.block_force[b], 0), load8(run.scratch.block_force[own + b], 0)
             alpha, beta = load8(ending[0, b], 0), load8(ending[1, b], 0)
             x[b] += sum8(alpha * p + beta * v)
             x[n + b] += sum8(alpha * v - beta * (splat8(problem.k[b]) * p + splat8(problem.c[b]) * v))
 
 
 @inlined
-def prefers_blocks(problem, tables, state):
+def prefers_blocks(run):
     """Whether sums over the blocks take less time than sums over all pairs of rows in contact."""
+    problem = run.problem
     n, active = problem.k.size, 0
-    if not uses_blocks(tables):
+    if not uses_blocks(run.tables):
         return False
     for r in range(problem.gap.size):
-        active += 1 if acts(problem, state, r) else 0
+        active += 1 if acts(problem, run.state, r) else 0
     return active > FEW_AT_ONCE and S * active * active > 3 * n * (active + S)
 
 
 @inner
-def respond_through_blocks(problem, tables, state, scratch, node_set, level):
+def respond_through_blocks(run, node_set, level):
     """Displacement and rate of all rows in contact at the nodes under the present forces, into ``scratch.motion``."""
+    problem, scratch = run.problem, run.scratch
     size, moved = 2 * problem.k.size, scratch.along
     for e in range(size):
         store8(moved[e], 0, splat8(0.0))
-    add_block_motion(problem, tables, state, scratch, node_set, level, CONTINUING, moved)
-    add_block_motion(problem, tables, state, scratch, node_set, level, ENTERING, moved)
+    add_block_motion(run, node_set, level, CONTINUING, moved)
+    add_block_motion(run, node_set, level, ENTERING, moved)
     for r in range(problem.gap.size):
-        if acts(problem, state, r):
+        if acts(problem, run.state, r):
             combine(moved, problem.read[r], size, scratch.free[r, 0], scratch.motion[r, 0])
             combine(moved, problem.read_rate[r], size, scratch.free[r, 1], scratch.motion[r, 1])
 
 
 @part(STOP_AT_NODES, types.void, types.int64, REAL, MATRIX)
-def motion_at_nodes(problem, scratch, r, gap, out):
+def motion_at_nodes(run, r, gap, out):
     """Displacement less ``gap``, and rate, of row r at the nodes from the motion of the blocks."""
+    problem = run.problem
     size = 2 * problem.k.size
     store8(out[0], 0, splat8(-gap))
-    combine(scratch.block_motion, problem.read[r], size, out[0], out[0])
-    combine(scratch.block_motion, problem.read_rate[r], size, None, out[1])
+    combine(run.scratch.block_motion, problem.read[r], size, out[0], out[0])
+    combine(run.scratch.block_motion, problem.read_rate[r], size, None, out[1])

@@ -19,11 +19,12 @@ _MOST_NOISE = 1e-3  # of a force by rounding of δ̇; iterates that come down fr
 
 
 @inner
-def linearise(problem, tables, state, scratch, node_set, level):
+def linearise(run, node_set, level):
     """Write J = 1 - ∂law/∂(δ, δ̇) ∂(δ, δ̇)/∂F, over nodes and rows in contact, into ``scratch.jacobian``; its size."""
+    problem, state = run.problem, run.state
     for s in range(problem.law.size):
         if state.segment[s] > 0:
-            law_slopes_at_nodes(problem, state, scratch, s)
+            law_slopes_at_nodes(run, s)
             state.count[CALLS] += S
     size = 0
     for r in range(problem.gap.size):
@@ -31,27 +32,28 @@ def linearise(problem, tables, state, scratch, node_set, level):
             s = element_of(problem, r)
             if rubs(problem, s):
                 if r == row_of(problem, s):
-                    linearise_rubbing(problem, tables, state, scratch, node_set, level, s, size)
+                    linearise_rubbing(run, node_set, level, s, size)
             elif not is_circle(problem, s):
-                _linearise_row(problem, tables, state, scratch, node_set, level, r, size)
+                _linearise_row(run, node_set, level, r, size)
             elif r == row_of(problem, s):
-                linearise_circle(problem, tables, state, scratch, node_set, level, s, size)
+                linearise_circle(run, node_set, level, s, size)
             size += S
     return size
 
 
 @inner
-def _linearise_row(problem, tables, state, scratch, node_set, level, r, begin):
+def _linearise_row(run, node_set, level, r, begin):
     """Write the S rows of J that belong to row r, from its row ``begin`` on."""
-    slope, pushes, column = scratch.slope[element_of(problem, r)], r == row_of(problem, element_of(problem, r)), 0
+    problem = run.problem
+    slope, pushes, column = run.scratch.slope[element_of(problem, r)], r == row_of(problem, element_of(problem, r)), 0
     for u in range(problem.gap.size):
-        if not acts(problem, state, u):
+        if not acts(problem, run.state, u):
             continue
-        matrix = pair_response(problem, tables, scratch, node_set, level, r, u)
+        matrix = pair_response(run, node_set, level, r, u)
         for i in range(S):
             for j in range(S):
                 value = slope[0, i] * matrix[j, i] + slope[1, i] * matrix[j, S + i] if pushes else 0.0
-                scratch.jacobian[begin + i, column + j] = (1.0 if r == u and i == j else 0.0) - value
+                run.scratch.jacobian[begin + i, column + j] = (1.0 if r == u and i == j else 0.0) - value
         column += S
 
 
@@ -88,34 +90,36 @@ def substitute(matrix, pivots, n, x):
 
 
 @merged
-def _store_rate_slopes(state, scratch):
+def _store_rate_slopes(run):
     """Largest |∂F/∂δ̇| at the nodes of every stop in contact, N s/m, into ``scratch.viscous``."""
-    for s in range(state.segment.size):
-        if state.segment[s] > 0:
+    scratch = run.scratch
+    for s in range(run.state.segment.size):
+        if run.state.segment[s] > 0:
             scratch.viscous[s] = 0.0
             for i in range(S):
                 scratch.viscous[s] = max(scratch.viscous[s], abs(scratch.slope[s, 1, i]))
 
 
 @part(NEWTON, types.boolean, types.int64, types.int64)
-def newton(problem, tables, state, scratch, node_set, level):
+def newton(run, node_set, level):
     """Solve for the forces by Newton's method, where fixed-point iteration diverges; whether it converged."""
+    problem, state, scratch = run.problem, run.state, run.scratch
     for _ in range(MOST_ITERATIONS):
         place = 0
-        respond_all(problem, tables, state, scratch, node_set, level)
+        respond_all(run, node_set, level)
         for s in range(problem.law.size):
             if state.segment[s] == 0:
                 continue
-            node_forces(problem, tables, state, scratch, s)
+            node_forces(run, s)
             for r in range(row_of(problem, s), row_of(problem, s + 1)):
                 for i in range(S):
                     scratch.residual[place + i] = scratch.law_force[r, i] - scratch.force[r, i]
                 place += S
-        n = linearise(problem, tables, state, scratch, node_set, level)
+        n = linearise(run, node_set, level)
         factorise(scratch.jacobian, scratch.pivots, n)
         substitute(scratch.jacobian, scratch.pivots, n, scratch.residual)
         found, place = True, 0
-        _store_rate_slopes(state, scratch)
+        _store_rate_slopes(run)
         for r in range(problem.gap.size):
             s = element_of(problem, r)
             if state.segment[s] == 0:

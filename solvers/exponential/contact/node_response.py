@@ -146,12 +146,13 @@ class Scratch(NamedTuple):
 
 
 @merged
-def sample_signals(problem, tables, scratch, node_set, t, h):
+def sample_signals(run, node_set, t, h):
     """Values of the sampled signals at the nodes of a step of length h from time t, into rows of ``scratch.force``."""
+    problem = run.problem
     for j in range(problem.table_dt.size):
         for i in range(S):
-            scratch.force[problem.gap.size + problem.table_load[j], i] = table_value(
-                problem, j, t + h * tables.times[node_set, i]
+            run.scratch.force[problem.gap.size + problem.table_load[j], i] = table_value(
+                problem, j, t + h * run.tables.times[node_set, i]
             )
 
 
@@ -185,34 +186,36 @@ def next_coefficient(coefficients):
 
 
 @inlined
-def error_of_work(problem, state, scratch, s, unresolved, largest, slopes):
+def error_of_work(run, s, unresolved, largest, slopes):
     """Part of a force that a step leaves out, N, in units of its tolerance for the work of an element.
 
     ``slopes`` of the law by δ and δ̇ give the rounding of the force, which is no error of the step.
     """
+    problem, state = run.problem, run.state
     rounding = slopes[0] * surface_tolerance(problem, s, state.x) + slopes[1] * rate_tolerance(problem, s, state.x)
-    allowed = _WORK_TOLERANCE * scratch.accuracy[RTOL] * max(largest, state.active[s, PEAK_FORCE])
+    allowed = _WORK_TOLERANCE * run.scratch.accuracy[RTOL] * max(largest, state.active[s, PEAK_FORCE])
     return max(unresolved - _ROUNDINGS * rounding, 0.0) / allowed
 
 
 @inner
-def unresolved_signal(problem, tables, scratch, node_set, j, t, h):
+def unresolved_signal(run, node_set, j, t, h):
     """Estimate of the part of sampled signal j that its polynomial leaves out; on an entry step at half the order.
 
     What lies between the nodes, such as a short pulse, does not show in the coefficients: there the table is compared.
     Where the table has kinks, the coefficients decay too slowly to show it: there the difference is integrated.
     """
-    values, c = scratch.force[problem.gap.size + problem.table_load[j]], scratch.trial
+    problem = run.problem
+    values, c = run.scratch.force[problem.gap.size + problem.table_load[j]], run.scratch.trial
     largest, dt, start = largest_size(values), problem.table_dt[j], problem.table_start[j]
-    combine(tables.tail[node_set], values, S, None, c)
+    combine(run.tables.tail[node_set], values, S, None, c)
     found = unresolved_part(c, largest, S // 2 if node_set == 0 else 1)
     first, beyond = start + int(t / dt) + 1, min(start + int((t + h) / dt) + 1, problem.table_start[j + 1])
     if beyond - first > S:
-        difference, mean = _between_nodes(problem, c, tables.time_exponent[node_set], j, first, beyond, t, h)
+        difference, mean = _between_nodes(problem, c, run.tables.time_exponent[node_set], j, first, beyond, t, h)
         if difference > _RESOLVED * max(abs(c[2]), abs(c[3])) + 1e-12 * largest:
             found = max(found, mean)
     if _has_kinks(problem, j, first, beyond, largest):
-        found = max(found, _missed_impulse(problem, tables, values, node_set, j, t, h))
+        found = max(found, _missed_impulse(run, values, node_set, j, t, h))
     return found
 
 
@@ -244,8 +247,9 @@ def _has_kinks(problem, j, first, beyond, largest):
 
 
 @inner
-def _missed_impulse(problem, tables, values, node_set, j, t, h):
+def _missed_impulse(run, values, node_set, j, t, h):
     """|mean| over the step of signal less polynomial; on a smooth step also of the difference times 2τ/h - 1."""
+    problem = run.problem
     dt, impulse, moment = problem.table_dt[j], 0.0, 0.0
     last = min(int((t + h) / dt), problem.table_start[j + 1] - problem.table_start[j] - 2)
     for cell in range(min(int(t / dt), last), last + 1):
@@ -256,9 +260,9 @@ def _missed_impulse(problem, tables, values, node_set, j, t, h):
         moment += (b[1] - a[1]) + (cell - (t + 0.5 * h) / dt) * (b[0] - a[0])
     impulse, moment = impulse * dt / h, moment * 2.0 * dt * dt / (h * h)
     for i in range(S):
-        weight = tables.plain[node_set, i]
+        weight = run.tables.plain[node_set, i]
         impulse -= weight * values[i]
-        moment -= weight * (2.0 * tables.times[node_set, i] - 1.0) * values[i]
+        moment -= weight * (2.0 * run.tables.times[node_set, i] - 1.0) * values[i]
     return abs(impulse) + (abs(moment) if node_set == 0 else 0.0)
 
 
@@ -283,26 +287,27 @@ def _legendre(coefficients, x):
 
 
 @inner
-def free_response(problem, tables, state, scratch, node_set, level):
+def free_response(run, node_set, level):
     """Motion of the rows at the nodes without contact forces, but with signals, into ``scratch.free``.
 
     With many rows only those in contact are computed.
     """
+    problem, tables, state, scratch = run.problem, run.tables, run.state, run.scratch
     rows, size, by_blocks = problem.gap.size, 2 * problem.k.size, uses_blocks(tables)
     if is_planar(problem):
         for i in range(S):
             scratch.node_time[i] = state.now[T] + tables.contact_step[level] * tables.times[node_set, i]
     if problem.table_dt.size:
-        sample_signals(problem, tables, scratch, node_set, state.now[T], tables.contact_step[level])
+        sample_signals(run, node_set, state.now[T], tables.contact_step[level])
     if by_blocks:
-        free_block_motion(problem, tables, scratch, node_set, level, state.x)
+        free_block_motion(run, node_set, level, state.x)
         if problem.table_dt.size:
-            add_block_motion(problem, tables, state, scratch, node_set, level, SIGNALS, scratch.block_motion)
+            add_block_motion(run, node_set, level, SIGNALS, scratch.block_motion)
     for r in range(rows):
         free = scratch.free[r]
         if by_blocks:
             if acts(problem, state, r):
-                motion_at_nodes(problem, scratch, r, problem.gap[r], free)
+                motion_at_nodes(run, r, problem.gap[r], free)
             continue
         store8(free[0], 0, splat8(-problem.gap[r]))
         store8(free[1], 0, splat8(0.0))
@@ -313,33 +318,35 @@ def free_response(problem, tables, state, scratch, node_set, level):
 
 
 @inlined
-def respond(problem, tables, state, scratch, node_set, level, r):
+def respond(run, node_set, level, r):
     """Displacement and rate of row r at the nodes under the present forces, into ``scratch.motion``."""
+    scratch = run.scratch
     delta, rate = load8(scratch.free[r, 0], 0), load8(scratch.free[r, 1], 0)
-    for u in range(problem.gap.size):
-        if acts(problem, state, u):
-            rows = pair_response(problem, tables, scratch, node_set, level, r, u)
+    for u in range(run.problem.gap.size):
+        if acts(run.problem, run.state, u):
+            rows = pair_response(run, node_set, level, r, u)
             delta, rate = add_response(rows, scratch.force[u], delta, rate)
     store8(scratch.motion[r, 0], 0, delta)
     store8(scratch.motion[r, 1], 0, rate)
 
 
 @inner
-def respond_all(problem, tables, state, scratch, node_set, level):
+def respond_all(run, node_set, level):
     """The same of all rows in contact, through the blocks if that is cheaper."""
-    if prefers_blocks(problem, tables, state):
-        respond_through_blocks(problem, tables, state, scratch, node_set, level)
+    if prefers_blocks(run):
+        respond_through_blocks(run, node_set, level)
         return
-    for r in range(problem.gap.size):
-        if acts(problem, state, r):
-            respond(problem, tables, state, scratch, node_set, level, r)
+    for r in range(run.problem.gap.size):
+        if acts(run.problem, run.state, r):
+            respond(run, node_set, level, r)
 
 
 @inlined
-def own_accelerance(problem, tables, s):
+def own_accelerance(run, s):
     """-δ̈ of a stop per newton of its own force, 1/kg; of a circle the larger one of its rows."""
-    row = row_of(problem, s)
-    if is_circle(problem, s):
+    tables = run.tables
+    row = row_of(run.problem, s)
+    if is_circle(run.problem, s):
         return max(tables.accelerance[row, row], tables.accelerance[row + 1, row + 1])
     return tables.accelerance[row, row]
 
@@ -351,32 +358,35 @@ def shortest_step(tables):
 
 
 @merged
-def motion_of(problem, scratch, s):
+def motion_of(run, s):
     """(2, S) δ, m, and δ̇, m/s, of stop s at the nodes."""
-    return scratch.motion[place_of(problem, s)]
+    return run.scratch.motion[place_of(run.problem, s)]
 
 
 @merged
-def force_of(problem, scratch, s):
+def force_of(run, s):
     """(S,) force, N, of stop s at the nodes; of a circle that along the radius."""
+    problem, scratch = run.problem, run.scratch
     return scratch.force[row_of(problem, s)] if not is_circle(problem, s) else scratch.law_force[place_of(problem, s)]
 
 
 @inlined
-def law_slopes_at_nodes(problem, state, scratch, s):
+def law_slopes_at_nodes(run, s):
     """Derivatives of the law of stop s at the nodes by δ, δ̇ and entry rate, into ``scratch.slope``."""
-    motion, slope = motion_of(problem, scratch, s), scratch.slope[s]
+    scratch = run.scratch
+    motion, slope = motion_of(run, s), scratch.slope[s]
     copy(motion[0], scratch.clipped, S)
-    contact_gradient(problem, s, scratch.clipped, motion[1], state.entry_rate[s], slope[0], slope[1], slope[2])
+    contact_gradient(run.problem, s, scratch.clipped, motion[1], run.state.entry_rate[s], slope[0], slope[1], slope[2])
 
 
 @inlined
-def ripple_of_stop(problem, tables, s, alias, x):
+def ripple_of_stop(run, s, alias, x):
     """Error of a stop's indentation between the nodes by fast blocks, m; see `ripple_of`."""
+    problem = run.problem
     row, n = row_of(problem, s), problem.k.size
-    ripple = ripple_of(tables.ripple_weight[row], alias, x, n)
+    ripple = ripple_of(run.tables.ripple_weight[row], alias, x, n)
     if is_circle(problem, s):
-        ripple += ripple_of(tables.ripple_weight[row + 1], alias, x, n)
+        ripple += ripple_of(run.tables.ripple_weight[row + 1], alias, x, n)
     return ripple
 
 
@@ -399,15 +409,16 @@ def rate_ripple_of(ripple_weight, k, alias, x, n):
 
 
 @inlined
-def node_forces(problem, tables, state, scratch, s):
+def node_forces(run, s):
     """Forces of stop s on its rows at the nodes by its law, into ``scratch.law_force``."""
+    problem, scratch = run.problem, run.scratch
     if rubs(problem, s):
-        rubbing_forces(problem, tables, state, scratch, s)
+        rubbing_forces(run, s)
         return
     if is_circle(problem, s):
-        radial_forces(problem, tables, state, scratch, s)
+        radial_forces(run, s)
         return
-    motion, force = motion_of(problem, scratch, s), scratch.law_force[row_of(problem, s)]
+    motion, force = motion_of(run, s), scratch.law_force[row_of(problem, s)]
     above(motion[0], problem.knots[s, 0], scratch.clipped)
-    law_forces(problem, s, S, scratch.clipped, motion[1], state.entry_rate[s], force)
-    state.count[CALLS] += S
+    law_forces(problem, s, S, scratch.clipped, motion[1], run.state.entry_rate[s], force)
+    run.state.count[CALLS] += S

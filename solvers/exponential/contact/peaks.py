@@ -130,9 +130,10 @@ def polynomial(tables, node_set, values, sigma):
 
 
 @inner
-def motion_around(problem, tables, state, scratch, node_set, h, s, place):
+def motion_around(run, node_set, h, s, place):
     """Indentations and rates of stop s at points around a node of the step, into ``scratch.local_motion``."""
-    local_motion, motion, known = scratch.local_motion, motion_of(problem, scratch, s), scratch.local_motion[KNOWN]
+    problem, tables, state = run.problem, run.tables, run.state
+    local_motion, motion, known = run.scratch.local_motion, motion_of(run, s), run.scratch.local_motion[KNOWN]
     copy(motion[0], known, S)
     for i in range(S):
         known[S + i] = h * motion[1, i]
@@ -153,11 +154,11 @@ def motion_around(problem, tables, state, scratch, node_set, h, s, place):
 
 
 @merged
-def largest_indentation(problem, tables, state, scratch, node_set, h, s):
+def largest_indentation(run, node_set, h, s):
     """Largest indentation of stop s, m, around its highest node of a step."""
-    place = _highest_node(tables, motion_of(problem, scratch, s)[0], node_set, 1.0)
-    motion_around(problem, tables, state, scratch, node_set, h, s, place)
-    return local_maximum(scratch.local_motion[DELTAS], 1.0, scratch.trial)
+    place = _highest_node(run.tables, motion_of(run, s)[0], node_set, 1.0)
+    motion_around(run, node_set, h, s, place)
+    return local_maximum(run.scratch.local_motion[DELTAS], 1.0, run.scratch.trial)
 
 
 @inlined
@@ -167,15 +168,16 @@ def _all_below_peak(state, s, column, values):
 
 
 @inner
-def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
+def step_peaks(run, node_set, h, s, limit):
     """Raise the peaks of stop s by the converged step of length h from ``state.x``, up to σ = ``limit``."""
-    seen, motion, force = -1, motion_of(problem, scratch, s)[0], force_of(problem, scratch, s)
+    problem, state, scratch = run.problem, run.state, run.scratch
+    seen, motion, force = -1, motion_of(run, s)[0], force_of(run, s)
     if limit >= 1.0 and _all_below_peak(state, s, PEAK_FORCE, force) and _all_below_peak(state, s, PEAK_DELTA, motion):
         return
     summary, start = scratch.summary[place_of(problem, s)], scratch.start_motion[s]
     for column, values, d in ((PEAK_FORCE, force, 0), (PEAK_DELTA, motion, 1)):
         known = state.active[s, column]
-        place = _highest_node(tables, values, node_set, limit)
+        place = _highest_node(run.tables, values, node_set, limit)
         if place >= 0:
             state.active[s, column] = max(known, values[place])
         if limit >= 1.0:
@@ -189,12 +191,12 @@ def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
                 continue  # falling from its start
         place = max(place, 0)
         if seen != place:
-            motion_around(problem, tables, state, scratch, node_set, h, s, place)
+            motion_around(run, node_set, h, s, place)
             deltas, rates, seen = scratch.local_motion[DELTAS, :S], scratch.local_motion[RATES, :S], place
             for i in range(S):
                 deltas[i] = off_knots(problem, s, state.segment[s], deltas[i])
             contact_forces(problem, s, deltas, rates, state.entry_rate[s], scratch.local_motion[FORCES, :S])
-        begin, end = tables.local_interval[node_set, place]
+        begin, end = run.tables.local_interval[node_set, place]
         within = min(2.0 * (limit - begin) / (end - begin) - 1.0, 1.0)
         if within > -1.0:
             sought = scratch.local_motion[FORCES if d == 0 else DELTAS]
@@ -203,9 +205,10 @@ def step_peaks(problem, tables, state, scratch, node_set, h, s, limit):
 
 
 @inner
-def state_peaks(problem, state, scratch, x):
+def state_peaks(run, x):
     """Raise the peaks of all stops in contact by their indentations and forces in the state x."""
-    batch = scratch.trial
+    problem, state = run.problem, run.state
+    batch = run.scratch.trial
     for s in range(problem.law.size):
         if acting_segment(problem, state, s) > 0:
             delta = off_knots(problem, s, state.segment[s], indentation(problem, s, x))
@@ -222,10 +225,11 @@ def state_peaks(problem, state, scratch, x):
 
 
 @inner
-def pressed_speed(problem, tables, state, s, batch):
+def pressed_speed(run, s, batch):
     """Speed, m/s, that the force of a stop in contact would give over a distance δ, √(|F δ|/m); 0 if it is open."""
+    problem, state = run.problem, run.state
     delta = indentation(problem, s, state.x)
     if state.segment[s] == 0 or abs(delta) <= surface_tolerance(problem, s, state.x):
         return 0.0
     force_at(problem, s, delta, indentation_rate(problem, s, state.x), state.entry_rate[s], batch)
-    return math.sqrt(abs(batch[0] * batch[2] * own_accelerance(problem, tables, s)))
+    return math.sqrt(abs(batch[0] * batch[2] * own_accelerance(run, s)))

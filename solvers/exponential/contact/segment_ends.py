@@ -18,31 +18,32 @@ from solvers.exponential.contact.node_response import LANDED
 
 
 @part(LAND, types.Tuple((*[types.int64] * 4, types.boolean)), types.int64, types.int64, REAL)
-def land_first(problem, tables, state, scratch, stop, direction, time_to_knot):
+def land_first(run, stop, direction, time_to_knot):
     """Land on the knot reached first, be it that of another stop: (stop, direction, and the last three of `Landing`).
 
     The stop is -1 on failure.
     """
+    problem = run.problem
     for _ in range(problem.law.size + 1):
-        landed = land(problem, tables, state, scratch, stop, direction, time_to_knot)
+        landed = land(run, stop, direction, time_to_knot)
         if landed.stop == stop or landed.stop < 0:
             return landed.stop, direction, landed.element, landed.border, landed.opened
         stop = landed.stop
-        above = indentation(problem, stop, scratch.stages[LANDED]) > problem.knots[stop, state.segment[stop]]
+        above = indentation(problem, stop, run.scratch.stages[LANDED]) > problem.knots[stop, run.state.segment[stop]]
         direction = 1 if above else -1
     return -1, 0, -1, -1, False
 
 
 @part(FIRST_END, types.Tuple((REAL, types.int64, types.int64, REAL)), types.int64, types.int64, types.boolean)
-def first_end(problem, tables, state, scratch, node_set, level, is_new):
+def first_end(run, node_set, level, is_new):
     """(time after the start, element, border, slope) of the first bend or border that the step just tried crosses.
 
     The border is -1 of a bend; the slope is that of its margin by time, 0 if it is not known. The element is -1 if
     there is none, `UNRESOLVED` if the step is too long to decide.
     """
-    first, stop = first_bend(problem, tables, state, scratch, node_set, level, is_new)
-    time, element, border, slope = border_ahead(problem, tables, state, scratch, node_set, level)
-    if element == UNRESOLVED and level < tables.contact_step.size - 1:
+    first, stop = first_bend(run, node_set, level, is_new)
+    time, element, border, slope = border_ahead(run, node_set, level)
+    if element == UNRESOLVED and level < run.tables.contact_step.size - 1:
         return np.inf, UNRESOLVED, -1, 0.0
     return (time, element, border, slope) if time < first else (first, stop, -1, 0.0)
 
@@ -51,15 +52,15 @@ _ON = types.Tuple((types.int64, types.int64, types.boolean))
 
 
 @part(LAND_IN_TIME, _ON, types.int64, types.int64, REAL, REAL, types.boolean)
-def land_in_time(problem, tables, state, scratch, element, border, time, slope, opened):
+def land_in_time(run, element, border, time, slope, opened):
     """Land on a bend or border, ``time`` s ahead, or on a border reached before; (element, border, success).
 
     ``border`` is -1 of a bend; ``slope`` is that of its margin there, 0 if it is not known; ``opened`` is that of
     `Landing`. "In time": unlike that of a landing on a knot, the length of the step has to be found.
     """
     is_bend = border < 0
-    for _ in range(problem.law.size + 1):
-        landed = land_on_bend_or_border(problem, tables, state, scratch, element, border, time, slope, opened)
+    for _ in range(run.problem.law.size + 1):
+        landed = land_on_bend_or_border(run, element, border, time, slope, opened)
         if landed.stop >= 0:
             return element, border, True
         if is_bend or landed.element < 0:
@@ -69,11 +70,11 @@ def land_in_time(problem, tables, state, scratch, element, border, time, slope, 
 
 
 @part(GO_BEYOND, types.void, types.int64, types.int64, types.boolean)
-def go_beyond(problem, state, scratch, element, border, alone):
+def go_beyond(run, element, border, alone):
     """Begin what follows a bend, -1, or a border and, unless ``alone``, others reached with it."""
     if border < 0:
-        scratch.side[element] = -scratch.side[element]
+        run.scratch.side[element] = -run.scratch.side[element]
     elif alone:
-        renew_border(problem, state, scratch, element, border)
+        renew_border(run, element, border)
     else:
-        renew_all(problem, state, scratch, element, border)
+        renew_all(run, element, border)

@@ -44,24 +44,25 @@ FIRST, LAST, ALLOWED = range(3)  # places in Scratch.energy: own energy at start
 
 
 @inner
-def own_energy(problem, tables, x):
+def own_energy(run, x):
     """Energy, J, of the motion minus the steady response to tones."""
-    n, energy = problem.k.size, 0.0
-    for b in range(int(tables.own_blocks)):
-        energy += 0.5 * (x[n + b] * x[n + b] + problem.k[b] * x[b] * x[b])
+    n, energy = run.problem.k.size, 0.0
+    for b in range(int(run.tables.own_blocks)):
+        energy += 0.5 * (x[n + b] * x[n + b] + run.problem.k[b] * x[b] * x[b])
     return energy
 
 
 @merged
-def note_energy(problem, tables, state, scratch):
+def note_energy(run):
     """At the end of a run write its energy and the bound E_c into ``scratch.energy``."""
+    problem, state, scratch = run.problem, run.state, run.scratch
     n = problem.k.size
     allowed = scratch.energy[FIRST]
     for s in range(problem.law.size):
         steady = 0.0
         for r in range(row_of(problem, s), row_of(problem, s + 1)):
             row = problem.read_rate[r]
-            for b in range(int(tables.own_blocks), n):
+            for b in range(int(run.tables.own_blocks), n):
                 speed = np.hypot(row[b], row[n + b] * np.sqrt(problem.k[b]))
                 steady += speed * np.hypot(
                     state.x[b], state.x[n + b] / np.sqrt(problem.k[b]) if problem.k[b] > 0.0 else 0.0
@@ -74,7 +75,7 @@ def note_energy(problem, tables, state, scratch):
         if problem.knots[s, 0] < 0.0:  # a force of both signs
             impulse = state.active[s, PEAK_FORCE] * state.now[T]
         allowed += 2.0 * steady * impulse - work
-    scratch.energy[LAST], scratch.energy[ALLOWED] = own_energy(problem, tables, state.x), max(allowed, 0.0)
+    scratch.energy[LAST], scratch.energy[ALLOWED] = own_energy(run, state.x), max(allowed, 0.0)
 
 
 def tolerated_energy(handled: float, rtol: float) -> float:

@@ -21,18 +21,19 @@ from solvers.exponential.energy.quadrature import state_within
 
 
 @part(ACCOUNT_CONTACT, types.void, types.int64, types.int64, REAL)
-def account_contact(problem, tables, energy_tables, state, scratch, node_set, level, h):
+def account_contact(run, node_set, level, h):
     """Add work of the loads and damping over the contact step of length h just solved to the state's balance."""
+    energy_tables, state = run.energy_tables, run.state
     if level >= energy_tables.first and h <= energy_tables.longest[energy_tables.kind[node_set]]:
         place = level - int(energy_tables.first)
         if energy_tables.sums.shape[0]:
-            _account_sums(problem, tables, energy_tables, state, scratch, node_set, place)
+            _account_sums(run, node_set, place)
         else:
-            _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h)
+            _account_nodes(run, node_set, place, h)
         return
-    x, size = scratch.stages[WITHIN], 2 * problem.k.size
+    x, size = run.scratch.stages[WITHIN], 2 * run.problem.k.size
     copy(state.x, x, state.x.size)
-    state_within(problem, tables, state, scratch, node_set, h, 0.0, h, x, energy_tables.active > 0.0, False)
+    state_within(run, node_set, h, 0.0, h, x, energy_tables.active > 0.0, False)
     copy(x[size:], state.x[size:], 2)
 
 
@@ -47,10 +48,11 @@ def _free_loss(plain, x, n):
 
 
 @merged
-def _account_sums(problem, tables, energy_tables, state, scratch, node_set, place):
+def _account_sums(run, node_set, place):
     """The same for a whole step by the forms that are summed over the blocks."""
+    problem, energy_tables, state, scratch = run.problem, run.energy_tables, run.state, run.scratch
     size, rows, heads = 2 * problem.k.size, problem.gap.size, energy_tables.head
-    y, sums, tones = scratch.energy_sums[0], scratch.energy_sums[1], problem.k.size - int(tables.own_blocks)
+    y, sums, tones = scratch.energy_sums[0], scratch.energy_sums[1], problem.k.size - int(run.tables.own_blocks)
     copy(state.x, y, size)
     for i in range(heads.size):
         used = heads[i] >= rows or acts(problem, state, heads[i])
@@ -66,21 +68,22 @@ def _account_sums(problem, tables, energy_tables, state, scratch, node_set, plac
     loss += _free_loss(energy_tables.free_loss[energy_tables.kind[node_set], place], state.x, problem.k.size)
     of_tones = sums[S * (2 * heads.size - rows) :]
     for k in range(2 * tones):
-        value = state.x[int(tables.own_blocks) + (k if k < tones else k + problem.k.size - tones)]
+        value = state.x[int(run.tables.own_blocks) + (k if k < tones else k + problem.k.size - tones)]
         loss, gain = loss + value * of_tones[k], gain + value * of_tones[2 * tones + k]
     state.x[size], state.x[size + 1] = state.x[size] + gain, state.x[size + 1] + loss
 
 
 @merged
-def _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, weights):
+def _steady_nodes(run, kind, place, h, weights):
     """Work, J, of the loads on the steady motion over the step.
 
     Signals at the nodes are left in ``scratch.energy_sums``, motion of the tones there in ``scratch.terms``.
     """
-    n, size, gain, steady = int(tables.own_blocks), problem.k.size, 0.0, energy_tables.steady[kind, place]
+    problem, tables, scratch = run.problem, run.tables, run.scratch
+    n, size, gain, steady = int(tables.own_blocks), problem.k.size, 0.0, run.energy_tables.steady[kind, place]
     for k in range(size - n):
         alpha, beta = load8(steady[k, 0], 0), load8(steady[k, 1], 0)
-        p, v = splat8(state.x[n + k]), splat8(state.x[size + n + k])
+        p, v = splat8(run.state.x[n + k]), splat8(run.state.x[size + n + k])
         store8(scratch.terms, 2 * S * k, alpha * p + beta * v)
         store8(scratch.terms, 2 * S * k + S, alpha * v - beta * splat8(problem.k[n + k]) * p)
     for load in range(tables.power_rows.shape[0]):
@@ -103,8 +106,9 @@ def _sum_of_tones(row, scratch, n, size):
 
 
 @merged
-def _block_forces(problem, tables, state, scratch, node_set, b, y):
+def _block_forces(run, node_set, b, y):
     """Write a block's plain forces, that of the stop that enters, and its state into ``y``; its signal at the nodes."""
+    problem, tables, state, scratch = run.problem, run.tables, run.state, run.scratch
     size, signal, plain, entering = problem.k.size, splat8(0.0), splat8(0.0), splat8(0.0)
     for u in range(problem.gap.size):
         if acts(problem, state, u):
@@ -124,14 +128,15 @@ def _block_forces(problem, tables, state, scratch, node_set, b, y):
 
 
 @merged
-def _account_nodes(problem, tables, energy_tables, state, scratch, node_set, place, h):
+def _account_nodes(run, node_set, place, h):
     """The same for a whole step by the forms of each block."""
+    problem, tables, energy_tables, state, scratch = run.problem, run.tables, run.energy_tables, run.state, run.scratch
     n, size, kind, plain = int(tables.own_blocks), problem.k.size, energy_tables.kind[node_set], tables.plain[node_set]
     y, sums, entering = scratch.energy_sums[0], scratch.energy_sums[1], tables.weight_exponent[node_set] > 0.0
-    gain, loss = _steady_nodes(problem, tables, energy_tables, state, scratch, kind, place, h, plain), 0.0
+    gain, loss = _steady_nodes(run, kind, place, h, plain), 0.0
     weights, gains, losses = load8(plain, 0), splat8(0.0), splat8(0.0)
     for b in range(n):
-        signal, p, v = _block_forces(problem, tables, state, scratch, node_set, b, y), state.x[b], state.x[size + b]
+        signal, p, v = _block_forces(run, node_set, b, y), state.x[b], state.x[size + b]
         table, c = energy_tables.contact[kind, place, b], problem.c[b]
         combine(table, y, S + 2, None, sums)
         if entering:

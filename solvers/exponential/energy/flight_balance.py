@@ -39,29 +39,30 @@ _EXCHANGED = types.UniTuple(REAL, 2)
 
 
 @inner
-def start_account(problem, state, scratch):
+def start_account(run):
     """Set the mark to the state; its balance must be complete."""
-    split(problem, state.x, scratch.split_state[_MARK])
-    scratch.marked[0] = state.now[T]
+    split(run.problem, run.state.x, run.scratch.split_state[_MARK])
+    run.scratch.marked[0] = run.state.now[T]
 
 
 @inner
-def fly_within(problem, tables, scratch, place, t, span, accounted, energy_tables, row):
+def fly_within(run, place, t, span, accounted, row):
     """Move p and v at index ``place`` of ``split_state`` by ``span`` within a cell.
 
     If ``accounted``, the balance of ``row`` is integrated along.
     """
+    problem, tables, scratch = run.problem, run.tables, run.scratch
     x = scratch.split_state[place]
     while tables.fastest * span > SERIES_REACH:
         level = level_within(tables, span)
         derive_signals(problem, t, scratch.signal_terms)
         if accounted:
-            add_to_balance(problem, row, account_step(problem, tables, energy_tables, scratch, level, t, place))
-        fly_tabulated(problem, tables, level, x, scratch.signal_terms)
+            add_to_balance(problem, row, account_step(run, level, t, place))
+        fly_tabulated(run, level, x, scratch.signal_terms)
         t, span = t + tables.flight_step[level], span - tables.flight_step[level]
-    fly_series(problem, tables, x, t, span, scratch.signal_terms, scratch.terms)
+    fly_series(run, x, t, span, scratch.signal_terms, scratch.terms)
     if accounted:
-        add_to_balance(problem, row, account_series(problem, tables, energy_tables, scratch, span))
+        add_to_balance(problem, row, account_series(run, span))
 
 
 @inlined
@@ -72,35 +73,37 @@ def add_to_balance(problem, row, exchanged):
 
 
 @part(ACCOUNT_FLIGHT, types.void, REAL, VECTOR)
-def account_until(problem, tables, energy_tables, scratch, t, row):
+def account_until(run, t, row):
     """Add work and damping of the flight from the mark to t, within one cell, to the balance of ``row``."""
+    scratch = run.scratch
     begin = scratch.marked[0]
     copy_split(scratch.split_state[_MARK], scratch.split_state[_MOVING])
     span = t - begin
-    if energy_tables.closed > 0.0 and abs(span - energy_tables.spacing) <= _time_rounding(problem, energy_tables, t):
-        whole = tables.flight_step.size
-        add_to_balance(problem, row, account_step(problem, tables, energy_tables, scratch, whole, begin, _MOVING))
+    if run.energy_tables.closed > 0.0 and abs(span - run.energy_tables.spacing) <= _time_rounding(run, t):
+        whole = run.tables.flight_step.size
+        add_to_balance(run.problem, row, account_step(run, whole, begin, _MOVING))
     elif span > 0.0:
         accounted = np.bool_(1)  # a literal would be compiled for itself
-        fly_within(problem, tables, scratch, _MOVING, begin, span, accounted, energy_tables, row)
+        fly_within(run, _MOVING, begin, span, accounted, row)
 
 
 @inner
-def account_output(problem, tables, energy_tables, state, scratch, t, row):
+def account_output(run, t, row):
     """Complete the balance of an output at t; without sampled signals the mark moves there."""
-    copy(state.x[2 * problem.k.size :], row[2 * problem.k.size :], 2)
-    account_until(problem, tables, energy_tables, scratch, t, row)
+    problem = run.problem
+    copy(run.state.x[2 * problem.k.size :], row[2 * problem.k.size :], 2)
+    account_until(run, t, row)
     if problem.table_dt.size == 0:
-        copy(row[2 * problem.k.size :], state.x[2 * problem.k.size :], 2)
-        split(problem, row, scratch.split_state[_MARK])
-        scratch.marked[0] = t
+        copy(row[2 * problem.k.size :], run.state.x[2 * problem.k.size :], 2)
+        split(problem, row, run.scratch.split_state[_MARK])
+        run.scratch.marked[0] = t
 
 
 @inner
-def account_state(problem, tables, energy_tables, state, scratch):
+def account_state(run):
     """Complete the balance of the state, and set the mark there."""
-    account_until(problem, tables, energy_tables, scratch, state.now[T], state.x)
-    start_account(problem, state, scratch)
+    account_until(run, run.state.now[T], run.state.x)
+    start_account(run)
 
 
 @inlined
@@ -111,27 +114,28 @@ def copy_split(source, target):
 
 
 @merged
-def _time_rounding(problem, energy_tables, t):
+def _time_rounding(run, t):
     """Difference, s, allowed between the step of the tables and the time between two outputs, or a cell."""
-    return 1e-7 * energy_tables.spacing if problem.table_dt.size else 4e-16 * t
+    return 1e-7 * run.energy_tables.spacing if run.problem.table_dt.size else 4e-16 * t
 
 
 @part(ACCOUNT_STEP, _EXCHANGED, types.int64, REAL, types.int64)
-def account_step(problem, tables, energy_tables, scratch, level, t, place):
+def account_step(run, level, t, place):
     """Work and damping, J, of a tabulated step or whole cell from t on, of state ``place`` of ``split_state``.
 
     The derivatives of the signals at the start of a tabulated step are in ``scratch.signal_terms``.
     """
-    whole, n, given = level == tables.flight_step.size, problem.k.size, scratch.energy_sums[0]
+    problem, energy_tables, scratch = run.problem, run.energy_tables, run.scratch
+    whole, n, given = level == run.tables.flight_step.size, problem.k.size, scratch.energy_sums[0]
     x = scratch.split_state[place]
     if energy_tables.closed == 0.0:
-        span = energy_tables.spacing if whole else tables.flight_step[level]
+        span = energy_tables.spacing if whole else run.tables.flight_step[level]
         copy_split(x, scratch.split_state[_WITHIN])
-        exchanged = _account_panels(problem, tables, energy_tables, scratch, scratch.split_state[_WITHIN], t, span)
+        exchanged = _account_panels(run, scratch.split_state[_WITHIN], t, span)
         derive_signals(problem, t, scratch.signal_terms)  # which the panels have overwritten
         return exchanged
     if whole:
-        _nodes_of_cell(problem, scratch, t)
+        _nodes_of_cell(run, t)
     count = 0
     for j in range(problem.table_dt.size):
         copy(scratch.signal_terms[j], given[count:], 6)
@@ -146,12 +150,13 @@ def account_step(problem, tables, energy_tables, scratch, level, t, place):
 
 
 @merged
-def _nodes_of_cell(problem, scratch, t):
+def _nodes_of_cell(run, t):
     """Write s, s', s'' of every signal at the start, then at the end of the cell of t into ``scratch.signal_terms``."""
+    problem = run.problem
     for j in range(problem.table_dt.size):
         begin, end = cell_ends(problem, problem.table_start[j] + cell_of(problem, t)[0])
-        copy(begin, scratch.signal_terms[j], 3)
-        copy(end, scratch.signal_terms[j, 3:], 3)
+        copy(begin, run.scratch.signal_terms[j], 3)
+        copy(end, run.scratch.signal_terms[j, 3:], 3)
 
 
 @merged
@@ -191,21 +196,22 @@ def _exchange_of_state(rows, plain, given, count, x):
 
 
 @merged
-def _account_panels(problem, tables, energy_tables, scratch, x, t, span):
+def _account_panels(run, x, t, span):
     """Work and damping of a step without forms, by series; x is moved."""
     gain, loss = 0.0, 0.0
-    panels = max(1, math.ceil(tables.fastest * span / SERIES_REACH - 1e-9))
+    panels = max(1, math.ceil(run.tables.fastest * span / SERIES_REACH - 1e-9))
     for i in range(panels):
         begin = t + i * span / panels
-        fly_series(problem, tables, x, begin, span / panels, scratch.signal_terms, scratch.terms)
-        more, lost = account_series(problem, tables, energy_tables, scratch, span / panels)
+        fly_series(run, x, begin, span / panels, run.scratch.signal_terms, run.scratch.terms)
+        more, lost = account_series(run, span / panels)
         gain, loss = gain + more, loss + lost
     return gain, loss
 
 
 @part(ACCOUNT_SERIES, _EXCHANGED, REAL)
-def account_series(problem, tables, energy_tables, scratch, span):
+def account_series(run, span):
     """Work and damping, J, of the motion that the last `fly_series` has moved by ``span``."""
+    problem, tables, scratch = run.problem, run.tables, run.scratch
     n, signals = problem.k.size, scratch.between[PACE + 1 + problem.gap.size :]
     count = _powers_of_time(tables, span, scratch.values)
     for load in range(tables.power_rows.shape[0]):
@@ -213,27 +219,28 @@ def account_series(problem, tables, energy_tables, scratch, span):
     for j in range(problem.table_dt.size):
         value = splat8(0.0)
         for i in range(6):
-            value += splat8(scratch.values[i] * scratch.signal_terms[j, i]) * load8(energy_tables.series[i], 0)
+            value += splat8(scratch.values[i] * scratch.signal_terms[j, i]) * load8(run.energy_tables.series[i], 0)
         store8(signals[problem.table_load[j]], 0, splat8(span) * value)
     if int(tables.own_blocks) == n and tables.loss_rows.shape[0] <= n:
-        return _exchange_of_rates(problem, tables, energy_tables, scratch, count, span)
+        return _exchange_of_rates(run, count, span)
     store8(scratch.between[PACE], 0, splat8(span))
     width, along = tables.block_k_c.shape[1], scratch.along
     for b in range(n):
         p, v = splat8(0.0), splat8(0.0)
         for i in range(count):
-            share = splat8(scratch.values[i]) * load8(energy_tables.series[i], 0)
+            share = splat8(scratch.values[i]) * load8(run.energy_tables.series[i], 0)
             p += splat8(scratch.terms[i, b]) * share
             v += splat8(scratch.terms[i, width + b]) * share
         store8(along[b], 0, p)
         store8(along[n + b], 0, v)
-    return exchanged_over(problem, tables, scratch)
+    return exchanged_over(run)
 
 
 @merged
-def _exchange_of_rates(problem, tables, energy_tables, scratch, count, span):
+def _exchange_of_rates(run, count, span):
     """The same without tones and coupling, where velocities are enough: those of eight blocks at a time."""
-    series, weights, width = energy_tables.series, tables.gauss[1], tables.block_k_c.shape[1]
+    tables, scratch = run.tables, run.scratch
+    series, weights, width = run.energy_tables.series, tables.gauss[1], tables.block_k_c.shape[1]
     gains, losses = splat8(0.0), splat8(0.0)
     for i in range(0, width, WIDTH):
         a, b, c, d = splat8(0.0), splat8(0.0), splat8(0.0), splat8(0.0)
@@ -251,9 +258,9 @@ def _exchange_of_rates(problem, tables, energy_tables, scratch, count, span):
         damped = _sum_of_eight(weights, (a * a, b * b, c * c, d * d, e * e, f * f, g * g, h * h))
         losses += load8(tables.block_k_c[1], i) * damped
         for load in range(tables.power_rows.shape[0]):
-            signal = scratch.between[PACE + 1 + problem.gap.size + load]
+            signal = scratch.between[PACE + 1 + run.problem.gap.size + load]
             store8(scratch.trial, 0, load8(weights, 0) * load8(signal, 0))
-            gains += load8(energy_tables.power[load], i) * _sum_of_eight(scratch.trial, (a, b, c, d, e, f, g, h))
+            gains += load8(run.energy_tables.power[load], i) * _sum_of_eight(scratch.trial, (a, b, c, d, e, f, g, h))
     return sum8(gains), span * sum8(losses)
 
 

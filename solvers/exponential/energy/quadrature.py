@@ -54,8 +54,9 @@ PACE = S  # row of `Scratch.between` with dt of the panel's points, behind polyn
 
 
 @inner
-def powers(problem, tables, t, x):
+def powers(run, t, x):
     """(power of the loads, power of the damping) at time t, W."""
+    problem, tables = run.problem, run.tables
     size, gain, loss, own = 2 * problem.k.size, 0.0, 0.0, int(tables.own_blocks)
     for load in range(tables.power_rows.shape[0] if own < problem.k.size else 0):
         gain += dot(tables.signal_rows[load], x, size) * dot(tables.power_rows[load], x, size)
@@ -90,8 +91,9 @@ def _plain_loss(n, own, c, steady_rate, x):
 
 
 @merged
-def _panel_points(tables, scratch, node_set, h, begin, width):
+def _panel_points(run, node_set, h, begin, width):
     """Points of a panel: σ into ``trial``, times after its start into ``clipped``, polynomials, dt into ``between``."""
+    tables, scratch = run.tables, run.scratch
     time_exponent, between, nodes = tables.time_exponent[node_set], scratch.between, tables.nodes[node_set]
     start = h * raised(begin, time_exponent)
     for q in range(S):
@@ -109,11 +111,12 @@ def _panel_points(tables, scratch, node_set, h, begin, width):
 
 
 @merged
-def _forces(problem, tables, state, scratch, node_set):
+def _forces(run, node_set):
     """Forces and signals at the points of the panel times dt, into ``scratch.between``."""
+    problem, tables, scratch = run.problem, run.tables, run.scratch
     between = scratch.between
     for u in range(scratch.force.shape[0]):
-        if u < problem.gap.size and not acts(problem, state, u):
+        if u < problem.gap.size and not acts(problem, run.state, u):
             continue
         weighted = u < problem.gap.size and is_weighted(tables, node_set, element_of(problem, u))
         row = between[PACE + 1 + u]
@@ -126,9 +129,10 @@ def _forces(problem, tables, state, scratch, node_set):
 
 
 @merged
-def _panel_propagators(problem, tables, scratch, length):
+def _panel_propagators(run, length):
     """α, β of every block from the start of a panel to its points, back by det E = e^{-ct}, and to its end."""
-    halvings, reach = 0, tables.fastest * length
+    problem, scratch = run.problem, run.scratch
+    halvings, reach = 0, run.tables.fastest * length
     while reach > _REACH:
         halvings, reach = halvings + 1, 0.5 * reach
     share, powers, last = splat8(0.5**halvings), splat8(1.0), splat8(1.0)
@@ -166,11 +170,12 @@ def _propagators(powers, first, k, c, halvings):
 
 
 @merged
-def _pull_back(problem, state, scratch, b, moves):
+def _pull_back(run, b, moves):
     """Rates of a block at the points, moved back to the panel's start, into ``scratch.trial`` and ``clipped``."""
+    problem, scratch = run.problem, run.scratch
     n, p, v = problem.k.size, splat8(0.0), splat8(0.0)
     for u in range(scratch.force.shape[0]):
-        if u >= problem.gap.size or acts(problem, state, u):
+        if u >= problem.gap.size or acts(problem, run.state, u):
             push = push_of(problem, u)
             force = load8(scratch.between[PACE + 1 + u], 0)
             p += splat8(push[b]) * force
@@ -181,15 +186,16 @@ def _pull_back(problem, state, scratch, b, moves):
 
 
 @merged
-def _move_blocks(problem, tables, state, scratch, row):
+def _move_blocks(run, row):
     """Write the blocks at the points of the panel into ``scratch.along``, and move ``row`` to its end."""
+    problem, tables, scratch = run.problem, run.tables, run.scratch
     n, gauss, weights = problem.k.size, tables.gauss, load8(tables.gauss[1], 0)
     for b in range(n):
         k, c, moves = problem.k[b], problem.c[b], scratch.moves[b]
         p, v = row[b], row[n + b]
         p_points, v_points = splat8(p), splat8(v)
         if b < tables.own_blocks:
-            _pull_back(problem, state, scratch, b, moves)
+            _pull_back(run, b, moves)
             for r in range(S):
                 share = load8(gauss[_INTEGRALS + r], 0)
                 p_points += splat8(scratch.trial[r]) * share
@@ -203,39 +209,39 @@ def _move_blocks(problem, tables, state, scratch, row):
 
 
 @merged
-def _add_works(problem, tables, state, scratch, row):
+def _add_works(run, row):
     """Add works and impulses of the contacts over the panel to ``row``."""
+    problem, scratch = run.problem, run.scratch
     for s in range(problem.law.size):
-        if state.segment[s] > 0:
+        if run.state.segment[s] > 0:
             r = row_of(problem, s)
             if rubs(problem, s):
                 account = problem.friction[s, 1]
-                work, impulse, friction_work, friction_impulse, slip_distance = work_within_rubbing(
-                    problem, tables, scratch, s, PACE + 1
-                )
+                work, impulse, friction_work, friction_impulse, slip_distance = work_within_rubbing(run, s, PACE + 1)
                 row[account], row[account + 1] = row[account] + friction_work, row[account + 1] + friction_impulse
                 row[account + 2] += slip_distance
             elif is_circle(problem, s):
-                work, impulse = work_within_circle(problem, tables, scratch, s, PACE + 1)
+                work, impulse = work_within_circle(run, s, PACE + 1)
             else:
                 combine(scratch.along, problem.read_rate[r], 2 * problem.k.size, None, scratch.trial)
-                impulses = load8(tables.gauss[1], 0) * load8(scratch.between[PACE + 1 + r], 0)
+                impulses = load8(run.tables.gauss[1], 0) * load8(scratch.between[PACE + 1 + r], 0)
                 work, impulse = sum8(impulses * load8(scratch.trial, 0)), sum8(impulses)
             column = work_column(problem, s)
             row[column], row[column + 1] = row[column] + work, row[column + 1] + impulse
 
 
 @merged
-def exchanged_over(problem, tables, scratch):
+def exchanged_over(run):
     """Work of the loads and damping, J, over a panel: motion at its points, dt there, and the sampled loads times dt.
 
     They are in ``scratch.along``, row `PACE` of ``between``, and behind its rows of forces.
     """
+    tables, scratch = run.tables, run.scratch
     gain, loss = splat8(0.0), splat8(0.0)
-    n, own, rows = problem.k.size, int(tables.own_blocks), tables.loss_rows
+    n, own, rows = run.problem.k.size, int(tables.own_blocks), tables.loss_rows
     weights, pace = load8(tables.gauss[1], 0), load8(scratch.between[PACE], 0)
     for load in range(tables.power_rows.shape[0]):
-        signal = load8(scratch.between[PACE + 1 + problem.gap.size + load], 0)
+        signal = load8(scratch.between[PACE + 1 + run.problem.gap.size + load], 0)
         if own < n:
             combine(scratch.along, tables.signal_rows[load], 2 * n, None, scratch.trial)
             signal += pace * load8(scratch.trial, 0)
@@ -255,38 +261,41 @@ def exchanged_over(problem, tables, scratch):
 
 
 @merged
-def hides_motion(problem, tables, state, scratch, h):
+def hides_motion(run, h):
     """Whether polynomials of the forces may miss an indentation rate inside the step by half its tolerance."""
+    problem, scratch = run.problem, run.scratch
     worst = 0.0
     for u in range(problem.gap.size):
-        if acts(problem, state, u):
+        if acts(problem, run.state, u):
             impulse = _INSIDE * h * next_coefficient(scratch.summary[u])
             for r in range(problem.gap.size):
                 speed = scratch.reference_speed[element_of(problem, r)]
-                worst = max(worst, impulse * abs(tables.accelerance[r, u]) / speed)
+                worst = max(worst, impulse * abs(run.tables.accelerance[r, u]) / speed)
     return worst > _RESOLVED * scratch.accuracy[RTOL]
 
 
 @merged
-def _motion_at_points(problem, scratch, r, out):
+def _motion_at_points(run, r, out):
     """Displacements and rates of a row at the points of the panel, from the motion in ``scratch.along``."""
-    combine(scratch.along, problem.read[r], 2 * problem.k.size, None, out[0])
-    combine(scratch.along, problem.read_rate[r], 2 * problem.k.size, None, out[1])
+    problem = run.problem
+    combine(run.scratch.along, problem.read[r], 2 * problem.k.size, None, out[0])
+    combine(run.scratch.along, problem.read_rate[r], 2 * problem.k.size, None, out[1])
     store8(out[0], 0, load8(out[0], 0) - splat8(problem.gap[r]))
 
 
 @merged
-def _follow_laws(problem, tables, state, scratch, node_set, h, begin, width):
+def _follow_laws(run, node_set, h, begin, width):
     """Forces at the points of the panel times dt by their laws, for the motion that is in ``scratch.along``."""
+    problem, state, scratch = run.problem, run.state, run.scratch
     points = scratch.local_motion[:2]  # peaks, which need it, are looked for later
     for s in range(problem.law.size):
         if state.segment[s] == 0 or scratch.viscous[s] > 0.0:
             continue
         r = row_of(problem, s)
         if is_circle(problem, s) or rubs(problem, s):
-            _follow_in_plane(problem, tables, state, scratch, node_set, h, begin, width, s)
+            _follow_in_plane(run, node_set, h, begin, width, s)
             continue
-        _motion_at_points(problem, scratch, r, points)
+        _motion_at_points(run, r, points)
         for q in range(S):
             scratch.trial[q] = off_knots(problem, s, state.segment[s], points[0, q])
         copy(points[1], scratch.clipped, S)
@@ -296,27 +305,29 @@ def _follow_laws(problem, tables, state, scratch, node_set, h, begin, width):
 
 
 @merged
-def _follow_in_plane(problem, tables, state, scratch, node_set, h, begin, width, s):
+def _follow_in_plane(run, node_set, h, begin, width, s):
     """The same of an element in a plane: its forces are those at the nodes of a step that has the points as nodes."""
+    problem, scratch = run.problem, run.scratch
     first, beyond = row_of(problem, s), row_of(problem, s + 1)
-    _exchange(problem, scratch, s, True)
+    _exchange(run, s, True)
     for r in range(first, beyond):
-        _motion_at_points(problem, scratch, r, scratch.motion[r])
+        _motion_at_points(run, r, scratch.motion[r])
     if rubs(problem, s):
         for q in range(S):
-            sigma = begin + width * tables.gauss[0, q]
-            scratch.node_time[q] = state.now[T] + h * raised(sigma, tables.time_exponent[node_set])
-        rubbing_forces(problem, tables, state, scratch, s)
+            sigma = begin + width * run.tables.gauss[0, q]
+            scratch.node_time[q] = run.state.now[T] + h * raised(sigma, run.tables.time_exponent[node_set])
+        rubbing_forces(run, s)
     else:
-        radial_forces(problem, tables, state, scratch, s)
+        radial_forces(run, s)
     for r in range(first, beyond):
         store8(scratch.between[PACE + 1 + r], 0, load8(scratch.law_force[r], 0) * load8(scratch.between[PACE], 0))
-    _exchange(problem, scratch, s, False)
+    _exchange(run, s, False)
 
 
 @merged
-def _exchange(problem, scratch, s, keep):
+def _exchange(run, s, keep):
     """Keep what `Scratch` has of an element at the nodes in ``scratch.kept``, or bring it back."""
+    problem, scratch = run.problem, run.scratch
     row = 0
     for r in range(row_of(problem, s), row_of(problem, s + 1) + 1):
         at = r if r < row_of(problem, s + 1) else place_of(problem, s)
@@ -339,32 +350,32 @@ def _move_row(scratch, values, row, keep):
 
 
 @part(WITHIN_STEP, types.void, types.int64, *[REAL] * 3, VECTOR, types.boolean, types.boolean)
-def state_within(problem, tables, state, scratch, node_set, h, begin, end, row, ledger, by_laws):
+def state_within(run, node_set, h, begin, end, row, ledger, by_laws):
     """Move ``row`` from ``begin`` to ``end``, s after the start of a contact step of length h whose forces are known.
 
     Works and impulses of the contacts are integrated along; those of loads and damping only with ``ledger``.
     With ``by_laws`` forces follow their laws where they can, see the module.
     """
-    time_exponent = tables.time_exponent[node_set]
+    time_exponent = run.tables.time_exponent[node_set]
     sigma, last = (begin / h) ** (1.0 / time_exponent), (end / h) ** (1.0 / time_exponent)
-    begun = scratch.stages[LANDED]  # no landing is under way
-    panels, size = 1 + int(time_exponent * tables.fastest * (end - begin) / _PANEL_RADIANS), 2 * problem.k.size
+    begun = run.scratch.stages[LANDED]  # no landing is under way
+    panels, size = 1 + int(time_exponent * run.tables.fastest * (end - begin) / _PANEL_RADIANS), 2 * run.problem.k.size
     width = (last - sigma) / panels
     for i in range(panels):
-        _panel_points(tables, scratch, node_set, h, sigma, width)
+        _panel_points(run, node_set, h, sigma, width)
         if i == 0 or time_exponent > 1.0:
             length = h * (raised(sigma + width, time_exponent) - raised(sigma, time_exponent))
-            _panel_propagators(problem, tables, scratch, length)
-        _forces(problem, tables, state, scratch, node_set)
+            _panel_propagators(run, length)
+        _forces(run, node_set)
         if by_laws:
             copy(row, begun, size)
-        _move_blocks(problem, tables, state, scratch, row)
+        _move_blocks(run, row)
         if by_laws:
-            _follow_laws(problem, tables, state, scratch, node_set, h, sigma, width)
+            _follow_laws(run, node_set, h, sigma, width)
             copy(begun, row, size)
-            _move_blocks(problem, tables, state, scratch, row)
-        _add_works(problem, tables, state, scratch, row)
+            _move_blocks(run, row)
+        _add_works(run, row)
         if ledger:
-            gain, loss = exchanged_over(problem, tables, scratch)
+            gain, loss = exchanged_over(run)
             row[size], row[size + 1] = row[size] + gain, row[size + 1] + loss
         sigma += width
