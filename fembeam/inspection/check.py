@@ -21,6 +21,7 @@ from fembeam.model.mode_table import mode_part, mode_rows
 from fembeam.scene import unit_of
 from fembeam.study.decay import correlation_time
 from fembeam.support import Part, Printed
+from solvers.problem import counted
 
 if TYPE_CHECKING:
     from fembeam.model import Model
@@ -84,7 +85,7 @@ class Check(Printed):
 
     def _contacts_with(self, one: Touched) -> str:
         """What to expect of a stop, in a sentence."""
-        seen = f"{one.contacts} contacts in a trial" if one.contacts else "no contact in a trial"
+        seen = f"{counted(one.contacts, 'contact') if one.contacts else 'no contact'} in a trial"
         row = self.model.contact_rows[one.stop]
         speed, force = (unit_of(of, [row.rotation]) for of in ("speed", "force"))
         lasts = f"lasts {one.time:.3g} s ({one.periods:.2g} periods of the highest mode kept)"

@@ -70,7 +70,8 @@ class SolverError(RuntimeError):
         self.solution = solution
 
 
-_CLIPPED = 9  # place among the columns of a log of contacts
+# columns of a log of contacts
+(_STOP, _T_IN, _T_OUT, _, _SPEED_OUT, _DEEPEST, _LARGEST, _IMPULSE, _LOSS, _CLIPPED, _, _ANGLE_OUT) = range(12)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +140,7 @@ class ContactLog(Columns):
     def of_rows(cls, rows: Array, names: Sequence[str] = ()) -> ContactLog:
         """From a table with one contact a row, with names of all stops."""
         columns: list[Any] = [*rows.T.copy()]
-        columns[0], columns[_CLIPPED] = columns[0].astype(int), columns[_CLIPPED].astype(bool)
+        columns[_STOP], columns[_CLIPPED] = columns[_STOP].astype(int), columns[_CLIPPED].astype(bool)
         return cls(*columns, names=tuple(names))
 
     @classmethod
@@ -150,19 +151,18 @@ class ContactLog(Columns):
         """
         rows = [np.array(list(log.arrays().values()), dtype=float).T for log in logs]
         for i, start in enumerate(starts):
-            for row in rows[i][np.isnan(rows[i][:, 2])]:
+            for row in rows[i][np.isnan(rows[i][:, _T_OUT])]:
                 rest = rows[(i + 1) % len(rows)]
                 later = starts[i + 1] if i + 1 < len(rows) else starts[0] + period
-                found = np.flatnonzero((rest[:, 0] == row[0]) & (rest[:, 1] == 0.0) & ~np.isnan(rest[:, 2]))
+                ends = (rest[:, _STOP] == row[_STOP]) & (rest[:, _T_IN] == 0.0) & ~np.isnan(rest[:, _T_OUT])
+                found = np.flatnonzero(ends)
                 if found.size:
                     _make_whole(row, rest[found[0]], later - start)
-                    rows[i][(rows[i][:, 0] == row[0]) & np.isnan(rows[i][:, 2])] = row
+                    rows[i][(rows[i][:, _STOP] == row[_STOP]) & np.isnan(rows[i][:, _T_OUT])] = row
                     rows[(i + 1) % len(rows)] = np.delete(rest, found[0], axis=0)
-        moved = [
-            part + np.array([0.0, start, start] + [0.0] * (part.shape[1] - 3))
-            for part, start in zip(rows, starts, strict=True)
-        ]
-        return cls.of_rows(np.concatenate(moved), logs[0].names)
+        for part, start in zip(rows, starts, strict=True):
+            part[:, [_T_IN, _T_OUT]] += start
+        return cls.of_rows(np.concatenate(rows), logs[0].names)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,10 +211,10 @@ class FrictionLog(Columns):
 
 def _make_whole(row: Array, rest: Array, later: float) -> None:
     """Add to a log row the rest of its contact, whose times count from ``later``."""
-    row[2], row[4] = later + rest[2], rest[4]
-    row[5:7] = np.maximum(row[5:7], rest[5:7])
-    row[7:9] += rest[7:9]
-    row[11] = rest[11]
+    row[_T_OUT] = later + rest[_T_OUT]
+    row[[_SPEED_OUT, _ANGLE_OUT]] = rest[[_SPEED_OUT, _ANGLE_OUT]]
+    row[[_DEEPEST, _LARGEST]] = np.maximum(row[[_DEEPEST, _LARGEST]], rest[[_DEEPEST, _LARGEST]])
+    row[[_IMPULSE, _LOSS]] += rest[[_IMPULSE, _LOSS]]
 
 
 @dataclass(frozen=True, eq=False)

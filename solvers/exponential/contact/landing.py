@@ -107,8 +107,8 @@ _SHARE_SINCE_ENTRY = 0.016  # the same of one from the entry on
 _NEAR_SURFACE = 1e-6  # δ, in units of its peak, below which its rounding may hide a border
 _LEAST_MARGIN = 0.1  # part of a margin's error that counts, in units of the tolerance of δ̇
 _ANY_ERROR = 1e300  # but NaN
-_TURNED = 0.01  # change of δ̇ in a landing, relative, that shorter steps are to resolve
-TOO_LONG = 2  # in `Scratch.last_resort`: the landing taken errs, which shorter steps would not
+_TURN = 0.01  # change of δ̇ in a landing, relative, that shorter steps are to resolve
+TURNED = 2  # in `Scratch.last_resort`: the landing taken errs, which shorter steps would not
 _LEAST_RATE = 0.5  # δ̇ at the end of a landing, in units of that at its start, below which it is too long
 _LEAST_RATE_FOURTH_ROOT = 0.8  # the same with u = δ^{1/4}: under constant deceleration the difference is zero at 0.65
 _LAST_STEP = 0.09  # indentation, in units of the deepest, below which a landing on δ = 0 is tried
@@ -478,7 +478,7 @@ def _is_resolved(run, variable, stop):
 
     A stop that turns soon after it has left is near a pole of 1/δ̇. The embedded difference changes its sign there: it
     may be zero where the step errs by 1e-3 of the rate. As the last resort a landing of any error is taken: a step
-    across the border errs by more. It is `TOO_LONG` where it has turned the motion: shorter steps resolve that.
+    across the border errs by more. It is `TURNED` where it has turned the motion: shorter steps resolve that.
     """
     scratch = run.scratch
     before, after = scratch.start_motion[stop, 1], indentation_rate(run.problem, stop, scratch.stages[LANDED])
@@ -489,8 +489,8 @@ def _is_resolved(run, variable, stop):
     error = _rate_error(run, share)
     if scratch.last_resort[0] == 0 or not error <= _ANY_ERROR:
         return error <= 1.0
-    fast = _TURNED * max(abs(after), scratch.reference_speed[stop])
-    scratch.last_resort[0] = TOO_LONG if error > 1.0 and abs(after - before) > fast else 1
+    fast = _TURN * max(abs(after), scratch.reference_speed[stop])
+    scratch.last_resort[0] = TURNED if error > 1.0 and abs(after - before) > fast else 1
     return True
 
 

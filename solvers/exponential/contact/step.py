@@ -73,7 +73,7 @@ from solvers.exponential.contact.first_step import (
     level_of,
 )
 from solvers.exponential.contact.kinks import land_on_kink_or_limit
-from solvers.exponential.contact.landing import TOO_LONG, may_land
+from solvers.exponential.contact.landing import TURNED, may_land
 from solvers.exponential.contact.node_response import (
     BORDER,
     ELEMENT,
@@ -399,7 +399,7 @@ def advance_contact(run):
         return RUNNING
     landed, longest = _try_landing_now(run, stop, direction, time_to_knot)
     if landed:
-        return STEP_TOO_SMALL if scratch.last_resort[0] == TOO_LONG else RUNNING
+        return STEP_TOO_SMALL if scratch.last_resort[0] == TURNED else RUNNING
     node_set, wanted = control[NODE_SET] if control[NEW] else 0, control[NEXT_LEVEL]
     if problem.table_dt.size:
         allowed = land_on_kink_or_limit(run, wanted)
