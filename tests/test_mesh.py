@@ -61,6 +61,8 @@ def test_gmsh_itself_writes_such_a_file(tmp_path):
 def test_round_trip_keeps_the_frequencies(tmp_path, suffix):
     beam = fb.Beam.of_spans([(0.1, THICK), (0.3 / 7, fb.Taper(THICK, THIN)), (0.2, THIN), (0.1, THICK)])
     sections = beam.to_mesh(tmp_path / f"beam.{suffix}", elements=57)
+    cells = meshio.read(tmp_path / f"beam.{suffix}").cells
+    assert sum(len(block.data) for block in cells) == 58  # 13, 6, 26 and 13 by the lengths of the spans
     again = fb.Beam.from_mesh(tmp_path / f"beam.{suffix}", sections)
     assert [section for _, section in again.spans] == [section for _, section in beam.spans]
     np.testing.assert_allclose(frequencies(again), frequencies(beam), rtol=1e-12)
@@ -81,7 +83,8 @@ def test_names_that_no_file_can_hold_are_not_written(tmp_path):
 
 def test_one_section_for_all_and_a_slanting_axis(tmp_path):
     t = np.array([0.0, 0.3, 0.7, 1.0])
-    path = written(tmp_path / "a.vtu", np.column_stack([3 * t, 4 * t, 0 * t])[:, :2], [[3, 2], [0, 1], [1, 2]])
+    points = np.column_stack([7 + 3 * t, 4 * t - 2, 0 * t])[:, :2]  # not through the origin
+    path = written(tmp_path / "a.vtu", points, [[3, 2], [0, 1], [1, 2]])
     assert fb.Beam.from_mesh(path, THIN).length == pytest.approx(5.0, rel=1e-14)
 
 
@@ -147,10 +150,14 @@ test_missing_groups_are_named = refused_by(
 def test_files_that_are_no_meshes_are_refused(tmp_path):
     with pytest.raises(FileNotFoundError, match="does not exist"):
         fb.Beam.from_mesh(tmp_path / "none.msh", THIN)
-    (tmp_path / "bad.msh").write_text("not a mesh")
-    (tmp_path / "bad.xyz").write_text("not a mesh")
-    for name in ("bad.msh", "bad.xyz"):
-        with pytest.raises(ValueError, match="cannot be read as a mesh"):
+    files = {
+        "bad.msh": ("not a mesh", "unknown format"),
+        "old.msh": ("$MeshFormat\n9.9 0 8\n$EndMeshFormat\n", "Need mesh format in"),
+        "bad.xyz": ("not a mesh", "Could not deduce file format"),
+    }
+    for name, (text, reason) in files.items():
+        (tmp_path / name).write_text(text)
+        with pytest.raises(ValueError, match=f"cannot be read as a mesh: {reason}"):
             fb.Beam.from_mesh(tmp_path / name, THIN)
     with pytest.raises(ValueError, match=r"the suffix must be one of .msh, .inp, .vtu, .vtk, got '.stl'"):
         fb.Beam(1.0, THIN).to_mesh(tmp_path / "a.stl")
@@ -172,6 +179,12 @@ def test_nodes_that_are_not_there_are_refused(tmp_path, kind):
     (tmp_path / "a.msh").write_text(text[: text.index("$Elements") + 14])
     with pytest.raises(ValueError, match=r"cannot be read as a mesh: .*; is it cut, or of another format"):
         fb.Beam.from_mesh(tmp_path / "a.msh", THIN)
+
+
+def test_a_node_behind_the_last_one_is_not_there(tmp_path):
+    path = written(tmp_path / "a.vtu", [0.0, 0.3, 1.0], [[0, 1], [1, 3]])
+    with pytest.raises(ValueError, match="cells must have nodes that are defined, got 'others in a line'"):
+        fb.Beam.from_mesh(path, THIN)
 
 
 def test_far_too_fine_elements_are_noticed(tmp_path):
@@ -467,10 +480,17 @@ S,
 """
 
 
-@pytest.mark.parametrize("end", ["\n", "\r\n"])
-def test_parts_and_sets_of_abaqus(tmp_path, end):
+def independent(text):
+    """The same with the mesh in the instance, as CAE writes independent ones."""
+    part, rest = text.split("*End Part\n")
+    head, mesh = part.split("** as CAE writes it\n")
+    return f"{head}*End Part\n{rest}".replace("*End Instance\n", f"{mesh}*End Instance\n")
+
+
+@pytest.mark.parametrize(("text", "end"), [(LEVELS, "\n"), (LEVELS, "\r\n"), (independent(LEVELS), "\n")])
+def test_parts_and_sets_of_abaqus(tmp_path, text, end):
     """Nodes in several blocks, sets of sets, in parts, in ranges; a reference point of the assembly is no place."""
-    (tmp_path / "nodes.inp").write_bytes(LEVELS.replace("\n", end).encode())
+    (tmp_path / "nodes.inp").write_bytes(text.replace("\n", end).encode())
     (tmp_path / "a.inp").write_text("*Heading\n*Include, input=nodes.inp\n")
     for name in ("nodes.inp", "a.inp"):
         beam = fb.Beam.from_mesh(tmp_path / name, {"first span": THICK, "second": THIN})
