@@ -136,7 +136,7 @@ def test_one_end_moves(omega):
     frame = fb.Frame({"A": (0, 0), "B": (1.0, 0)}, [fb.Member("A", "B", SPAN)])
     wave = fb.Harmonic(1.0, omega)
     scene = fb.Scene(frame, [fb.Pinned("A"), fb.Fixed("B", "y", motion={"y": wave})])
-    kappa, at = np.sqrt(omega), np.array([0.25, 0.5, 0.9])
+    kappa, at = np.sqrt(omega), np.array([0.25, 0.5, 0.9, 1.0])
     exact = 0.5 * (np.sin(kappa * at) / np.sin(kappa) + np.sinh(kappa * at) / np.sinh(kappa))
     places, errors = [(("A-B", float(z)), "y") for z in at], []
     for modes in (8, 24):
