@@ -70,6 +70,24 @@ def test_stability_changes_at_the_flips_only(damped):
             assert found.stable != (low < found.parameter < high)
 
 
+def shifted(family, shift):
+    """The same family by its parameter less a number."""
+    return lambda parameter: family(parameter + shift)
+
+
+def test_special_points_beside_a_parameter_of_zero(damped):
+    """Where a parameter is counted from is free: also from an orbit whose next one lies behind a flip or a grazing."""
+    flips = [flip.parameter - 0.94 for flip in marks(damped, "flip")]
+    start = replace(DAMPED, omega=0.94).settled(60)
+    found = branch(shifted(over(DAMPED), 0.94), (-0.14, 0.16), start, at=0.0, step=0.25).run()
+    assert [flip.parameter for flip in marks(found, "flip")] == pytest.approx(flips, abs=1e-9)
+    exact = GAPPED.gap / GAPPED.linear_amplitude()
+    problem = replace(GAPPED, amplitude=0.99 * exact)
+    family, start = shifted(over(problem, "amplitude"), problem.amplitude), problem.steady(False, 0.0)
+    found = branch(family, (-0.2 * exact, 0.1 * exact), start, at=0.0, step=0.25).run()
+    assert [one.parameter for one in marks(found, "grazing")] == pytest.approx([0.01 * exact], abs=1e-8)
+
+
 def test_every_orbit_of_a_branch_closes(damped, doubled):
     for found in damped.orbits + doubled.orbits:
         assert found.residual < 1e-10

@@ -31,7 +31,7 @@ from solvers.orbits import Chain, Orbit, OrbitError, orbit_of
 from solvers.problem import Array
 
 ROUNDING = 1e-9  # of the test functions: a test function that is zero all along marks nothing
-_SHARP = 1e-10  # tolerance of a special point, in units of the parameter, or of the arclength between the points
+_SHARP = 1e-10  # tolerance of a special point, in units of the arclength between the points
 _AT = 1e-4  # distance of a multiplier from its value at a special point up to which it is one
 _NUDGES = 0.0, 1e-7, -1e-7, 1e-6, -1e-6  # of the arclength: for some guesses rounding keeps residuals too large
 
@@ -124,9 +124,7 @@ class Arc:
 
     def sharpness(self) -> float:
         """Arclength to which a special point is to be located."""
-        pace = abs(self.b.chain.parameter - self.a.chain.parameter) / self.length
-        fine = abs(self.a.chain.parameter) / pace if self.straight else self.length
-        return _SHARP * min(fine, self.length)
+        return _SHARP * self.length
 
 
 def between(a: Point, b: Point, length: float, before: tuple[Point, float] | None = None) -> list[Orbit]:
