@@ -16,6 +16,7 @@ import solvers.branches.count_changes
 import solvers.branches.walk
 from solvers import Contact, Exponential, OrbitError, System, branch, orbit
 from solvers.branches import recorded, restarted
+from solvers.branches.subharmonic_end import Scaled
 
 DAMPED = Bilinear(1.1, zeta=0.05)  # doubles its period between 0.83 and 0.93 rad/s
 GAPPED = Bilinear(0.8, zeta=0.05, gap=2.0)
@@ -86,6 +87,15 @@ def test_special_points_beside_a_parameter_of_zero(damped):
     family, start = shifted(over(problem, "amplitude"), problem.amplitude), problem.steady(False, 0.0)
     found = branch(family, (-0.2 * exact, 0.1 * exact), start, at=0.0, step=0.25).run()
     assert [one.parameter for one in marks(found, "grazing")] == pytest.approx([0.01 * exact], abs=1e-8)
+
+
+def test_subharmonic_end_at_a_parameter_of_zero(damped):
+    """The branch of two periods ends at the flip, where the parameter is 0, and does not retrace itself."""
+    flip = marks(damped, "flip")[0].parameter
+    start = replace(DAMPED, omega=flip + 1e-3).settled(40)
+    found = branch(Scaled(shifted(over(DAMPED), flip), 2.0), (-2e-3, 1.5e-3), start, at=1e-3, step=0.5).run()
+    assert "subharmonic end" in found.endings[-1]
+    assert min(abs(one.parameter) for one in marks(found, "flip")) < 1e-10
 
 
 def test_every_orbit_of_a_branch_closes(damped, doubled):

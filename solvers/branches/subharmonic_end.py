@@ -16,7 +16,7 @@ from solvers.branches.point import Point
 from solvers.orbits import Orbit, OrbitError, newton, orbit_of, states_at, why_not_periodic
 from solvers.problem import Array, System
 
-_SHARP = 1e-10  # of the parameter
+_SHARP = 1e-10  # of the span: the parameter itself may be 0 there
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,10 @@ def _flip(a: Point, fold: Orbit) -> Orbit | None:
     def indicator(parameter: float) -> float:
         return indicators(orbit_of(half, newton(half, x, parameter)), a.tangent)["flip"]
 
-    step = 0.01 * (a.chain.parameter - fold.parameter) or 1e-6 * a.chain.parameter
-    place = float(secant(indicator, fold.parameter, x1=fold.parameter + step, tol=_SHARP * abs(fold.parameter)))
-    if not abs(place - fold.parameter) <= 1e-3 * abs(a.chain.parameter - fold.parameter) + 1e-6 * abs(fold.parameter):
+    apart, width = a.chain.parameter - fold.parameter, float(a.metric[-1, -1] ** -0.5)
+    step = 0.01 * apart or 1e-6 * width
+    place = float(secant(indicator, fold.parameter, x1=fold.parameter + step, tol=_SHARP * width))
+    if not abs(place - fold.parameter) <= 1e-3 * abs(apart) + 1e-6 * width:
         return None
     found, whole = newton(half, x, place), replace(a.problem, fractions=(begin,))
     chain = replace(whole.evaluate(found.x, place), error=found.error, iterations=found.iterations)
