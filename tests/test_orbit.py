@@ -75,6 +75,19 @@ def test_starts_that_settle_slowly_are_on_no_unstable_orbit():
     assert all(one.orbit is None or one.orbit.stable for one in found)
 
 
+def test_a_mode_that_nothing_drives_dies_out():
+    """By the same share in every period, however small it is: half the range is F φ²/|ω₁² - ω² + 2iζω₁ω|."""
+    beam = fb.Beam(0.5, fb.Section.circle(2.1e11, 7800.0, 0.01))
+    force, damping = fb.PointForce(0.25, fb.Harmonic(20.0, 100.0)), fb.ModalDamping(0.01)
+    model = fb.Scene(beam, [fb.Pinned(0.0), fb.Pinned(0.5)], forces=[force], damping=damping).reduce(2)
+    start = model.state(lambda z: 1e-3 * np.sin(2.0 * np.pi * z / beam.length), lambda z: 0.0 * z)
+    (found,) = model.attractors(starts=[start])
+    assert found.name == "period 1 with 0 impacts"
+    w, phi = model.omega[0], model.phi(0.25)[0]
+    size = 20.0 * phi**2 / abs(w**2 - 100.0**2 + 2j * 0.01 * w * 100.0)
+    assert found.orbit.extremes(0.25) == pytest.approx((-size, size), rel=1e-6)
+
+
 def test_an_orbit_within_a_contact_where_the_period_begins_is_one_attractor():
     """Its state there does not tell the entry rate that the law has latched: one of period 2 was counted as two."""
     bar = fb.Section.rectangle(2.0e11, 7800.0, width=0.02, height=0.003)

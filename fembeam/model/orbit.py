@@ -351,6 +351,7 @@ def _settle(model: Model, T: float, start: Vector, longest: int, method: Any) ->
         strobes = np.concatenate((run.q, run.q_dot), axis=1)[-3 * longest :]
         x = np.concatenate((strobes[-1], *run.memory))
         size = np.abs(strobes).max(axis=0)
+        size = np.maximum(size, SAME * np.repeat(size.reshape(2, n).max(axis=1), n))  # what nothing drives dies out
         for k in range(1, longest + 1):
             if np.all(np.abs(strobes[k:] - strobes[:-k]) <= 1e-3 * size):
                 try:
