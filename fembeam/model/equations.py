@@ -180,6 +180,14 @@ class ModalEquations:
         shapes = self.body_shapes(body, "phi")
         return shapes(shapes.place(z), derivative)
 
+    def rows_with_supports(self, z: Any, body: int = 0) -> Vector:
+        """`phi` (…, n + k), with what the k dofs of supports that move carry of the place."""
+        shapes = self.body_shapes(body, "phi")
+        at = shapes.place(z)
+        if not shapes.named or isinstance(at, list):
+            return np.asarray(shapes.rows_with_supports(at))
+        return np.asarray(shapes.rows_with_supports([at])[0])
+
     def body_shapes(self, body: int, where: str) -> Any:
         """Mode shapes of one body; ValueError unless there is one of that number."""
         every: Any = (self.shapes, *self.others)

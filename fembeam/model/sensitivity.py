@@ -10,7 +10,7 @@ formulas of the parameter; the motion is not: its derivative solves the variatio
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -24,7 +24,7 @@ from fembeam.model.extremes import of_top, time_of_top
 from fembeam.model.reduce import signed_like
 from fembeam.model.turned import angle, turned_like
 from fembeam.response import PlacedLog, directed
-from fembeam.scene import called, changes_structure, path_of, replaced, value_of
+from fembeam.scene import called, changes_structure, loads_of_order, path_of, replaced, value_of
 from fembeam.scene.signals import is_of_signal
 from fembeam.support import Part, Printed, bar, by_rows, numbers, require, warn
 from solvers.orbits import codes, counts, delayed
@@ -127,11 +127,11 @@ class Sensitivity(Printed):
 
     def displacement(self, z: Any, direction: Any = None, body: int = 0) -> Vector:
         """Of u(z, t), m relative to the frame: (k,) at one z, (k, j) at z (j,); places as for `Run.displacement`."""
-        return self._of_motion(self.q, self._own.q, z, direction, body)
+        return self._of_motion(0, z, direction, body)
 
     def velocity(self, z: Any, direction: Any = None, body: int = 0) -> Vector:
         """Of u̇(z, t), m/s, likewise."""
-        return self._of_motion(self.q_dot, self._own.q_dot, z, direction, body)
+        return self._of_motion(1, z, direction, body)
 
     def indentation(self, stop: int | str = 0) -> Vector:
         """Of δ(t) of a stop, (k,) m or rad, its gap's own change included; stops as for `Run.indentation`."""
@@ -167,19 +167,23 @@ class Sensitivity(Printed):
         du, dv = (ask(z, direction, body) for ask in (self.displacement, self.velocity))
         return tuple(of_top(self.t, sign * u, sign * v, du, dv) for sign in (-1.0, 1.0))  # type: ignore[return-value]
 
-    def _of_motion(self, changed: Vector, motion: Vector, z: Any, direction: Any, body: int) -> Vector:
-        """Of φ·q at a place, φ·dq + dφ·q: ``changed`` is dq."""
+    def _of_motion(self, order: int, z: Any, direction: Any, body: int) -> Vector:
+        """Of φ·x at a place, φ·dx + dφ·x, where x is q or q̇ with the same of supports that move."""
         model = self.run.readout.model
         at = z if direction is None else directed(z, direction)
-        found = changed @ np.asarray(model.phi(at, 0, body)).T
+        moved = _of_supports(self.t, order, model.shapes.moving)
+        none = np.zeros((len(self.t), model.shapes.moving))
+        changed = none if self.systems is None else self.systems.derivative(moved)
+        found = np.hstack([(self.q, self.q_dot)[order], changed]) @ model.rows_with_supports(at, body).T
         if self.models is not None:
-            found = found + self._at_samples(motion) @ self._of_shapes(self.models, at, body).T
+            own = self._at_samples((self._own.q, self._own.q_dot)[order])
+            found = found + np.hstack([own, moved(model.system)]) @ self._of_shapes(self.models, at, body).T
         return np.asarray(found)
 
     def _of_shapes(self, models: Nearby, at: Any, body: int) -> Vector:
         """Of φ at a place; ValueError for one that the parameter takes away, such as the tip of a shorter beam."""
         try:
-            return models.derivative(lambda one: one.phi(at, 0, body))
+            return models.derivative(lambda one: one.rows_with_supports(at, body))
         except ValueError as error:
             raise ValueError(
                 f"no derivative by {self.parameter} of what is at {at}, which is not there at values near "
@@ -211,6 +215,16 @@ class Sensitivity(Printed):
         names += ["d t_in", "d t_out", "d peak force", "d impulse"]
         more: list[Part] = [f"and {counted(left, 'contact')} more"] if left else []
         return [head, growth, *([(names, rows)] if rows else []), *more]
+
+
+def _of_supports(t: Vector, order: int, moving: int) -> Callable[[Any], Vector]:
+    """What reads off a system the displacements or speeds (k, m) of the dofs of supports that move."""
+
+    def read(system: Any) -> Vector:
+        loads = system.loads[loads_of_order(order, moving)]
+        return np.array([np.broadcast_to(signal(t), t.shape) for _, signal in loads]).reshape(moving, len(t)).T
+
+    return read
 
 
 @dataclass(frozen=True, eq=False)
@@ -478,8 +492,8 @@ def of_orbit_by_each(orbit: Orbit, parameters: Sequence[str], times: Vector | No
     whole = orbit.run.t if times is None else times
     period = sensitivities(system, *known, list(zip(later, starts, strict=True)), whole, **options)
     return [
-        Sensitivity(one.called, one.value, orbit.run, its, longer, one.models, one.systems)
-        for one, its, longer in zip(varied, period, lengthening, strict=True)
+        Sensitivity(one.called, one.value, orbit.run, its, longer, one.models, systems)
+        for one, its, longer, systems in zip(varied, period, lengthening, later, strict=True)
     ]
 
 

@@ -64,9 +64,10 @@ class Turned:
         rows = {name: getattr(contact, name) for name in ("direction", "tangent", "rotation")}
         return replace(contact, **{name: row @ self.turn for name, row in rows.items() if row is not None})
 
-    def phi(self, z: Any, derivative: int = 0, body: int = 0) -> Vector:
-        """See `Model.phi`."""
-        return np.asarray(self.model.phi(z, derivative, body) @ self.turn)
+    def rows_with_supports(self, z: Any, body: int = 0) -> Vector:
+        """See `Model.rows_with_supports`."""
+        rows, n = self.model.rows_with_supports(z, body), len(self.turn)
+        return np.concatenate([rows[..., :n] @ self.turn, rows[..., n:]], axis=-1)
 
     def rest(self) -> Vector:
         """The start [q', q̇'] (2n,) at rest."""
