@@ -205,6 +205,15 @@ def test_brute_force_of_a_rotation_is_in_radians():
     assert "largest peak / mrad" in str(found)
 
 
+def test_brute_force_beside_a_support_that_moves():
+    """The support itself has its own amplitude, and a place in the first element moves with it."""
+    section, motion = fb.Section.circle(2.1e11, 7800.0, 0.01), {"y": fb.Harmonic(1e-3, 150.0)}
+    model = fb.Scene(fb.Beam(0.5, section), [fb.Clamped(0.0, motion=motion)], damping=fb.ModalDamping(0.05)).reduce(2)
+    for z, peak in ((0.0, 1e-3), (0.01, max(model.orbit().extremes(0.01)))):
+        found = fb.study.bifurcation(model, "supports[0].motion.y.omega", [150.0], z, settle=60, keep=1)
+        assert found.peaks[0, 0] == pytest.approx(peak, rel=1e-5)
+
+
 def between_clamps(mass: float, stop: float) -> fb.Scene:
     """A beam between clamps, driven aside of its middle; of masses and stops elsewhere it is symmetric."""
     section, sheet = fb.Section(E=1.9e11, rho=8000.0, A=58.3e-6, I=18.5e-12), PiecewiseLinear([2e4])

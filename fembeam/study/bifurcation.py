@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import solvers
 from fembeam import plot
-from fembeam.model import Model, extremes_of, load_period, observed
+from fembeam.model import Model, Run, extremes_of, load_period, observed
 from fembeam.model.branch import Family
 from fembeam.plot.axis_names import axis_name, parameter_unit
 from fembeam.plot.units import motion_for
@@ -139,6 +139,7 @@ def _settled(family: Family, z: Any, settle: int, keep: int, start: Vector, valu
     times = np.linspace(settle * T, (settle + keep) * T, keep * looks + 1)
     run = solvers.integrate(model.system, start[:n], start[n:], (settle + keep) * T, times, method)
     states = np.concatenate((run.q, run.q_dot), axis=1)[:-1:looks]
-    u, v = run.q @ model.phi(z), run.q_dot @ model.phi(z)
+    seen = Run.of(model, run)
+    u, v = seen.displacement(z), seen.velocity(z)
     periods = [slice(i, i + looks + 1) for i in range(0, keep * looks, looks)]
     return states, np.array([np.abs(extremes_of(run.t[one], u[one], v[one])).max() for one in periods])
