@@ -41,6 +41,10 @@ def test_spring_and_slider():
     np.testing.assert_allclose(found.stiffness, stiffness, rtol=1e-12)
     np.testing.assert_allclose(found.loss_stiffness, energy / (math.pi * AMPLITUDES**2), rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(found.loss_factor, found.loss_stiffness / stiffness, rtol=1e-12, atol=1e-15)
+    moved = equivalent(Jenkins(K, F), AMPLITUDES, mean=3.0 * SLIP)  # the same once it has slipped
+    exact = 1e-7  # √(2 eps m/X), of the angles where it turns
+    np.testing.assert_allclose(moved.energy, energy, rtol=exact, atol=exact * F * SLIP)
+    np.testing.assert_allclose(moved.stiffness, stiffness, rtol=exact)
     with pytest.raises(ValueError, match="give omega="):
         _ = found.damping
 
