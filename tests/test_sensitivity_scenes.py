@@ -58,6 +58,16 @@ def test_numbers_of_a_support_that_moves_change_the_start_that_follows_it(path):
         assert np.all(miss <= np.array([1e-4, 1e-5]) * np.abs(by_differences).max(axis=0))  # a stiff shape moves there
 
 
+def test_a_small_number_that_stands_for_zero():
+    """Modes do not feel a thousandth of it: the derivative by an axial force of 1 nN was three times too large."""
+    scene = fb.Scene(fb.Beam(0.5, BAR, axial_force=1e-9), [fb.Clamped(0.0)], damping=fb.ModalDamping(0.02),
+                     forces=[fb.PointForce(0.5, fb.Harmonic(1.0, 60.0))])  # fmt: skip
+    path, options = "beam.axial_force", {"modes": 2, "duration": 0.05, "dt": 1e-3}
+    found = simulated(scene, **options).sensitivity(path).displacement(0.5)
+    by_differences = differences(scene, path, 0.1, lambda run: run.displacement(0.5), **options)
+    np.testing.assert_allclose(found, by_differences, rtol=0.0, atol=1e-4 * np.abs(by_differences).max())
+
+
 def test_motion_beside_a_support_that_moves():
     """Linear: an orbit's extremes by the amplitude are in proportion; by the length the first element is another."""
     motion, damping = {"y": fb.Harmonic(1e-3, 150.0)}, fb.ModalDamping(0.05)

@@ -47,6 +47,8 @@ KNOT = 1e-7  # of an indentation where a law has a kink: small, since between bo
 UNIT = 1.0  # SI unit: stands for the value where it is zero, unless it changes modes
 SMALL = 1e-6  # part of its usual step by which a zero is varied whose usual step the scene refuses
 FELT = 1e-4  # relative change of frequencies or shapes that the step of a zero which changes modes shall exceed
+UNFELT = 1e-7  # the same, below which rounding is more than 1e-5 of it, as steps of a number below `TINY` may be
+TINY = 1e-3  # SI unit
 FIRST = 1e-6  # SI unit: the step of such a zero that is tried first
 LEAST, MOST = 1e-30, 2e6  # SI unit: the smallest and the largest step of such a zero
 ROUGH = 1e-2  # relative difference of the derivatives by one and by two steps, above which modes do not change smoothly
@@ -254,9 +256,7 @@ class _Varied:
         """Models near the present one, where modes change."""
         if not changes_structure(self.path):
             return None
-        with self._rewording_refusals():
-            step = STRUCTURE * abs(self.value) or self._felt()
-        found = self._near(self._model, step)
+        found = self._apart(STRUCTURE * abs(self.value))
         turned = found.map(lambda one: turned_like(one, self.model))
         if max(map(angle, turned.systems)) > MIXED:
             _check_turned(turned, self.called, self.model.omega)
@@ -297,6 +297,19 @@ class _Varied:
 
     def _scene(self, value: float) -> Any:
         return replaced(self.model.scene, self.path, value)
+
+    def _apart(self, step: float) -> Nearby:
+        """Models by a step of the number, by a larger one where it is zero, or stands for it."""
+        found = self._near(self._model, step) if step else None
+        if found is not None and not self._stands_for_zero(found, step):
+            return found
+        with self._rewording_refusals():
+            step = self._felt()
+        return self._near(self._model, step)
+
+    def _stands_for_zero(self, near: Nearby, step: float) -> bool:
+        """Whether a number is so small that models near it tell its step from rounding no longer."""
+        return 0.0 < abs(self.value) < TINY and max(self._change(one, step) for one in near.systems) < UNFELT
 
     def _felt(self) -> float:
         """A step of a number that is zero and changes modes, which they feel about as much as `STRUCTURE`.
