@@ -125,7 +125,16 @@ def test_a_stop():
     assert equivalent(KelvinVoigt(5e3, 0.0), 1e-3, mean=-2e-3, stop=True).stiffness[0] == 0.0
     hertz = quad(lambda x: math.cos(x) ** 2.5, 0.0, math.pi / 2)[0] * 2.0 / math.pi * 1e7 * 1e-3**0.5
     assert equivalent(Hertz(1e7), 1e-3).stiffness[0] == pytest.approx(hertz, rel=1e-8)
-    assert equivalent(Hysteretic(1e7, 0.3), 1e-3, omega=100.0).energy[0] > 0.0
+
+
+@pytest.mark.parametrize("mean", [0.0, -4e-4, 6e-4])
+def test_a_law_that_goes_by_the_rate_of_entry(mean):
+    """F = K δ (1 + a δ̇/v), v = ω √(X² - m²): W = K a X (m (α - sin α cos α) + 2/3 X sin³ α)/sin α, whatever ω."""
+    X, angle = 1e-3, math.acos(-mean / 1e-3)
+    lost = mean * (angle - math.sin(angle) * math.cos(angle)) + 2.0 / 3.0 * X * math.sin(angle) ** 3
+    for omega in (30.0, 100.0):
+        found = equivalent(Hysteretic(1e5, 0.3, exponent=1.0), X, omega, mean)
+        assert found.energy[0] == pytest.approx(1e5 * 0.3 * X * lost / math.sin(angle), rel=1e-8)
 
 
 @pytest.mark.parametrize("beside", [WaltonBraun(1e4, 3e4), WaltonBraun(1e4, 3e4) + Jenkins(2e3, 0.1), Hertz(1e7)])
