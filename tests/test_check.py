@@ -107,6 +107,23 @@ def test_contacts_to_expect_scale_with_the_law():
     assert soft.time / stiff.time == pytest.approx(100**0.4, rel=0.05)
 
 
+def test_contacts_of_impactors_and_of_further_bodies_are_expected_too():
+    """A mass strikes the tip, a second beam its own stop; of mode and mass μ = 1/(1/m + φ²), T = π √(μ/k)."""
+    beam, k, mass = fb.Beam(1.0, fb.Section.rectangle(2.1e11, 7850.0, width=0.05, height=0.02)), 1e9, 0.1
+    stop = fb.Stop(1.0, KelvinVoigt(1e6, 10.0), gap=1e-4, name="guard")
+    other = fb.Scene(beam, [fb.Clamped(0.0)], stops=[stop])
+    ball = fb.Impactor(1.0, mass, velocity=-1.0, law=KelvinVoigt(k, 0.0), gap=0.01, name="ball")
+    scene = fb.Scene(beam, [fb.Clamped(0.0)], bodies=[other], impactors=[ball], base=fb.Harmonic(1e-3, 70.0))
+    found = scene.check(modes=1)
+    assert [found.model.contact_rows[one.stop].name for one in found.touched] == ["ball", "guard"]
+    falls, guard = found.touched
+    together = 1.0 / (1.0 / mass + found.model.phi(1.0)[0] ** 2)
+    assert falls.time == pytest.approx(np.pi * np.sqrt(together / k), rel=1e-3)
+    assert falls.peak_force == pytest.approx(falls.speed * np.sqrt(together * k), rel=1e-3)
+    assert guard.contacts > 0
+    assert "ball: " in str(found)
+
+
 def test_a_record_in_ms_is_told():
     t = 0.01 * np.arange(200)
     for unit, few in ((1e3, True), (1.0, False)):

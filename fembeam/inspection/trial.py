@@ -66,7 +66,7 @@ def _trial(model: Model) -> tuple[solvers.ContactLog | None, list[str]]:
     if not len(moving):
         return None, []
     lengths = [signal.duration for signal in signals_of(model.scene).values() if hasattr(signal, "duration")]
-    share = min(1.0, FEW_STOPS / max(len(model.scene.stops), 1))
+    share = min(1.0, FEW_STOPS / max(len(_stops(model)), 1))
     driven = highest_driven(model.scene)
     quickest = max(fastest(model), driven if math.isfinite(driven) else 0.0)
     usual = min(max(PERIODS * share, LEAST_PERIODS) / float(moving.min()), MOST_PERIODS / quickest)
@@ -77,10 +77,15 @@ def _trial(model: Model) -> tuple[solvers.ContactLog | None, list[str]]:
         return None, [f"a trial of {duration:.3g} s fails: {error}"]
 
 
+def _stops(model: Model) -> list[int]:
+    """Numbers of what opens and closes: stops and impactors, those of further bodies too."""
+    return [number for number, row in enumerate(model.contact_rows) if not row.always]
+
+
 def _all_touched(model: Model, log: solvers.ContactLog | None) -> list[Touched]:
     """What to expect of the stops; nothing of one of which neither a strike nor the trial tells."""
     counts = np.bincount(np.zeros(0, dtype=int) if log is None else log.stop, minlength=len(model.contact_rows))
-    stops = range(len(model.scene.stops))
+    stops = _stops(model)
     struck = sorted(stops, key=lambda stop: -counts[stop])[:MOST_STRUCK]
     return [one for stop in stops if (one := _touched(model, log, stop, stop in struck))]
 
@@ -98,9 +103,10 @@ def _touched(model: Model, log: solvers.ContactLog | None, stop: int, struck: bo
 
 
 def _strike(model: Model, speed: float, stop: int) -> solvers.ContactLog | None:
-    """Contacts with a stop struck by the first mode; None when that does not move there."""
-    rows = model.directions[model.rows_of[stop]]
-    if np.abs(rows[:, 0]).max() <= 1e-9 * np.abs(rows).max():
+    """Contacts with a stop struck by the first mode of its body; None when that does not move there."""
+    moves = np.abs(model.directions[model.rows_of[stop]]).max(axis=0)
+    first = moves[np.flatnonzero(moves)[:1]]  # modes of other bodies are exactly 0
+    if not len(first) or first[0] <= 1e-9 * moves.max():
         return None
     try:
         return model.strike(speed, stop)

@@ -85,16 +85,16 @@ class Model(Printed, ModalEquations):
         """Contacts with one stop when the model swings into it in the first mode that moves it, nothing else acting.
 
         Tells what to expect before a study: contact time ``t_out - t_in`` of the first contact and peak force, and so
-        how many periods of the highest mode a contact lasts. Friction is left out.
+        how many periods of the highest mode a contact lasts. Friction is left out. An impactor arrives by itself.
 
         Parameters
         ----------
         speed : m/s at the stop on arrival, > 0.
-        stop : its number.
+        stop : its number, as in the contact log: elements, impactors and stops of further bodies count on.
         """
         require_positive("speed", speed, "Model.strike", "give the speed of arrival in m/s")
-        known = is_whole(stop) and 0 <= stop < len(self.scene.stops)
-        require(known, f"stop must be below {len(self.scene.stops)}", stop, "Model.strike",
+        known = is_whole(stop) and 0 <= stop < len(self.contact_rows) and not self.contact_rows[stop].always
+        require(known, f"stop must be below {len(self.contact_rows)} and no element", stop, "Model.strike",
                 "count from 0")  # fmt: skip
         contact = initial_states.smooth(self.system.contacts[stop])
         require(bool(contact.direction.any()), "a mode must move the stop", contact.name, "Model.strike",
@@ -103,14 +103,20 @@ class Model(Printed, ModalEquations):
         if contact.map == "annulus":
             start[:, 0] = initial_states.onto_circle(contact, speed)
         else:
-            reach = np.abs(contact.direction)
-            mode = int(np.argmax(reach >= _MOVES * reach.max()))
+            mode = self._arriving(np.abs(contact.direction))
             start[:, mode] = np.array([-contact.gap, -float(speed)]) / contact.direction[mode]
         system = solvers.System(self.system.M, self.system.C, self.system.K, [contact], gyroscopic=self.turning)
         slowest = max(float(self.omega[mode]), 1.0)
         with whole_runs():
             found = solvers.integrate(system, *start, np.pi / slowest).contacts
         return PlacedLog.of(found, self.sites[stop : stop + 1])
+
+    def _arriving(self, reach: Vector) -> int:
+        """The coordinate that brings a stop of |row| (n,) to its surface: its impactor, else the first to move it."""
+        free = len(reach) - len(self.matrices.impactors)  # these are the last coordinates
+        if reach[free:].any():
+            return free + int(np.argmax(reach[free:]))
+        return int(np.argmax(reach >= _MOVES * reach.max()))
 
     def under(self, scene: Scene) -> Model:
         """The same model of a scene that differs in signals, gaps and laws only; what depends on none is kept."""
