@@ -124,6 +124,24 @@ def test_contacts_of_impactors_and_of_further_bodies_are_expected_too():
     assert "ball: " in str(found)
 
 
+def test_suggested_modes_are_those_of_every_body():
+    """A second beam beside the first, which changes nothing of it: as many modes of each are enough."""
+    beam, stop = fb.Beam(1.0, fb.Section.rectangle(2.1e11, 7850.0, width=0.05, height=0.02)), Hertz(1e8)
+    alone = fb.Scene(beam, [fb.Clamped(0.0)], stops=[fb.Stop(1.0, stop, gap=1e-4)], base=fb.Harmonic(1e-3, 700.0))
+    two = replace(alone, bodies=[fb.Scene(beam, [fb.Clamped(0.0)])])
+    one, both = (scene.check(modes=2).modes for scene in (alone, two))
+    assert next(iter(one.values())) == 3  # 105, 658 rad/s, and 1842, the first beyond 1.5 * 700
+    assert both == one
+
+
+def test_a_body_without_damping_beside_a_damped_one_is_told():
+    beam = fb.Beam(1.0, fb.Section.rectangle(2.1e11, 7850.0, width=0.05, height=0.02))
+    damped, bare = (fb.Scene(beam, [fb.Clamped(0.0)], damping=fb.ModalDamping(zeta)) for zeta in (0.02, 0.0))
+    for own, other, told in ((damped, bare, True), (damped, damped, False), (bare, bare, False)):
+        said = list(replace(own, bodies=[other]).check(modes=2))
+        assert any(one.startswith("bodies[0]: nothing damps it") for one in said) is told
+
+
 def test_a_record_in_ms_is_told():
     t = 0.01 * np.arange(200)
     for unit, few in ((1e3, True), (1.0, False)):

@@ -16,7 +16,7 @@ import numpy as np
 
 import solvers
 from fembeam.inspection import sampling, units
-from fembeam.inspection.trial import Touched, expected, fastest, of_contacts
+from fembeam.inspection.trial import Touched, expected, fastest, of_contacts, stops
 from fembeam.model.mode_table import mode_part, mode_rows
 from fembeam.scene import unit_of
 from fembeam.study.decay import correlation_time
@@ -162,7 +162,7 @@ def _suggested_modes(scene: Scene, shortest: float) -> dict[str, int]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         try:
-            omega = scene.reduce(modes=MOST_MODES).omega
+            model = scene.reduce(modes=MOST_MODES)
         except (ValueError, RuntimeError):
             return {}
     wanted = {}
@@ -171,8 +171,10 @@ def _suggested_modes(scene: Scene, shortest: float) -> dict[str, int]:
         wanted["modes for the motion, to the first above 1.5 times the highest frequency that drives it"] = 1.5 * top
     if shortest < math.inf:
         wanted["modes for contact forces, to the first above 3π over the contact time"] = 3 * math.pi / shortest
-    counts = {name: 1 + int(np.count_nonzero(omega <= w)) for name, w in wanted.items()}
-    return {name if n <= len(omega) else f"{name} (at least)": min(n, len(omega)) for name, n in counts.items()}
+    each = [model.omega[own] for own in units.of_each_body(model)]  # `modes` counts those of every body
+    most = max(map(len, each))
+    counts = {name: 1 + max(int(np.count_nonzero(omega <= w)) for omega in each) for name, w in wanted.items()}
+    return {name if n <= most else f"{name} (at least)": min(n, most) for name, n in counts.items()}
 
 
 def _limits(model: Model) -> dict[str, float]:
@@ -183,7 +185,7 @@ def _limits(model: Model) -> dict[str, float]:
     for method in (solvers.RK4(1e-6), solvers.HenonRK2(1e-6, 1e-6)):
         limit = method.stable_dt(model.system)
         name = type(method).__name__
-        steps = {"flight": limit.flight, **({"contact": limit.contact} if model.scene.stops else {})}
+        steps = {"flight": limit.flight, **({"contact": limit.contact} if stops(model) else {})}
         found |= {f"step of {name} in {where}, at most": step for where, step in steps.items() if 0 < step < math.inf}
     return found
 

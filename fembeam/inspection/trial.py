@@ -66,7 +66,7 @@ def _trial(model: Model) -> tuple[solvers.ContactLog | None, list[str]]:
     if not len(moving):
         return None, []
     lengths = [signal.duration for signal in signals_of(model.scene).values() if hasattr(signal, "duration")]
-    share = min(1.0, FEW_STOPS / max(len(_stops(model)), 1))
+    share = min(1.0, FEW_STOPS / max(len(stops(model)), 1))
     driven = highest_driven(model.scene)
     quickest = max(fastest(model), driven if math.isfinite(driven) else 0.0)
     usual = min(max(PERIODS * share, LEAST_PERIODS) / float(moving.min()), MOST_PERIODS / quickest)
@@ -77,7 +77,7 @@ def _trial(model: Model) -> tuple[solvers.ContactLog | None, list[str]]:
         return None, [f"a trial of {duration:.3g} s fails: {error}"]
 
 
-def _stops(model: Model) -> list[int]:
+def stops(model: Model) -> list[int]:
     """Numbers of what opens and closes: stops and impactors, those of further bodies too."""
     return [number for number, row in enumerate(model.contact_rows) if not row.always]
 
@@ -85,9 +85,9 @@ def _stops(model: Model) -> list[int]:
 def _all_touched(model: Model, log: solvers.ContactLog | None) -> list[Touched]:
     """What to expect of the stops; nothing of one of which neither a strike nor the trial tells."""
     counts = np.bincount(np.zeros(0, dtype=int) if log is None else log.stop, minlength=len(model.contact_rows))
-    stops = _stops(model)
-    struck = sorted(stops, key=lambda stop: -counts[stop])[:MOST_STRUCK]
-    return [one for stop in stops if (one := _touched(model, log, stop, stop in struck))]
+    known = stops(model)
+    struck = sorted(known, key=lambda stop: -counts[stop])[:MOST_STRUCK]
+    return [one for stop in known if (one := _touched(model, log, stop, stop in struck))]
 
 
 def _touched(model: Model, log: solvers.ContactLog | None, stop: int, struck: bool) -> Touched | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
@@ -21,7 +22,7 @@ STICKY = 3.0  # a coefficient of friction beyond that of rubber
 
 def doubts(model: Model) -> list[str]:
     """Warnings about the numbers of a model's scene, as sentences; of its bodies, too."""
-    return [*of_bodies(model.scene), *of_loads(model.scene, model)]
+    return [*of_bodies(model.scene), *of_undamped(model), *of_loads(model.scene, model)]
 
 
 def of_bodies(scene: Scene) -> list[str]:
@@ -30,6 +31,22 @@ def of_bodies(scene: Scene) -> list[str]:
     for i, body in enumerate(scene.bodies):
         found += [f"bodies[{i}]: {said}" for said in _of_body(body)]
     return found
+
+
+def of_each_body(model: Model) -> list[slice]:
+    """The coordinates of each body, the scene's own first."""
+    ends = np.cumsum([0, *map(sum, model.counts)])
+    return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+
+
+def of_undamped(model: Model) -> list[str]:
+    """Bodies without damping beside others that have some: that of a scene is of its own body alone."""
+    damped = [bool(model.system.C[own, own].any()) for own in of_each_body(model)]
+    return [
+        f"bodies[{i - 1}]: nothing damps it; the damping of a scene is that of its own body, give this one its own"
+        for i, found in enumerate(damped)
+        if i and damped[0] and not found
+    ]
 
 
 def _of_body(scene: Scene) -> list[str]:
