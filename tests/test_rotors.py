@@ -86,6 +86,13 @@ def test_a_disk_that_spins_fast():
     np.testing.assert_allclose(few.signed, many.signed[:, :2], rtol=5e-6)
 
 
+def test_a_housing_that_moves_leaves_the_diagram_as_it_is():
+    housing = fb.Frame({"S": (0.3, 0, 0.5), "T": (0.1, 0, 0.5)}, [fb.Member("S", "T", SECTION)])
+    stop = fb.AnnularStop("B", KelvinVoigt(2e6, 300.0), 1e-4, on=(1, "T"), directions=("x", "y"))
+    scene = rotor(bodies=[fb.Scene(housing, [fb.Clamped("S")])], stops=[stop])
+    np.testing.assert_array_equal(scene.campbell([0.0, 300.0]).signed, rotor().campbell([0.0, 300.0]).signed)
+
+
 def test_twist_and_stretch_are_no_critical_speeds():
     """They meet the spin at their own frequencies, which no unbalance excites."""
     shaft = fb.Frame.straight(LENGTH, SECTION)

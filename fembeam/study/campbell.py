@@ -86,6 +86,7 @@ def campbell(
     Parameters
     ----------
     scene : with a straight `Frame` in space, whatever its own spin; its disks, masses, springs and supports count.
+        Stops, elements and bodies that these alone connect with it do not.
     spins : (k,) rad/s, ascending.
     modes : how many frequencies of each spin, 1 to 64.
     elements : of the mesh; None: as few as make the frequencies right to 1e-6.
@@ -140,7 +141,7 @@ def check_modes(modes: Any) -> None:
 def check_shaft(scene: Scene) -> Frame:
     """The shaft of a scene; ValueError where there is none."""
     body = scene.beam
-    shaft = isinstance(body, Frame) and body.axis is not None and not body.in_plane and not scene.bodies
+    shaft = isinstance(body, Frame) and body.axis is not None and not body.in_plane
     require(shaft, "a Campbell diagram needs one shaft: a straight Frame in space", type(body).__name__, WHERE,
             "use Frame.straight")  # fmt: skip
     assert isinstance(body, Frame)
@@ -159,7 +160,8 @@ def _at_unit_spin(scene: Scene, modes: int, elements: int | None) -> tuple[reduc
     All in the coordinates of these modes, whose vectors are unit vectors then.
     """
     body = check_shaft(scene)
-    spun = replace(scene, beam=replace(body, spin=1.0), stops=(), elements=(), forces=(), base=None, gravity=0.0)
+    bare = replace(scene, stops=(), elements=(), bodies=(), forces=(), base=None, gravity=0.0)
+    spun = replace(bare, beam=replace(body, spin=1.0))
     wanted = 2 * modes + SPARE
     matrices: Any = spun.matrices(elements, wanted)
     count = min(2 * modes + BASIS, matrices.M.shape[0])
