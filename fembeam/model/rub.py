@@ -95,8 +95,9 @@ def _spun(model: Model, spin: float | None) -> tuple[Model, float]:
     """The model at a spin, and Ω about the axis of its stop."""
     scene, stops = model.scene, model.scene.stops
     one = len(stops) == 1 and isinstance(stops[0], AnnularStop) and not scene.elements and not scene.bodies
-    require(one, "a synchronous rub needs one AnnularStop, and no other stop, element or body", stops, WHERE,
-            "leave the others out")  # fmt: skip
+    has = {"stops": len(stops), "elements": len(scene.elements), "bodies": len(scene.bodies)}
+    require(one, "a synchronous rub needs one AnnularStop, and no other stop, element or body", has, WHERE,
+            "leave the others out; else ask orbit()")  # fmt: skip
     if spin is not None:
         require_finite("spin", spin, WHERE, "give rad/s")
     if not hasattr(scene.beam, "spin"):  # turned by its loads alone
