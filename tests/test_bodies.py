@@ -83,6 +83,24 @@ def test_impactor_on_both_sides_rattles_within_its_clearance():
     assert np.abs(relative).max() > 0.9e-3
 
 
+def test_impactors_are_called_by_name_too(tmp_path):
+    ball = fb.Impactor(0.3, 0.05, -2.0, HERTZ, 1e-3, name="ball")
+    ring = fb.Impactor(0.2, 0.05, 1.0, HERTZ, 1e-3, "both", name="ring")
+    stop = fb.Stop(0.4, HERTZ, 1e-2, name="guard")
+    run = (
+        fb.Scene(fb.Beam(0.4, STEEL), [fb.Clamped(0.0)], stops=[stop], impactors=[ball, ring])
+        .reduce(2)
+        .simulate(0.01, 1e-3)
+    )
+    for one in (run, fb.load(run.save(tmp_path / "run.npz"))):
+        for number, name in enumerate(("ball", "ring")):
+            np.testing.assert_array_equal(one.impactor_displacement(name), run.impactor_displacement(number))
+            np.testing.assert_array_equal(one.impactor_velocity(name), run.impactor_velocity(number))
+    for none in ("guard", "bell"):
+        with pytest.raises(ValueError, match="impactor must be below 2, the number of impactors, or the name of one"):
+            run.impactor_displacement(none)
+
+
 def test_sprung_mass_without_contact_swings_by_itself():
     k, m, v = 400.0, 0.25, 0.3
     scene = fb.Scene(fb.Beam(0.4, STEEL), [fb.Clamped(0.0)],

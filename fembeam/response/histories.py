@@ -267,22 +267,33 @@ class Histories:
         values = self._q_of(body) @ shapes.T + offset
         return values if places.ndim else values[:, 0]
 
-    def impactor_displacement(self, impactor: int = 0) -> Vector:
-        """x(t) (k,) of an impactor from its place at the start, relative to the frame, m."""
+    def impactor_displacement(self, impactor: int | str = 0) -> Vector:
+        """x(t) (k,) of an impactor, by number or name, from its place at the start, relative to the frame, m.
+
+        Positive up, of frames and structures along its direction. ``displacement("ball")`` is that of the place below
+        it instead.
+        """
         return self._of_impactor(self.q, impactor)
 
-    def impactor_velocity(self, impactor: int = 0) -> Vector:
-        """ẋ(t) (k,) of an impactor relative to the frame, m/s."""
+    def impactor_velocity(self, impactor: int | str = 0) -> Vector:
+        """ẋ(t) (k,) of an impactor relative to the frame, m/s; as for `impactor_displacement`."""
         return self._of_impactor(self.q_dot, impactor)
 
-    def _of_impactor(self, coordinates: Vector, impactor: int) -> Vector:
+    def _of_impactor(self, coordinates: Vector, impactor: int | str) -> Vector:
         """One of the last columns, without its √m."""
         count = len(self.impactor_masses)
-        right = is_whole(impactor) and 0 <= impactor < count
-        require(right, f"impactor must be below {count}, the number of impactors", impactor, "Run",
-                "count from 0")  # fmt: skip
-        column = coordinates.shape[1] - count + impactor
-        return self._at_samples(coordinates)[:, column] / np.sqrt(self.impactor_masses[impactor])
+        first = coordinates.shape[1] - count
+        number = self._impactor_of(impactor, first) if isinstance(impactor, str) else impactor
+        right = is_whole(number) and 0 <= number < count
+        require(right, f"impactor must be below {count}, the number of impactors, or the name of one", impactor, "Run",
+                "count from 0, or see run.names")  # fmt: skip
+        return self._at_samples(coordinates)[:, first + number] / np.sqrt(self.impactor_masses[number])
+
+    def _impactor_of(self, name: str, first: int) -> int:
+        """The number of the impactor called so, on both sides too, -1 for none; their coordinates begin at `first`."""
+        mine = [i for i, own in enumerate(self.names) if own in (name, f"{name}, below")]
+        rows = [self.directions[self._rows[i].start, first:] for i in mine]
+        return next((int(np.argmax(np.abs(row))) for row in rows if row.any()), -1)
 
     def unit(self, quantity: str, stop: int | str | None = None) -> str:
         """Unit of "indentation", "speed", "force" or "impulse" of a stop; None: of a column that all of them share."""
