@@ -390,6 +390,7 @@ MARKET = [
     ("name", "lines", "message"),
     [
         ("a.pdf", ["%PDF-1.4 nothing of this kind"], "a.pdf, its suffix: expected one of .dmig, .hb, .*, got '.pdf'"),
+        ("K.txt", ["2.0 -1.0", "-1.0 1.0"], "got '.txt'; rows of numbers as text are read by numpy.loadtxt"),
         ("a.op4", [], "a.op4, byte 0: expected a matrix, got an empty file"),
         ("k.mtx", MARKET[:-2], "k.mtx, line 8: expected the last of 8 entries, got the last of 6"),
         ("k.mm", [*MARKET[:3], "2 1 "], "k.mm, line 4: expected row, column, value, got '2 1 '"),

@@ -79,7 +79,8 @@ def _reader(path: Path, head: bytes) -> Callable[[Path], Given]:
         return read_dmig
     if len(lines) > 3 and lines[2][:3].upper() in ("RSA", "RUA"):
         return read_harwell_boeing
-    raise wrong(path, "its suffix", f"one of {', '.join(sorted(SUFFIXES))}", repr(path.suffix))
+    got = f"{path.suffix!r}; rows of numbers as text are read by numpy.loadtxt, for Structure(K, M, labels=…)"
+    raise wrong(path, "its suffix", f"one of {', '.join(sorted(SUFFIXES))}", got)
 
 
 def structure_arguments(
