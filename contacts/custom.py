@@ -252,7 +252,8 @@ def _check_jump(made: CustomLaw) -> None:
         if nearer > 0.5 * near and nearer > 1e-12 * np.abs(made.force(1e-3, rate, 1.0)):
             raise ValueError(
                 f"law {made.name!r} jumps to {nearer:g} N at delta = 0+ with delta_dot = {rate:g} m/s; "
-                "declare it with @law(jump=True), so that integrators locate it"
+                "declare it with @law(jump=True), so that integrators locate it; a law of an Element, too, is bound "
+                "so, and loses nothing by it"
             )
 
 

@@ -553,7 +553,9 @@ def test_an_undeclared_jump_is_refused():
     def dashpot(delta, delta_dot, entry_rate, c):
         return 1e5 * delta + c * delta_dot
 
-    with pytest.raises(ValueError, match=r"'dashpot' jumps to 20 N at delta = 0\+ with delta_dot = 1 m/s.*jump=True"):
+    with pytest.raises(
+        ValueError, match=r"'dashpot' jumps to 20 N at delta = 0\+ with delta_dot = 1 m.*jump=True.*Element"
+    ):
         law(dashpot)(c=20.0)
     assert law(dashpot)(c=0.0).force(1e-3) == pytest.approx(100.0, rel=1e-15)
     assert law(jump=True)(dashpot)(c=20.0).jump
