@@ -34,7 +34,8 @@ class BandNoise(NoiseLines):
     Parameters
     ----------
     std : float
-        Standard deviation of y (m), > 0; the level S is such that Δω Σ S(ω_k) = std² exactly.
+        Standard deviation of y, > 0, m of base motion, N of a force; the level S is such that Δω Σ S(ω_k) = std²
+        exactly.
     band : (lo, hi)
         Band in rad/s, 0 <= lo < hi; no line lies outside, and none at ω = 0.
     seed : int >= 0 or numpy.random.SeedSequence
