@@ -237,6 +237,7 @@ test_mistakes_are_named = refused_files(
     ("modes = 2", "modes = true", r"\[reduce\]: .* a whole number or a list of whole numbers or 'all', got true"),
     ("modes = 2", "mode = 2", r"\[reduce\]: unknown key 'mode'; did you mean 'modes'"),
     ("modes = 2", "modes = 2\ngravity = 9.81", r"unknown key 'gravity'; gravity stands above all tables \(valid"),
+    ("[damping]", "[damping]\nmodes = 2", r"unknown key 'modes'; modes of a run stand in \[reduce\] \(valid"),
     ("[beam]", 'gravity = "9.81"\n[beam]', r"toml:\d+: the file: gravity must be a number, or three, got '9.81'"),
     ("modes = 2", "modes = -1", r"\[reduce\]: modes must be a count above 0 or a list"),
     ("[base]", "[base.y]", r"\[base.y\]: the base of a beam moves along y alone: write \[base\] with kind = "),

@@ -38,6 +38,7 @@ LISTS = (*FEATURES, "bodies", "joints")
 
 USUAL = ("lumped_mass", "point_force", "stop")  # kinds that need not be named
 SHORT = {"annular_stop": "annular"}
+ELSEWHERE = {"gravity": "; gravity stands above all tables", "modes": "; modes of a run stand in [reduce]"}
 
 
 class SceneFileError(ValueError):
@@ -290,9 +291,8 @@ class TableReader:
         """Every key is a valid one, else "unknown key 'mas'; did you mean 'mass'?"."""
         for key in table:
             if key not in valid:
-                above = "; gravity stands above all tables" if key == "gravity" else ""
                 hint = angular(key, valid) or nearest(key, valid)
-                self.fail(where, f"unknown {what} {key!r}{hint}{above} (valid: {listed(valid)})")
+                self.fail(where, f"unknown {what} {key!r}{hint}{ELSEWHERE.get(key, '')} (valid: {listed(valid)})")
 
     def need(self, table: Table, keys: Sequence[str], where: str, told: str = "") -> None:
         """Every key stands in the table."""
