@@ -83,6 +83,15 @@ def test_impactor_on_both_sides_rattles_within_its_clearance():
     assert np.abs(relative).max() > 0.9e-3
 
 
+def test_the_count_of_dofs_says_whose_they_are():
+    beam = fb.Scene(fb.Beam(0.4, STEEL), [fb.Clamped(0.0)])
+    assert "further" not in str(beam.matrices(modes=2))
+    assert " free dofs with those of further bodies: " in str(replace(beam, bodies=[beam]).matrices(modes=2))
+    column = fb.Scene(fb.Frame({"A": (0, 0), "B": (0, 1)}, [fb.Member("A", "B", STEEL)]), [fb.Clamped("A")])
+    assert "further" not in str(column.matrices(modes=2))
+    assert str(replace(column, bodies=[column]).matrices(modes=2)).endswith(" free, with those of further bodies")
+
+
 def test_impactors_are_called_by_name_too(tmp_path):
     ball = fb.Impactor(0.3, 0.05, -2.0, HERTZ, 1e-3, name="ball")
     ring = fb.Impactor(0.2, 0.05, 1.0, HERTZ, 1e-3, "both", name="ring")

@@ -206,7 +206,8 @@ class Matrices:
     @property
     def accuracy(self) -> str:
         """What the mesh promises, in a sentence."""
-        size = f"{self.elements} elements, {self.M.shape[0]} free dofs"
+        beside = " with those of further bodies" if self.bodies else ""
+        size = f"{self.elements} elements, {self.M.shape[0]} free dofs{beside}"
         if self.modes is None:
             return f"{size}: elements as asked, frequency_error(omega) estimates the error"
         return f"{size}: the lowest {self.modes} frequencies are right to {mesh.FREQUENCY_TOLERANCE:g} relative"

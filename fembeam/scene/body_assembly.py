@@ -91,7 +91,8 @@ class BodyMatrices(Matrices):
     def accuracy(self) -> str:
         """What the body says of its matrices, and what became of them."""
         static = f", {len(self.massless)} of them without mass follow statically" if self.massless else ""
-        return f"{self.assembled.accuracy}{static}; {self.M.shape[0]} free"
+        beside = ", with those of further bodies" if self.bodies else ""
+        return f"{self.assembled.accuracy}{static}; {self.M.shape[0]} free{beside}"
 
 
 def respun(matrices: Matrices, before: Scene, after: Scene) -> BodyMatrices | None:
