@@ -54,6 +54,8 @@ EXACT = {  # a beam, other parts than a clamp, and what of them is told to `exac
     "wedge": (fb.Beam(1.0, wedge(0.2)), {}, {}),
     "pyramid": (fb.Beam(1.0, wedge(0.1, 0.1)), {}, {}),
     "spans, tip mass": (fb.Beam.of_spans(SPANS), {"masses": [fb.LumpedMass(1.25, 3.0)]}, {"tip_mass": 3.0}),
+    "steep wedge, heavy tip": (fb.Beam(1.0, wedge(8.0)), {"masses": [fb.LumpedMass(1.0, 1e3)]}, {"tip_mass": 1e3}),
+    "short cone": (fb.Beam.of_spans([(0.02, wedge(3.0, 3.0)), (1.0, wedge(0.999))]), {}, {}),
     "elastic tip": (fb.Beam(1.0, UNIT), {"springs": [fb.Spring(1.0, 1e3)]}, {"tip_stiffness": 1e3}),
     "elastic clamp": (fb.Beam(1.0, UNIT), {"supports": [], "springs": [fb.Spring(0.0, 20.0, 5.0)]},
                       {"root": (20.0, 5.0)}),

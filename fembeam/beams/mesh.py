@@ -1,7 +1,8 @@
 """Where the nodes go: on every feature, and as dense as the bending waves of the highest mode kept ask for.
 
 Relative error of ω on cubic Hermite elements of length h: (κ h)⁴/1440, with the wavenumber κ of
-EI κ⁴ - |N| κ² = max(ρA ω², k), which also covers the boundary layers of tension and foundation.
+EI κ⁴ - |N| κ² = max(ρA ω², k), which also covers the boundary layers of tension and foundation. In a taper the
+curvature M/EI is no straight line either: relative error of ω up to g⁴/180, where EI changes by g along an element.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ Vector = NDArray[np.float64]
 FREQUENCY_TOLERANCE = 1e-6  # relative, promised for each mode asked for
 ERROR_CONSTANT = 1 / 1440  # relative error of omega of a cubic Hermite mesh: (beta h)^4/1440
 WAVE_STEP = (0.65 * FREQUENCY_TOLERANCE / ERROR_CONSTANT) ** 0.25  # beta h = 0.175, a third below the promise
+TAPER_STEP = (0.65 * FREQUENCY_TOLERANCE * 180) ** 0.25  # g = 0.104
+SAMPLES = 200  # of each interval of a beam with tapers
 MESHED_MODES = 10  # modes for whose frequencies a mesh is made where none are asked for
 MOST_ELEMENTS = 10_000  # of one mesh: above it rounding of K hides the lowest frequencies
 SAME_PLACE = 1e-9  # of the length: features closer than this share a node
@@ -40,11 +43,51 @@ def slowness(beam: Beam, nodes: Vector) -> Vector:
 
 def wavenumber(beam: Beam, nodes: Vector, omega: float) -> Vector:
     """κ in 1/m, the largest between neighbouring nodes."""
-    profile = beam.profile(nodes[:-1, None] + np.diff(nodes)[:, None] * INSIDE)
+    return _waves(beam, nodes[:-1, None] + np.diff(nodes)[:, None] * INSIDE, omega).max(axis=1)
+
+
+def _waves(beam: Beam, z: Vector, omega: float) -> Vector:
+    """κ in 1/m at z."""
+    profile = beam.profile(z)
     EI = profile.E * profile.I
     half = abs(beam.axial_force) / (2 * EI)
     squared = half + np.sqrt(half**2 + np.maximum(profile.rho * profile.A * omega**2, beam.foundation) / EI)
-    return np.sqrt(squared).max(axis=1)
+    return np.sqrt(squared)
+
+
+def _change(beam: Beam, z: Vector) -> Vector:
+    """|EI'|/EI in 1/m at z (k, s) along k tapers, by a bound: that of the width and thrice that of the height."""
+    profile = beam.profile(z)
+    height = np.sqrt(profile.I / profile.A)
+    sides = ((1, profile.A / height), (3, height))
+    parts = [power * np.ptp(one, axis=1)[:, None] / one for power, one in sides]
+    return np.asarray(sum(parts) / np.ptp(z, axis=1)[:, None])
+
+
+def demand(beam: Beam, borders: Vector, omega: float) -> Vector:
+    """How many elements (k, s) are needed from each border to s places of equal distance up to the next one.
+
+    So that κ h stays below WAVE_STEP at omega, and the change of EI along an element below TAPER_STEP.
+    """
+    x = np.linspace(0.0, 1.0, SAMPLES if beam.tapered else 2)
+    h = np.diff(borders)[:, None]
+    z = borders[:-1, None] + h * np.clip(x, INSIDE[0], INSIDE[-1])
+    dense = _waves(beam, z, omega) / WAVE_STEP
+    if beam.tapered:
+        finest = 2.0 / (beam.length * (SHORTEST_PRESSED if beam.axial_force < 0 else SHORTEST))
+        dense = np.hypot(dense, np.minimum(_change(beam, z) / TAPER_STEP, finest))  # errors of curvature go with h²
+    steps = h * np.diff(x) * (dense[:, 1:] + dense[:, :-1]) / 2
+    return np.hstack([0.0 * h, np.cumsum(steps, axis=1)])
+
+
+def placed(borders: Vector, needed: Vector, counts: NDArray[np.int64]) -> Vector:
+    """Nodes with counts[i] elements between borders i and i + 1, each for an equal part of the `demand`."""
+    x = np.linspace(0.0, 1.0, needed.shape[1])
+    parts = [
+        start + (end - start) * np.append(0.0, np.interp(np.arange(1, count) / count * own[-1], own, x))
+        for start, end, count, own in zip(borders[:-1], borders[1:], counts, needed, strict=True)
+    ]
+    return np.append(np.concatenate(parts), borders[-1])
 
 
 def divided(borders: Vector, counts: NDArray[np.int64]) -> Vector:

@@ -337,14 +337,14 @@ def check_counts(elements: int | None, modes: int | None) -> None:
 
 
 def _resolving(scene: Scene, borders: Vector, modes: int) -> Vector:
-    """Nodes with as few elements as keep κ h below WAVE_STEP; omega is estimated on a coarse mesh."""
+    """Nodes with as few elements as `mesh.demand` asks for; omega is estimated on a coarse mesh."""
     coarse = _on_nodes(scene, mesh.spread(scene.beam, borders, 2 * modes + 4), None)
     omega = reduction.modal_basis(coarse.M, coarse.K, modes, root=coarse.root).omega[-1]
-    waves = np.diff(borders) * mesh.wavenumber(scene.beam, borders, float(omega))
-    counts = np.maximum(1, np.ceil(waves / mesh.WAVE_STEP))
+    needed = mesh.demand(scene.beam, borders, float(omega))
+    counts = np.maximum(1, np.ceil(needed[:, -1]))
     require(counts.sum() <= mesh.MOST_ELEMENTS, f"{modes} modes must need at most {mesh.MOST_ELEMENTS} elements",
             counts.sum(), "Scene.matrices", "is a length in mm, or a place next to another one?")  # fmt: skip
-    return mesh.divided(borders, counts.astype(int))
+    return mesh.placed(borders, needed, counts.astype(int))
 
 
 def _check_buckling(scene: Scene) -> None:
