@@ -75,6 +75,15 @@ def test_moving_mass_of_rigid_bodies_at_supports(frame):
     assert np.ravel(of_mesh.moving_mass)[0] == pytest.approx(0.9985 * own + exact, abs=1e-3 * own)
 
 
+def test_moving_mass_of_joined_frames_is_that_of_one_frame():
+    steel = fb.Section.circle(2.1e11, 7800.0, 0.01)
+    first, second = (fb.Frame.polyline({"A": a, "B": b}, steel) for a, b in (((0, 0), (0, 1)), ((0, 1), (2, 1))))
+    beside = [fb.Scene(second, [fb.Clamped("B")])]
+    scene = fb.Scene(first, [fb.Clamped("A")], [fb.LumpedMass((0, "B"), 0.5)], bodies=beside,
+                     joints=[fb.Joint("B", to=(1, "A"), dofs="xy")])  # fmt: skip
+    np.testing.assert_allclose(scene.reduce(modes=2).moving_mass, 2 * [3 * steel.line_mass + 0.5], rtol=1e-12)
+
+
 def test_start_of_a_mode_shape_is_that_mode(model):
     start = model.state(displacement=lambda z: 2e-3 * model.phi(z)[:, 1], velocity=lambda z: 0.3 * model.phi(z)[:, 0])
     np.testing.assert_allclose(start, [0.0, 2e-3, 0.3, 0.0], atol=3e-6 * 0.3)

@@ -120,7 +120,7 @@ def body_matrices(scene: Scene, elements: int | None, modes: int | None, probes:
     held = _held(scene, assembled)
     require(len(held) < assembled.M.shape[0], "supports must leave dofs free", len(held), "Scene", "remove one")
     found = _of(scene, assembled, modes, held, condense=True)
-    if elements is None and isinstance(scene.beam, Frame):
+    if elements is None and all(isinstance(one, Frame) for one in getattr(scene.beam, "bodies", (scene.beam,))):
         found = replace(found, limit=_limit(scene, found))
     moved = [_dof(scene, assembled, support, dof) for support in scene.supports for dof in support_motion(support)]
     if moved:
