@@ -48,6 +48,12 @@ def test_chosen_modes_keep_their_own_damping():
     np.testing.assert_array_equal(chosen.zeta, [0.02, 0.03])
 
 
+def test_a_beam_moves_with_its_frame_along_y_alone(model):
+    np.testing.assert_array_equal(model.participation_along("y"), model.participation)
+    with pytest.raises(ValueError, match="the frame must move along y, got 'z' in Model"):
+        model.participation_along("z")
+
+
 def test_share_of_the_first_mode_of_a_cantilever():
     # Γ²/ρAl = (2 σ/λ)², σ = (sinh λ - sin λ)/(cosh λ + cos λ), whatever mesh the modes asked for need
     lam = 1.875104068711961

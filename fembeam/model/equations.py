@@ -128,7 +128,8 @@ class ModalEquations:
 
     def participation_along(self, direction: str) -> Vector:
         """Γ (n,) of a motion of the frame in one direction."""
-        return self.participation if self.participation.ndim == 1 else self.participation[:, self._column(direction)]
+        column = self._column(direction)
+        return self.participation if self.participation.ndim == 1 else self.participation[:, column]
 
     def _column(self, direction: str) -> int:
         """Number of a direction among those in which the frame may move."""
