@@ -161,6 +161,8 @@ def test_files_that_are_no_meshes_are_refused(tmp_path):
             fb.Beam.from_mesh(tmp_path / name, THIN)
     with pytest.raises(ValueError, match=r"the suffix must be one of .msh, .inp, .vtu, .vtk, got '.stl'"):
         fb.Beam(1.0, THIN).to_mesh(tmp_path / "a.stl")
+    with pytest.raises(ValueError, match="elements must be a whole number above 0, got nan in to_mesh"):
+        fb.Beam(1.0, THIN).to_mesh(tmp_path / "a.inp", elements=float("nan"))
 
 
 @pytest.mark.parametrize("kind", ["gmsh22", "gmsh"])

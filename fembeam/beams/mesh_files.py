@@ -298,6 +298,8 @@ def to_mesh(beam: Beam, path: str | os.PathLike[str], elements: int = 100) -> di
     target = file_path(path, "to_mesh")
     where, borders = "to_mesh", np.array(beam.borders)
     known = target.suffix in WRITERS
+    require(is_whole(elements) and elements > 0, "elements must be a whole number above 0", elements, where,
+            "give a count")  # fmt: skip
     require(known, f"the suffix must be one of {', '.join(WRITERS)}", target.suffix, where, "choose one")
     apart = [name for name, _ in beam.places if set(name) & set(',"\n')]
     require(not apart, "names of places must have no commas and quotes", apart, where, "such files end names there")
