@@ -147,6 +147,9 @@ test_refused = refused(
     (lambda: fb.Frame.straight(1.0, STEEL).check_place(1.2, "Stop"), "0 to 1 m, got 1.2"),
     (lambda: portal().assembled(modes=0), "modes must be a whole number"),
     (lambda: portal().assembled(elements=20_000), "at most 10000"),
+    (lambda: portal().assembled(modes=20_000), "modes must be at most 300, got 20000 in Frame.assembled"),
+    (lambda: fb.Scene(portal(), [fb.Clamped("A")]).reduce(modes=20_000), "modes must be at most 300, got 20000"),
+    (lambda: fb.Scene(portal(), [fb.Clamped("A")]).reduce(20_000, elements=9), "at most .*free dofs., got 20000"),
     (lambda: fb.Section(2e11, 7800.0, 1e-4, 1e-9, I2=1e-9, I12=2e-9), "I12 must stay below"),
     (lambda: fb.Section.circle(2e11, 7800.0, 0.1, nu=0.7), "above -1 and at most 0.5, got 0.7"),
 )  # fmt: skip

@@ -20,6 +20,7 @@ from fembeam.beams.mesh import (
     FREQUENCY_TOLERANCE,
     MESHED_MODES,
     MOST_ELEMENTS,
+    MOST_MODES,
     SAME_PLACE,
     SHORTEST,
     SHORTEST_PRESSED,

@@ -21,6 +21,7 @@ WAVE_STEP = (0.65 * FREQUENCY_TOLERANCE / ERROR_CONSTANT) ** 0.25  # beta h = 0.
 TAPER_STEP = (0.65 * FREQUENCY_TOLERANCE * 180) ** 0.25  # g = 0.104
 SAMPLES = 200  # of each interval of a beam with tapers
 MESHED_MODES = 10  # modes for whose frequencies a mesh is made where none are asked for
+MOST_MODES = 300  # of one mesh: 5400 elements, about a minute; a slender beam has lost its meaning long before
 MOST_ELEMENTS = 10_000  # of one mesh: above it rounding of K hides the lowest frequencies
 SAME_PLACE = 1e-9  # of the length: features closer than this share a node
 SHORTEST = 1e-4  # of the length: rounding of K grows like (length/h)³, 2e-4 of the first omega² here

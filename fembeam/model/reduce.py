@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 import reduction
-from fembeam.beams import Beam
 from fembeam.model.model import Model
 from fembeam.response import PlacedShapes, Shapes, placed_shapes
 from fembeam.scene import (
@@ -179,10 +178,9 @@ def check_reduction(
 
 
 def check_mode_count(scene: Scene, modes: int, elements: int | None = None) -> None:
-    """Raise ValueError for more modes than the scene's meshes have, as its matrices tell, or as a beam may have."""
+    """Raise ValueError for more modes than the scene's meshes have, as its matrices tell, or as one may have."""
     if elements is None and all(part.beam.meshed for part in (scene, *scene.bodies)):  # the mesh is as fine as needed
-        beams = any(isinstance(part.beam, Beam) for part in (scene, *scene.bodies))
-        require(modes <= MOST_MODES or not beams, f"modes must be at most {MOST_MODES}", modes, "Scene.reduce",
+        require(modes <= MOST_MODES, f"modes must be at most {MOST_MODES}", modes, "Scene.reduce",
                 "keep the modes up to a few times the highest frequency of interest")  # fmt: skip
     else:
         _chosen(scene, modes, elements, False)

@@ -20,7 +20,7 @@ from scipy import linalg, sparse
 from scipy.sparse import linalg as sparse_linalg
 
 import reduction
-from fembeam.beams import Beam, bare_beam, geometric_stiffness, hermite_rows, mesh
+from fembeam.beams import MOST_MODES, Beam, bare_beam, geometric_stiffness, hermite_rows, mesh
 from fembeam.scene.moving_loads import PER_DOF, loads_of_order
 from fembeam.scene.places import body_words, place_words, quoted
 from fembeam.scene.signals import support_motion
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 
-MOST_MODES = 300  # of one mesh: 5400 elements, about a minute; a slender beam has lost its meaning long before
 MOST_DENSE = 2000  # free dofs of which all modes may be asked for, about ten seconds
 DENSE = 200  # free dofs, below which the dense solver is quicker
 UNIT = 1e-12  # of 1: entries of a row that stands for one dof

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy import sparse
 
 import reduction
-from fembeam.beams import MESHED_MODES
+from fembeam.beams import MESHED_MODES, MOST_MODES
 from fembeam.scene.assembly import UNIT, Matrices, Vector, main_load, moved_by_rows, moving
 from fembeam.scene.places import place_words, quoted
 from fembeam.scene.rigid_motions import MOST_RIGID
@@ -181,7 +181,9 @@ def _made(scene: Scene, elements: int | None, modes: int | None, places: tuple[A
     """The body's matrices, of a frame on a mesh for the frequencies that it has with all that is on it."""
     if not scene.beam.meshed:
         return scene.beam.assembled(None, modes, places)
-    count = MESHED_MODES if modes is None else int(modes)
+    count = MESHED_MODES if modes is None or elements is not None else int(modes)
+    require(count <= MOST_MODES, f"modes must be at most {MOST_MODES}", modes, "Scene.matrices",
+            "keep the modes up to a few times the highest frequency of interest, or give elements")  # fmt: skip
     coarse = scene.beam.coarse(count, places)
     check_buckling(scene.beam, lambda body: _free_stiffness(scene, body.coarse(count, places)))
     own = _of(scene, coarse, count, _held(scene, coarse), condense=True)

@@ -357,7 +357,7 @@ class Frame:
 
         Raises
         ------
-        ValueError : a place off the frame, counts that are none, more than 10 000 elements.
+        ValueError : a place off the frame, counts that are none, more than 10 000 elements, or 300 modes without them.
         """
         from fembeam.structures.frame_mesh import assemble
 

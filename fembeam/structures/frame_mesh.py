@@ -22,6 +22,7 @@ from fembeam.beams import (
     FREQUENCY_TOLERANCE,
     MESHED_MODES,
     MOST_ELEMENTS,
+    MOST_MODES,
     SAME_PLACE,
     SHORTEST,
     SHORTEST_PRESSED,
@@ -248,6 +249,8 @@ def assemble(
     if elements is not None:
         return _on(frame, _spread(frame, stops, elements), "elements as asked")
     count = MESHED_MODES if modes is None else int(modes)
+    require(count <= MOST_MODES, f"modes must be at most {MOST_MODES}", modes, "Frame.assembled",
+            "keep the modes up to a few times the highest frequency of interest, or give elements")  # fmt: skip
     highest = _highest(frame, places, count) if omega is None else float(omega)
     kept = (
         f"frequencies to {highest:.6g} rad/s"
