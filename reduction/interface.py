@@ -350,4 +350,7 @@ def _check(basis: Basis, M: Matrix, K: Matrix, root: Matrix | None, B: Vector, e
     for what, (error, tolerance) in errors.items():
         worst = np.abs(error).max()
         if not worst <= tolerance:
-            raise AccuracyError(f"the basis must be {what} to {tolerance}, got {worst:.3g} in {where}")
+            raise AccuracyError(
+                f"the basis must be {what} to {tolerance}, got {worst:.3g} in {where}; "
+                "use less extreme stiffnesses, places farther apart, or a coarser mesh"
+            )
