@@ -8,6 +8,7 @@ import pytest
 from refusals import refused
 from test_memory_laws import asked, borders, forces, renewal_slopes, renewed, with_memory
 
+import solvers
 from contacts import Border, Iwan, Jenkins, Polynomial, Segment, WaltonBraun, memory_law
 
 
@@ -263,6 +264,14 @@ def let_go_alone(delta, delta_dot, way, slider, stiffness, limit):
     return way
 
 
+def left_below(delta, delta_dot, way, slider, stiffness, limit):
+    return limit - abs(stiffness * (delta - slider)) if delta < 1e-4 else math.nan
+
+
+def left_slowly(delta, delta_dot, way, slider, stiffness, limit):
+    return limit - abs(stiffness * (delta - slider)) if abs(delta_dot) < 0.1 else math.nan
+
+
 def made(stick=STICK, slip=SLIP, **options):
     return lambda: memory_law("mine", {"stick": stick, "slip": slip}, LATCHED, **options)(stiffness=2e4, limit=10.0)
 
@@ -284,6 +293,7 @@ MISTAKES = [
     (mistaken(inner=-1.0), TURNS.format("1e-05 m, δ̇ < 0") + ".* Check the sign of these borders"),
     (mistaken(sense=0.0, never=1.0), TURNS.format("0.0005 m, δ̇ > 0")),
     (mistaken(real=-1.0), "force of mine is nan N at δ = "),
+    (made(stick=Segment(pull, Border(left_below, "slip", let_go))), "force of mine is nan N at δ = 0.0001 m"),
     (made(slip=Segment(drag, Border(onwards, "stuck", hold))), "law 'mine': 'slip' ends in 'stuck'; its segments are"),
     (sticks(pull, let_go, wrong_slopes), "slope of segment 'stick' .* slider is -20200 at δ = .* differences.* -20000"),
     (made(reach=0.0), "reach of law 'mine' must be finite and > 0, got 0.0"),
@@ -323,3 +333,13 @@ def test_a_renewal_that_raises_gives_nan():
     law = made(slip=Segment(drag, Border(onwards, "stick", raising)))()
     _, after = renewed(law, 0, 2e9, 0.1, with_memory(law, 1.0, 1.0, 0.0))
     assert np.isnan(after[1:3]).all()
+
+
+@pytest.mark.parametrize("method", [solvers.Exponential(), solvers.DormandPrince()])
+def test_a_border_that_is_not_a_number_ends_the_run(method):
+    """`Exponential` took it for one that is never met: "finished", and stuck for ever."""
+    law = made(stick=Segment(pull, Border(left_slowly, "slip", let_go)))()
+    body = solvers.System([[2.0]], [[0.0]], [[0.0]], [solvers.Contact([1.0], law, always=True)])
+    assert solvers.integrate(body, [0.0], [0.05], 0.01, method=method).status.good
+    with pytest.raises(solvers.SolverError, match="not finite"):
+        solvers.integrate(body, [0.0], [0.5], 0.01, method=method)

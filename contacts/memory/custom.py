@@ -32,7 +32,7 @@ class Border:
     Parameters
     ----------
     value : function that is > 0 inside the segment and falls through zero at its end; smooth, also a little beyond.
-        A border at a reversal is the rate in the direction of the segment.
+        A border at a reversal is the rate in the direction of the segment. Where it is nan, so is the force.
     to : name of the next segment.
     renew : function that returns the latched numbers of the next segment, one number or a tuple; None keeps them.
     """

@@ -167,12 +167,19 @@ def _jacobian(function: Function, rows: int, columns: int, least: tuple[float, .
 
 
 def _points(force: Function, slopes: Function, value: Function, latched: int, width: int) -> tuple[Function, ...]:
-    """Force, its derivatives by the motion and by the latched numbers, and borders, at n points."""
+    """Force, its derivatives by the motion and by the latched numbers, and borders, at n points.
+
+    The force is nan where a border of its segment is, which would else never be met.
+    """
     given = inner(_given)
 
     def forces(n, delta, delta_dot, entry_rate, row, out):  # type: ignore[no-untyped-def]
         for i in range(n):
-            out[i] = force(row[0], given(delta[i], delta_dot[i], row))
+            at = given(delta[i], delta_dot[i], row)
+            out[i] = force(row[0], at)
+            for j in range(width):
+                if math.isnan(value(row[0] * width + j, at)):
+                    out[i] = math.nan
 
     def by_point(n, delta, delta_dot, entry_rate, row, by_delta, by_rate, by_entry):  # type: ignore[no-untyped-def]
         for i in range(n):
