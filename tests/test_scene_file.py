@@ -374,6 +374,18 @@ BASINS = "[basins]\nx_span = [0.0, 1.0]\ny_span = [0.0, 1.0]\n"
             "[mode_count]\ncounts = [1, 2]\nquantity = { kind = 'rms', z = 'tip' }\nduration = 0.5\ndt = 1e-3",
             "places of a beam must be numbers",
         ),
+        (
+            "[vary]\n" + GAPS.replace("'rms'", "{ kind = 'rms', stop = 1 }") + "dt = 1e-3",
+            "stop must be below 1, the numb",
+        ),
+        (
+            "[minimise]\n" + GAPS.replace("'rms'", "{ kind = 'power', stop = -2 }") + "dt = 1e-3",
+            "stop must be below 1, ",
+        ),
+        (
+            "[mode_count]\ncounts = [1, 2]\nquantity = { kind = 'peak_force', stop = 'valv' }\nduration = 0.5",
+            "no contact has this name, got 'valv' in peak_force.stop=valv.; the nearest is 'stop at 1 m, below'",
+        ),
         ("[peak]\nover = 'stops[0].gap'\nvalues = [1e-3, 2e-3]\nspan = [20.0, 40.0]\nz = 2.0", "must lie on the beam"),
         ("[peak]\nover = 'damping.zeta[0]'\nvalues = [-0.1, 0.1]\nspan = [20.0, 40.0]", "zeta"),
         ("[backbone]\nlevels = [1e-3, 2e-3]\nspan = [20.0, 40.0]\nz = 2.0", "must lie on the beam"),

@@ -30,7 +30,7 @@ from fembeam.scene import Scene, signals_of
 from fembeam.study.decay import correlation_time
 from fembeam.study.execution.checkpoint import Checkpoint, digested, scene_identity
 from fembeam.study.execution.executors import spread
-from fembeam.study.quantities import Quantity, label
+from fembeam.study.quantities import Quantity, check_contact, label
 from fembeam.study.realisations import child, renewed, seed_key
 from fembeam.support import is_whole, require, require_non_negative, require_positive, warn
 from solvers.problem.whole_runs import whole_runs
@@ -83,6 +83,7 @@ class Plan:
     def check(self, scene: Scene, quantity: Quantity) -> None:
         """Raise ValueError when the scene cannot be run like this."""
         require(isinstance(scene, Scene), "scene must be a Scene", scene, "study", "of a model, give model.scene")
+        check_contact(quantity, scene)
         rubs = any(getattr(one, "friction", None) is not None for one in scene.acting)
         require(rubs or not getattr(quantity, "rubbing", False), "a stop must have friction", label(quantity), "study",
                 "give it a Friction")  # fmt: skip

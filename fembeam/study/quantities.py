@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
+from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -331,12 +332,37 @@ def unit_of(quantity: Quantity, scene: Scene) -> str:
     return TURNED.get(unit, unit) if turning else unit
 
 
+def check_contact(quantity: Quantity, scene: Scene) -> None:
+    """Raise ValueError where a named quantity asks for a contact that no run of the scene has.
+
+    Of joined bodies the run tells; a made name may go on with " (2)", or end before the " m" where a place is a node.
+    """
+    stop, known = getattr(quantity, "stop", 0), _contacts(scene)
+    if type(quantity) not in QUANTITIES.values() or stop == 0 or scene.joints:
+        return
+    if isinstance(stop, str):
+        near = get_close_matches(stop, [name for name, *_ in known], 1, 0.0)
+        alike = (made and (stop.startswith(name) or name.startswith(stop)) for name, _, made in known)
+        right = stop in [name for name, *_ in known] or any(alike)
+        require(right, "no contact has this name", stop, label(quantity),
+                f"the nearest is {near[0]!r}" if near else "there is none at all")  # fmt: skip
+    else:
+        right = is_whole(stop) and -len(known) <= stop < len(known)
+        require(right, f"stop must be below {len(known)}, the number of stops", stop, label(quantity), "count from 0")
+
+
+def _contacts(scene: Scene) -> list[tuple[str, bool, bool]]:
+    """Name of every contact in the order of the log, whether it acts on a rotation, whether its name was made."""
+    found: list[tuple[str, bool, bool]] = []
+    for body, part in enumerate((scene, *scene.bodies)):
+        found += [(one.label_on(body), bool(one.coordinate.rotation), one.name is None) for one in part.acting]
+        found += [(one.label_on(body), False, True) for one in part.impactors for _ in one.pushes]
+    return found
+
+
 def _turning(scene: Scene) -> list[int | str]:
     """Names and numbers of the contacts that act on a rotation, in the order of the log."""
-    found: list[tuple[str, bool]] = []
-    for body, part in enumerate((scene, *scene.bodies)):
-        found += [(one.label_on(body), one.coordinate.rotation) for one in part.acting]
-        found += [(one.label_on(body), False) for one in part.impactors for _ in one.pushes]
+    found = [(name, rotation) for name, rotation, _ in _contacts(scene)]
     numbers = [i for i, (_, rotation) in enumerate(found) if rotation]
     return [*numbers, *(i - len(found) for i in numbers), *(name for name, rotation in found if rotation)]
 
