@@ -109,6 +109,7 @@ test_refused = refused_files(
     ("nodes = { A = [0, 0]", "nods = { A = [0, 0]", r"\[frame\].*nods"),
     ('nodes = ["D", "C"]', 'nodes = ["D", "E"]', r"\[frame\]: member 'D-E' must join nodes of the frame; 'D' is"),
     ('nodes = ["D", "C"]', 'nodes = ["D"]', r"\[\[frame.members\]\] number 2.*a chain of more"),
+    (f"section = {STEEL}", 'section = "steel"', r"\[\[frame.members\]\] number 1 section: must be a table"),
     ('release = "end rz"', 'release = "rz"', r"\[\[frame.members\]\] number 2.*release must be"),
     ('release = "end rz"', 'relase = "end rz"', r"number 2.*relase"),
     ('release = "end rz"', "offset = [[0, 0.1], [0]]", r"number 2: offset must be two vectors of finite numbers"),

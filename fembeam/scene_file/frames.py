@@ -44,7 +44,7 @@ def _members(reader: TableReader, entry: Any, number: int) -> list[Member]:
         reader.fail(where, f"nodes must be two names or a chain of more, got {chain!r}")
     if "name" in entry and len(chain) > 2:
         reader.fail(where, "name must be left out for a chain: its members are named after their nodes")
-    common = {"section": reader.section(entry["section"], where)}
+    common = {"section": reader.section(entry["section"], f"{where} section")}
     common |= {key: entry[key] for key in MEMBER if key in entry}
     return [reader.made(Member, {"a": a, "b": b, **common}, where) for a, b in pairwise(chain)]
 
