@@ -379,6 +379,7 @@ def test_model_survives_pickling(model):
         (lambda run: run.force("below"), "no contact has this name, got 'below' in Run"),
         (lambda run: run.to_csv("x", quantities="stress"), "quantities must be a list, got 'stress'"),
         (lambda run: run.to_csv("x", places=0.1), "places must be a list, got 0.1"),
+        (lambda run: run.to_csv("x", places=[0.1, ("C", "x")]), r"of a beam must be numbers, got \[\('C', 'x'\)\]"),
         *((lambda run, bad=bad: run.model.simulate(bad), "duration must be finite and positive")
           for bad in (0.0, -1.0, math.nan, math.inf)),
         (lambda run: run.model.simulate(0.1, dt=-1e-3), "dt must be positive and finite"),

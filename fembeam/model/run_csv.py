@@ -80,7 +80,7 @@ def histories(
 def _check_lists(run: Run, places: Any, quantities: Any) -> None:
     """Raise ValueError for one place, or one quantity, where a list of them belongs."""
     require(not isinstance(quantities, str), "quantities must be a list", quantities, "Run", "put it in brackets")
-    listed = isinstance(places, (list, tuple)) if run.shapes.named else np.ndim(places) == 1
+    listed = isinstance(places, (list, tuple)) or (not run.shapes.named and np.ndim(places) == 1)
     require(places is None or listed, "places must be a list", places, "Run", "put it in brackets")
 
 
