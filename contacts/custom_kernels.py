@@ -330,10 +330,10 @@ def or_say_where(compile_it: Callable[[], Any], function: Function, kind: str) -
         return compile_it()
     except refusals as error:
         file = inspect.getsourcefile(function)
-        line = _line_of(error, function)
+        line, wanted = _line_of(error, function), "three numbers" if kind == "derivative" else "one number"
         raise TypeError(
             f"{kind} {function.__name__!r} ({file}, line {line}) cannot be compiled; use plain arithmetic and the math "
-            f"module only, and return one number from every branch. The compiler says: {error}"
+            f"module only, and return {wanted} from every branch. The compiler says: {error}"
         ) from error
 
 

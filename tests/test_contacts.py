@@ -394,6 +394,14 @@ def test_law_that_cannot_be_compiled_names_itself():
         talks()
 
 
+def test_a_derivative_that_returns_too_few_numbers_is_told_how_many():
+    def slope_alone(delta, delta_dot, entry_rate):
+        return 1e5
+
+    with pytest.raises(TypeError, match=r"derivative 'slope_alone' .* and return three numbers from every branch"):
+        law(lambda delta, delta_dot, entry_rate: 1e5 * delta, derivative=slope_alone)()
+
+
 def test_law_that_imports_names_the_line():
     @law
     def imports(delta, delta_dot, entry_rate):
