@@ -290,6 +290,7 @@ def test_mistakes_are_found_by_their_line(file_of, old, new, line):
         ("beam.length.x=0", r"beam.length is no table"),
         ("simulate.durtion=1", "did you mean 'duration'"),
         ("simulate.dt=[", "dt must be a number"),
+        ("simulate.dt=1e-3\nduration=2", "dt must be a number"),
     ],
 )
 def test_bad_overrides(file_of, override, message):

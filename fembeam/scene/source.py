@@ -118,7 +118,7 @@ def _override(tables: dict[str, Any], text: str) -> None:
     if not (equals and path):
         raise ValueError(f"--set {text}: write table.key=value, such as simulate.duration=10 or stops[0].gap=1e-3")
     try:
-        new = tomllib.loads(f"x = {value}")["x"]
+        (new,) = tomllib.loads(f"x = {value}").values()  # ValueError of more lines than one
     except (ValueError, RecursionError):
         new = value.strip()  # text needs no quotes here
     item: Any = tables
