@@ -317,3 +317,34 @@ def test_a_branch_reaches_the_end_of_what_is_allowed():
     found = branch(make, (0.0, 0.3), orbit(*make(0.1)), at=0.1).run()
     assert [status.name for status in found.status] == ["END", "END"]
     assert found.orbits[-1].parameter == 0.0 or found.orbits[0].parameter == 0.0
+
+
+def test_branches_mark_where_a_slip_no_longer_ends_before_the_law_pulls():
+    """The slip ended, and turned, at shares ε of a time before N = 0 that vanishes, its last piece like ε².
+
+    There the slider's rate ξ̇ - σμṄ/k_t and N vanish at once: F_t = 0, so that both follow from state and loads.
+    """
+    law, friction, omega, drive = KelvinVoigt(21.9, 0.238, clamp=True), Friction(0.55, 10.8), 1.82, 22.9
+    normal, tangent = np.array([-0.122, -0.175]), np.array([0.261, 0.146])
+    stop = Contact(normal, law, gap=1.0, map="oblique", tangent=tangent, friction=friction)
+    C, K = np.diag([0.108, 0.123]), np.diag([2.01, 2.61])
+    base, period = System(np.eye(2), C, K, [stop]), 2.0 * np.pi / omega
+
+    def make(size):
+        tones = Tone(size * np.exp(0.614j), omega), Tone(drive * np.exp(2.364j), omega)
+        return base.like(loads=list(zip(([0.122, 0.175], [-0.606, 0.0674]), tones, strict=True))), period
+
+    found = branch(make, (11.0, 14.0), orbit(*make(13.9)), at=13.9, step=0.3).run()
+    least, *_, most = sorted(found.orbits, key=lambda one: one.parameter)
+    assert (least.transitions.event.tolist(), len(most.transitions)) == (["slip", "free"], 4)
+    marked = [one for one in found.special if one.mark == "stick"]
+    assert marked
+    assert np.ptp([one.parameter for one in marked]) < 1e-4 * most.parameter  # rounding may enter it several times
+    one, t = marked[-1], marked[-1].transitions.t[-1]
+    assert one.phase == 0.0
+    run = integrate(one.system, *np.split(one.state, 2), t, method=Exponential(1e-12))
+    q, v = np.split(run.end[:4], 2)
+    a = sum(np.array(vector) * signal(t) for vector, signal in one.system.loads) - C @ v - K @ q
+    growth = law.stiffness * (-normal @ v) + law.damping * (-normal @ a)
+    slip, way = friction.mu * growth / friction.stiffness, tangent @ v
+    assert min(abs(way - slip), abs(way + slip)) < 1e-3 * abs(way)

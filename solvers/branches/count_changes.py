@@ -18,6 +18,7 @@ _AT = 1e-4  # entry rate less the floor, in units of the floor, up to which an o
 _MOST_TRIALS = 25
 _SAME = 1e-6  # relative difference of states up to which they are the same
 _MOST_TRIALS_OF_GRAZING = 60  # more than bisection alone needs: with rounding in an indentation no secant helps
+_SECANTS = 20  # of these, then halves alone: a phase that vanishes in a multiple zero has secants that hardly move
 _MOST_GRAZINGS = 4  # located between two points
 
 
@@ -98,11 +99,11 @@ def _first_change(arc: Arc, begin: float, first: Orbit, log: str) -> tuple[float
     near, near_orbit = begin, first
     known = [(behind, distance(last)) if more else (begin, distance(first))]  # on the side with more contacts
     sharp = arc.sharpness()
-    for _ in range(_MOST_TRIALS_OF_GRAZING):
+    for trial in range(_MOST_TRIALS_OF_GRAZING):
         grazed, bare = (behind, near) if more else (near, behind)
         place = 0.5 * (grazed + bare)
         root = grazed + 2.0 * sharp
-        if len(known) > 1 and known[-1][1] != known[-2][1]:
+        if trial < _SECANTS and len(known) > 1 and known[-1][1] != known[-2][1]:
             (s0, f0), (s1, f1) = known[-2:]
             root = s1 - f1 * (s1 - s0) / (f1 - f0)
             if min(bare, grazed) < root < max(bare, grazed):
