@@ -61,6 +61,20 @@ def test_torus_bifurcation_where_a_nonlinear_stop_drives_as_much_as_the_mass_is_
     assert found.special[0].parameter == pytest.approx(-0.1, abs=1e-9)
 
 
+def test_torus_bifurcation_beside_hardly_damped_modes():
+    """Four idle modes share nothing with it: c = -0.1 as without them. Pairs of theirs make the test function small."""
+    omega, period = 1.7, 2.0 * math.pi / 1.7
+
+    def make(c):
+        stop = Contact([1.0, 0.0, 0.0, 0.0, 0.0], hardening(stiffness=2.0, damping=c), gap=-3.0)
+        loads = [([1.0, 0.0, 0.0, 0.0, 0.0], Tone(1.0, omega))]
+        return System.modal([1.0, 2.0, 2.6, 3.1, 4.3], [0.05, *[1e-4] * 4], [stop], loads), period
+
+    found = branch(make, (-0.15, 0.0), [2.0, *[0.0] * 9], at=0.0, step=0.3).run()
+    assert [orbit.mark for orbit in found.special] == ["neimark-sacker"]
+    assert found.special[0].parameter == pytest.approx(-0.1, abs=1e-9)
+
+
 def test_subharmonic_branch_ends_at_a_flip():
     """Followed back from where it is settled, the doubled branch ends at the flip where it begins."""
     problem = Bilinear(0.88, zeta=0.05)  # doubles its period between 0.83 and 0.93 rad/s

@@ -30,7 +30,7 @@ from solvers.branches.point import Point, corrected, cubic, is_straight, tangent
 from solvers.orbits import Chain, Orbit, OrbitError, orbit_of
 from solvers.problem import Array
 
-ROUNDING = 1e-9  # of the test functions: a test function that is zero all along marks nothing
+ROUNDING = 1e-9  # of a factor of a test function: one that is zero all along marks nothing
 _SHARP = 1e-10  # tolerance of a special point, in units of the arclength between the points
 _AT = 1e-4  # distance of a multiplier from its value at a special point up to which it is one
 _NUDGES = 0.0, 1e-7, -1e-7, 1e-6, -1e-6  # of the arclength: for some guesses rounding keeps residuals too large
@@ -38,14 +38,16 @@ _NUDGES = 0.0, 1e-7, -1e-7, 1e-6, -1e-6  # of the arclength: for some guesses ro
 
 def indicators(orbit: Orbit, tangent: Array) -> dict[str, float]:
     """Test functions of an orbit; each changes its sign at a special point of its name."""
+    products = {name: float(factors.prod().real) for name, factors in _factors(orbit).items()}
+    return {"fold": float(tangent[-1]), **products}
+
+
+def _factors(orbit: Orbit) -> dict[str, Any]:
+    """The factors of each test function that is a product; real, or in conjugate pairs, none larger than 1."""
     mu = orbit.transverse
     first, second = np.triu_indices(len(mu), 1)  # of all pairs
-    return {
-        "fold": float(tangent[-1]),
-        "flip": _product(mu),
-        "neimark-sacker": _product(-mu[first] * mu[second]),
-        "branch point": _product(-mu),
-    }
+    values = {"flip": mu, "neimark-sacker": -mu[first] * mu[second], "branch point": -mu}
+    return {name: (one + 1.0) / (1.0 + np.abs(one)) for name, one in values.items()}
 
 
 def indicators_at(point: Point) -> dict[str, float]:
@@ -53,11 +55,6 @@ def indicators_at(point: Point) -> dict[str, float]:
     if not point.tests:
         point.tests.update(indicators(point.orbit, point.tangent))
     return point.tests
-
-
-def _product(values: Any) -> float:
-    """Π (value + 1) / (1 + |value|), of values that are real or come in conjugate pairs."""
-    return float(((values + 1.0) / (1.0 + np.abs(values))).prod().real)
 
 
 def _is_at(orbit: Orbit, name: str) -> bool:
@@ -144,7 +141,9 @@ def _roots(arc: Arc, begin: float, end: float) -> Iterator[tuple[float, Orbit]]:
     """(arclength, orbit) of the zeros of all test functions that change their sign from begin to end."""
     before, after = arc.indicators(begin), arc.indicators(end)
     names = [name for name in before if before[name] * after[name] < 0.0]
-    names = [name for name in names if min(abs(before[name]), abs(after[name])) > ROUNDING]
+    if names:
+        known = [{**tests, **_factors(arc.orbit(s))} for s, tests in ((begin, before), (end, after))]
+        names = [name for name in names if all(np.abs(one[name]).min() > ROUNDING for one in known)]
     if "fold" in names and "branch point" in names:
         names.remove("branch point")
     for name in names:
