@@ -18,6 +18,7 @@ ORDER = 6  # of Taylor steps
 _LOG_ERROR = int(0.345 * 2**50)  # four times 0.0863, the error of a logarithm linear between powers of two
 SERIES_TERMS = 14  # terms of a series that is exact to rounding up to |λ| x = SERIES_REACH: 0.6^14/14! = 9e-15
 SERIES_REACH = 0.6
+SWING = 6  # index in Scratch.split_state: the state without what follows the sampled signals
 _ROUNDING = 9e-16  # of a time over the length of a cell, relative
 
 
@@ -90,6 +91,22 @@ def join(problem, parts, x):
     n = problem.k.size
     for b in range(n):
         x[b], x[n + b] = parts[0, b], parts[1, b]
+
+
+@inner
+def take_off_following(run, t, x, out):
+    """Write p and v of the blocks without what follows the sampled signals at t into ``out``; see `following`."""
+    problem, tables, terms = run.problem, run.tables, run.scratch.signal_terms
+    derive_signals(problem, t, terms)
+    for i in range(0, x.shape[1], WIDTH):
+        p, v = load8(x[0], i), load8(x[1], i)
+        for j in range(problem.table_dt.size):
+            rows = tables.following[problem.table_load[j]]
+            for d in range(3):
+                p = p - splat8(terms[j, d]) * load8(rows[d, 0], i)
+                v = v - splat8(terms[j, d]) * load8(rows[d, 1], i)
+        store8(out[0], i, p)
+        store8(out[1], i, v)
 
 
 @inlined

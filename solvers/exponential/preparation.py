@@ -160,7 +160,7 @@ def prepare_run(system: System, forcing: Forcing, duration: float, rtol: float) 
     taken = on_one_grid(without_resonance(system, forcing, duration, rtol), duration, float(_speeds(system).max()))
     prepared = prepare_system(system, taken)
     kind = type_of(prepared.problem.value)
-    if taken.table.shape[1] > 3:
+    if _is_kinked(taken):
         load_parts(kind, KINKS)
     if taken.table.size:
         sampled = prepared.problem.replaced(kind, table=taken.table, table_start=taken.table_start)
@@ -176,7 +176,14 @@ def prepare_system(system: System, forcing: Forcing) -> Prepared:
     def make() -> Prepared:
         return _shared_tables_for(system, forcing, dt_cell).with_tones(forcing, system.contacts)
 
-    key = "tables", dt_cell, shortened(system), forcing.table_load.tobytes(), *(part.tobytes() for part in tones)
+    key = (
+        "tables",
+        dt_cell,
+        _is_kinked(forcing),
+        shortened(system),
+        forcing.table_load.tobytes(),
+        *(part.tobytes() for part in tones),
+    )
     prepared: Prepared = system.kept.get(key, make)
     return prepared
 
@@ -185,9 +192,21 @@ def _shared_tables_for(system: System, forcing: Forcing, dt_cell: float) -> _Sha
     """The tables shared by systems that differ only in tones, sampled values and gaps."""
     about, laws = system.about_structure, system.about_laws
     places = (part.tobytes() for part in (forcing.tone_load, forcing.table_dt, forcing.table_load))
-    key = "tables", laws, shortened(system), *places, doublings(_speeds(system), forcing.tone_omega)
+    key = (
+        "tables",
+        laws,
+        _is_kinked(forcing),
+        shortened(system),
+        *places,
+        doublings(_speeds(system), forcing.tone_omega),
+    )
     shared: _SharedTables = about.get(key, lambda: _SharedTables(system, forcing, dt_cell))
     return shared
+
+
+def _is_kinked(forcing: Forcing) -> bool:
+    """Whether the slopes of sampled signals jump at nodes."""
+    return bool(forcing.table.shape[1] > 3)
 
 
 def shortened(system: System) -> int:
@@ -228,7 +247,9 @@ class _SharedTables:
         self.back, self.fastest = among_tones(system.blocks.T, self.tones), max(float(_speeds(system).max()), 1e-3)
         energy_rows = np.zeros_like(problem.load), problem.power, among_tones(loss, self.tones)
         laws = law_tables_of(contacts)
-        tables = build(problem, self.tones, self.series, laws, dt_cell, energy_rows, shortened(system))
+        tables = build(
+            problem, self.tones, self.series, laws, dt_cell, energy_rows, shortened(system), _is_kinked(forcing)
+        )
         sizes = {
             **{"E": len(contacts), "R": len(problem.gap), "L": len(problem.load), "N": len(problem.k)},
             **{"tables": len(forcing.table_dt), "B": most_borders(problem), "A": int(np.count_nonzero(problem.radius))},

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.compiled.kernels import copy, dot, indentation, indentation_rate, inlined, inner, is_circle, merged, row_of
+from solvers.compiled.kernels import copy, indentation, indentation_rate, inlined, inner, is_circle, merged, row_of
 from solvers.compiled.state import LEFT, SAMPLED, STEPS, T_END, T, move_clock, summed
 from solvers.exponential.circles.flight import circle_is_near, span_of_circle, span_of_circle_at
 from solvers.exponential.energy.flight_balance import (
@@ -36,10 +36,10 @@ from solvers.exponential.energy.flight_balance import (
 from solvers.exponential.first_contact import first_root
 from solvers.exponential.flight import (
     SERIES_REACH,
+    SWING,
     cell_of,
     cross_cell,
     derive_signals,
-    energy_norms,
     fly_series,
     fly_tabulated,
     join,
@@ -49,6 +49,7 @@ from solvers.exponential.flight import (
     propagate_split,
     safe_time,
     split,
+    take_off_following,
     taylor_step,
     taylor_terms,
     weighted_norms,
@@ -60,28 +61,61 @@ _GROUP = 8  # cells that one bound covers: with more the bound grows, with fewer
 
 
 @inner
-def _bound_signals(problem, cell, count, bounds):
-    """Bounds of |s| on ``count`` cells by Bézier coefficients, each at most |s| + 2h/5 |s'| + h²/20 |s''|."""
+def _bound_signals(run, cell, count):
+    """Bounds of |s| on ``count`` cells by Bézier coefficients, each at most |s| + 2h/5 |ṡ| + h²/20 |s̈|.
+
+    Where blocks follow the signals, also of |ṡ|, |s̈| and |s⃛|, by differences of the coefficients.
+    """
+    problem = run.problem
     for j in range(problem.table_dt.size):
-        first, bounds[j], sides = problem.table_start[j] + cell, 0.0, problem.table.shape[1]
+        first, bounds, sides = problem.table_start[j] + cell, run.scratch.signal_bounds[j], problem.table.shape[1]
         slope, curving = 0.4 * problem.table_dt[j], 0.05 * problem.table_dt[j] ** 2
+        for d in range(4):
+            bounds[d] = 0.0
         for row in range(first, first + count + 1):
             for side in range(0, sides, 3):
                 s, rate, curvature = problem.table[row, side : side + 3]
-                bounds[j] = max(bounds[j], abs(s) + slope * abs(rate) + curving * abs(curvature))
+                bounds[0] = max(bounds[0], abs(s) + slope * abs(rate) + curving * abs(curvature))
+        for row in range(first, first + count if run.tables.follows > 0.0 else first):
+            _bound_derivatives(problem, problem.table_dt[j], row, bounds)
 
 
 @inlined
-def _acceleration_bound(run, r, norms, signal_bounds, horizon):
-    """B: bound of |δ̈| of row r over the time ``horizon``, signals included."""
-    problem, tables = run.problem, run.tables
-    n = problem.k.size
-    total = dot(tables.acceleration_weight[r], norms, n)
-    for j in range(problem.table_dt.size):
-        load = problem.table_load[j]
-        growth = dot(tables.acceleration_weight[r], tables.load_norm[load], n)
-        total += signal_bounds[j] * (horizon * growth + abs(tables.load_acceleration[r, load]))
+def _bound_derivatives(problem, h, row, bounds):
+    """Raise the bounds of |ṡ|, |s̈| and |s⃛| to those on the cell of length h behind a row of the table."""
+    s, rate, curvature = problem.table[row, :3]
+    to, rate_to, curvature_to = problem.table[row + 1, :3]
+    a, b = s + 0.2 * h * rate, s + 0.4 * h * rate + 0.05 * h * h * curvature
+    c, d = to - 0.4 * h * rate_to + 0.05 * h * h * curvature_to, to - 0.2 * h * rate_to
+    steps = a - s, b - a, c - b, d - c, to - d
+    for i in range(5):
+        bounds[1] = max(bounds[1], 5.0 / h * abs(steps[i]))
+    for i in range(4):
+        bounds[2] = max(bounds[2], 20.0 / (h * h) * abs(steps[i + 1] - steps[i]))
+    for i in range(3):
+        third = steps[i + 2] - 2.0 * steps[i + 1] + steps[i]
+        bounds[3] = max(bounds[3], 60.0 / (h * h * h) * abs(third))
+
+
+@inlined
+def _acceleration_bound(run, r, swing, horizon):
+    """B: bound of |δ̈| of row r over the time ``horizon``, signals included; ``swing`` is what does not follow them."""
+    tables = run.tables
+    total = weighted_norms(tables.acceleration_weight[r], tables, swing)
+    for j in range(run.problem.table_dt.size):
+        factors, bounds = tables.acceleration_signal[r, run.problem.table_load[j]], run.scratch.signal_bounds[j]
+        total += bounds[0] * (factors[0] + horizon * factors[1]) + bounds[1] * factors[2] + bounds[2] * factors[3]
+        total += horizon * bounds[3] * factors[4]
     return total
+
+
+@inner
+def _swing_at(run, t, x):
+    """Write what oscillates in the state x at t into ``scratch.split_state[SWING]``."""
+    swing = run.scratch.split_state[SWING]
+    copy_split(x, swing)
+    if run.tables.follows > 0.0:
+        take_off_following(run, t, swing, swing)
 
 
 @inlined
@@ -164,12 +198,14 @@ def _fly_unsampled(run, longest, budget):
 def _bound_cells(run, x, cell, count):
     """Bound the interpolation errors e of all rows for the next ``count`` cells; returns whether a stop may be near."""
     problem, tables, scratch = run.problem, run.tables, run.scratch
-    _bound_signals(problem, cell, count, scratch.signal_bounds)
+    _bound_signals(run, cell, count)
+    _swing_at(run, cell * problem.table_dt[0], x)
     for r in range(problem.gap.size):
-        error = weighted_norms(tables.cell_error[r], tables, x)
+        error = weighted_norms(tables.cell_error[r], tables, scratch.split_state[SWING])
         for j in range(problem.table_dt.size):
-            by_signal = tables.cell_error_signal[r, problem.table_load[j]]
-            error += scratch.signal_bounds[j] * (by_signal[0] + count * by_signal[1])
+            factors, bounds = tables.cell_error_signal[r, problem.table_load[j]], scratch.signal_bounds[j]
+            error += bounds[0] * (factors[0] + count * factors[1]) + bounds[2] * factors[2]
+            error += bounds[3] * (factors[3] + count * factors[4])
         scratch.per_row[r] = error
     return _is_any_near(run, x)
 
@@ -235,9 +271,10 @@ def _safe_span(run, span, horizon, renew_bounds):
     """
     problem, state, scratch = run.problem, run.state, run.scratch
     if renew_bounds:
-        energy_norms(problem, state.x, scratch.norms)
+        split(problem, state.x, scratch.split_state[SWING])
+        _swing_at(run, state.now[T], scratch.split_state[SWING])
         for r in range(problem.gap.size):
-            scratch.per_row[r] = _acceleration_bound(run, r, scratch.norms, scratch.signal_bounds, horizon)
+            scratch.per_row[r] = _acceleration_bound(run, r, scratch.split_state[SWING], horizon)
     for s in range(problem.law.size):
         if is_circle(problem, s):
             span = min(span, span_of_circle_at(run, s))
@@ -319,7 +356,7 @@ def fly(run, budget):
         begin, span, place = now[T], target - now[T], _place_in_cell(problem, now[T])
         cell, _, rest = place
         if sampled:
-            _bound_signals(problem, cell, 1, run.scratch.signal_bounds)
+            _bound_signals(run, cell, 1)
         # --- the time within which no stop can be reached
         if first == np.inf and not sampled:  # neither outputs nor cells limit the steps
             steps, span = _fly_unsampled(run, span, budget)

@@ -34,6 +34,7 @@ _MOST_RADIANS = 2000.0  # |λ| h of the largest contact step
 _CONTACT_REACH = 1e-6  # |λ| h of the smallest one, at most
 _SLOWEST = 1e-9  # rate in units of the fastest, below which blocks do not lengthen the steps in the tables
 _SHORT = 1e-9  # s, of the smallest contact step, at most: a stop may be far stiffer than the structure
+_FOLLOWS = 4.0  # ωh from which on a block follows signals on cells of length h: it may oscillate within one
 SHORTER = 1e-5  # factor of the smallest contact step where a run has failed for want of a shorter one
 
 
@@ -50,11 +51,14 @@ class Tables(NamedTuple):
     cell: Annotated[Any, "2, N8"]  # α, β over a whole cell of the sampled signals
     cell_signal: Annotated[Any, "L, 6, 2, N8"]  # state change over a cell by s, s', s'' at its start, then at its end
     cell_error: Annotated[Any, "R, N8"]  # see `cell_errors`
-    cell_error_signal: Annotated[Any, "R, L, 2"]
+    cell_error_signal: Annotated[Any, "R, L, 5"]
+    following: Annotated[Any, "L, 3, 2, N8"]  # see `following`
+    follows: Annotated[float, "number"]  # 1 where any block follows a signal
     load_rows: Annotated[Any, "L, 2, N8"]  # state rate of p and v per unit of a signal
     block_k_c: Annotated[Any, "2, N8"]  # k in 1/s², c in 1/s
     stop_rows: Annotated[Any, "R, 4, N8"]  # the first two rows give δ + gap from p and v, the others δ̇
     acceleration_weight: Annotated[Any, "R, N8"]  # |δ̈| <= Σ weight × energy norm
+    acceleration_signal: Annotated[Any, "R, L, 5"]  # see `_acceleration_by_signal`
     rate_weight: Annotated[Any, "R, N"]  # |δ̇| <= Σ weight × energy norm
     load_acceleration: Annotated[Any, "R, L"]  # δ̈ per unit of a signal
     load_norm: Annotated[Any, "L, N"]  # energy norm of a load per block
@@ -152,10 +156,12 @@ def build(
     dt_cell: float,
     energy_rows: tuple[Any, Any, Any],
     shortened: int = 0,
+    kinked: bool = False,
 ) -> Tables:
     """Tables of a problem whose last blocks are ``tones``; the columns of these are filled by `fill_tones`.
 
-    Contact steps go down to 1e-5 of the usual shortest one for each time they have been ``shortened``.
+    Contact steps go down to 1e-5 of the usual shortest one for each time they have been ``shortened``. A block that
+    follows signals whose slope jumps at nodes, ``kinked``, oscillates from there on: then none is taken to follow.
     """
     size = len(problem.k)
     omega, damping = np.sqrt(problem.k), problem.c
@@ -163,7 +169,8 @@ def build(
     h, contact_h = _steps(omega, damping, tones, shortened)
     node_sets = node_sets_of(series)
     blocks = blocks_of(problem, tones, h, contact_h, node_sets)
-    cell_error, cell_error_signal = cell_errors(problem, dt_cell)
+    response = following(problem, 0.0 if kinked else dt_cell)
+    cell_error, cell_error_signal = cell_errors(problem, dt_cell, response)
     ready = {**node_sets._asdict(), **blocks._asdict(), **laws}  # `alias` is that of the blocks
     signal_rows, power_rows, loss_rows = energy_rows
     return Tables(
@@ -174,10 +181,13 @@ def build(
         cell_signal=_in_eights(quintic_responses(problem, dt_cell)),
         cell_error=_in_eights(cell_error),
         cell_error_signal=cell_error_signal,
+        following=_in_eights(response.reshape(-1, 3, 2, size)),
+        follows=float(response.any()),
         load_rows=_in_eights(problem.load.reshape(-1, 2, size)),
         block_k_c=_in_eights(np.array([problem.k, problem.c])),
         stop_rows=_in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
         acceleration_weight=_in_eights(_acceleration_weight(problem)),
+        acceleration_signal=_acceleration_by_signal(problem, response),
         rate_weight=np.abs(problem.read[:, :size]) + np.abs(problem.read[:, size:]) * (omega + damping),
         load_acceleration=problem.read_rate @ problem.load.T,
         load_norm=_load_norm(problem),
@@ -214,7 +224,7 @@ def fill_tones(tables: Tables, problem: Problem, tones: int, series: tuple[tuple
         tables.stop_rows[:, 2 * i : 2 * i + 2, own:size] = rows.reshape(-1, 2, size)[:, :, own:]
     if problem.table_dt.size:
         fill_propagators(problem.k, problem.c, (own, size), problem.table_dt[:1], tables.cell[None])
-        tables.cell_error[:, own:size] = cell_errors(problem, problem.table_dt[0])[0][:, own:]
+        tables.cell_error[:, own:size] = np.minimum(*_cell_weights(problem, problem.table_dt[0]))[:, own:]
     blocks = Blocks(*(getattr(tables, name) for name in Blocks._fields))
     filled(blocks, problem, (own, size), tables.flight_step, tables.contact_step, node_sets_of(series))
 
@@ -267,8 +277,24 @@ def _load_norm(problem: Problem) -> Any:
     return np.sqrt(problem.load[:, size:] ** 2 + problem.k * problem.load[:, :size] ** 2)
 
 
-def cell_errors(problem: Problem, h: float) -> tuple[Any, Any]:
-    """Weights (R, N) and (R, L, 2) of a bound of how far δ is from its linear interpolant between the ends of a cell.
+def following(problem: Problem, h: float) -> Any:
+    """(L, 3, 2N) response F_0 s + F_1 ṡ + F_2 s̈ that follows a signal s, of blocks with ωh ≥ 4; zero of the others.
+
+    With ẋ = A x + g s it is F_0 = -A⁻¹g, F_i = A⁻¹F_{i-1}, and what is left, d = x - Σ F_i s⁽ⁱ⁾, obeys ḋ = A d - F_2 s⃛.
+    """
+    n = len(problem.k)
+    fast = np.sqrt(problem.k) * h >= _FOLLOWS
+    stiff, c, out = np.where(fast, problem.k, np.inf), problem.c, np.zeros((len(problem.load), 3, 2, n))
+    response = -problem.load.reshape(-1, 2, n)
+    for i in range(3):
+        p, v = response[:, 0], response[:, 1]
+        response = np.stack((-(v + c * p) / stiff, np.where(fast, p, 0.0)), axis=1)
+        out[:, i] = response
+    return out.reshape(-1, 3, 2 * n)
+
+
+def cell_errors(problem: Problem, h: float, response: Any) -> tuple[Any, Any]:
+    """Weights (R, N) and (R, L, 5) of a bound of how far δ is from its linear interpolant between the ends of a cell.
 
     A block's share of δ differs from its interpolant by at most h²/8 max|δ̈_b|, and by at most twice its amplitude
     r_b E_b, whichever is smaller. With E_b the largest energy norm, |δ̈_b| <= w_b E_b + |a_b s|, so that
@@ -276,15 +302,52 @@ def cell_errors(problem: Problem, h: float) -> tuple[Any, Any]:
         error <= Σ_b W_b E_b + A |s|max,    W_b = min(w_b h²/8, 2 r_b),    A = |Σ_b a_b| h²/8
 
     where A is the sum over the blocks whose first bound is taken. As dε_b/dt <= ν_b |s|, E_b <= ε_b + m h ν_b |s|max
-    within m cells; what the signal adds is |s|max (A + m G), G = h Σ W_b ν_b. Returned are W, then A and G.
+    within m cells; what the signal adds is |s|max (A + m G), G = h Σ W_b ν_b.
+
+    Of blocks that follow the signal E_b is that of d, see `following`, W_b = 2 r_b, dε_b/dt <= μ_b |s⃛|, and the rest
+    is c_0 s + c_1 ṡ + c_2 s̈, which adds |s̈|max (h²/8 |c_0| + 2 |c_2|) + |s⃛|max (h²/8 |c_1| + m h Σ W_b μ_b). Returned
+    are W, then A, G, and these three factors.
     """
-    bent = _acceleration_weight(problem) * (h * h / 8.0)
-    both = 2.0 * _ripple_weight(problem.read, np.sqrt(problem.k))
-    oscillates = (problem.k > 0.0) & (both < bent)
+    follows, growth = _left_over(response, problem.k)
+    bent, both = _cell_weights(problem, h)
+    oscillates = follows | (both < bent)
     weight = np.where(oscillates, both, bent)
     rate = np.where(np.tile(oscillates, 2), 0.0, problem.read_rate)
     at_once = np.abs(rate @ problem.load.T) * (h * h / 8.0)
-    return weight, np.stack((at_once, h * weight @ _load_norm(problem).T), axis=2)
+    place = np.abs(problem.read @ response.transpose(1, 2, 0))  # (3, R, L): |c_0|, |c_1|, |c_2|
+    factors = (
+        *(at_once, h * np.where(follows, 0.0, weight) @ _load_norm(problem).T),
+        *(h * h / 8.0 * place[0] + 2.0 * place[2], h * h / 8.0 * place[1], h * (follows * weight) @ growth.T),
+    )
+    return weight, np.stack(factors, axis=2)
+
+
+def _cell_weights(problem: Problem, h: float) -> tuple[Any, Any]:
+    """(R, N) each: w_b h²/8 and, of blocks that oscillate, 2 r_b, see `cell_errors`; else inf."""
+    both = 2.0 * _ripple_weight(problem.read, np.sqrt(problem.k))
+    return _acceleration_weight(problem) * (h * h / 8.0), np.where(problem.k > 0.0, both, np.inf)
+
+
+def _left_over(response: Any, k: Any) -> tuple[Any, Any]:
+    """(N,) whether a block follows a signal; (L, N) μ, the rate at which s⃛ raises the energy norm of what is left."""
+    parts = response.reshape(len(response), 3, 2, len(k))
+    return parts.any(axis=(0, 1, 2)), np.hypot(parts[:, 2, 1], np.sqrt(k) * parts[:, 2, 0])
+
+
+def _acceleration_by_signal(problem: Problem, response: Any) -> Any:
+    """(R, L, 5): what signals add to a bound of |δ̈| during a time t: by |s|, |s| t, |ṡ|, |s̈| and |s⃛| t.
+
+    With what follows the signal taken off, δ̈ of a block is (its row of δ̇)·(A d + F_0 ṡ + F_1 s̈).
+    """
+    follows, growth = _left_over(response, problem.k)
+    weight = _acceleration_weight(problem)
+    rate = np.where(np.tile(follows, 2), 0.0, problem.read_rate)
+    moved = np.abs(problem.read_rate @ response.transpose(1, 2, 0))
+    factors = (
+        *(np.abs(rate @ problem.load.T), np.where(follows, 0.0, weight) @ _load_norm(problem).T),
+        *(moved[0], moved[1], (follows * weight) @ growth.T),
+    )
+    return np.stack(factors, axis=2)
 
 
 def _in_eights(rows: Any) -> Any:

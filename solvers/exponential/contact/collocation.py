@@ -71,6 +71,7 @@ from solvers.exponential.contact.node_response import (
     own_accelerance,
     respond_all,
     ripple_of,
+    swing_of,
     unresolved_part,
     unresolved_signal,
 )
@@ -257,7 +258,7 @@ def _find_unresolved(run, node_set, level, u):
         if unresolved > _TOO_MUCH * scratch.force_tolerance[s]:
             rounding = _force_rounding(run, s)
             unresolved = max(unresolved - rounding, _LITTLE * scratch.force_tolerance[s])
-        ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], run.state.x, n)
+        ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], swing_of(run), n)
         damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # nothing damps motion across a radius
         if rubs(problem, s):
             damped, stiffness = False, max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])

@@ -23,7 +23,7 @@ from solvers.compiled.kernels import (
 from solvers.compiled.parts import BEGIN, part
 from solvers.compiled.state import T_IN, T
 from solvers.exponential.contact.crossings import choose_sides
-from solvers.exponential.contact.node_response import own_accelerance
+from solvers.exponential.contact.node_response import note_swing, own_accelerance, swing_of
 from solvers.exponential.contact.peaks import pressed_speed, state_peaks
 from solvers.exponential.flight import energy_norms
 from solvers.exponential.tables import EXPONENT, STIFFNESS
@@ -42,11 +42,13 @@ def begin_steps(run, stop):
     """Set reference speeds, level and nodes of the next step after ``stop`` has entered, changed its segment, or left.
 
     The reference speed of a stop that enters or is open is the largest of |δ̇|, a tenth of the bound of |δ̇| by the
-    energy of the blocks, and 1e-3 of `pressed_speed`, m/s.
+    energy of the blocks, without what follows sampled signals, and 1e-3 of `pressed_speed`, m/s.
     """
     problem, state, scratch = run.problem, run.state, run.scratch
     control, others = scratch.control, False
-    energy_norms(problem, state.x, scratch.norms)
+    if run.tables.follows > 0.0:
+        note_swing(run)
+    energy_norms(problem, swing_of(run), scratch.norms)
     for s in range(problem.law.size):
         speed = abs(indentation_rate(problem, s, state.x))
         in_contact_before = state.segment[s] > 0 and state.active[s, T_IN] < state.now[T]

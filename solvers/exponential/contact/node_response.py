@@ -40,6 +40,7 @@ from solvers.exponential.contact.many_stops import (
     uses_blocks,
 )
 from solvers.exponential.contact.nodes import S
+from solvers.exponential.flight import SWING, join, split, take_off_following
 
 SHORT = STAGES
 DIFFERENCE, BATCH, LANDED, WITHIN, START = STAGES + 1, *range(STAGES + 4, STAGES + 8)
@@ -74,13 +75,14 @@ class Scratch(NamedTuple):
 
     x_new: Annotated[Any, "X8"]  # state at the end of the step tried
     terms: Annotated[Any, "14, 2*N8"]  # derivatives of the state
+    swing: Annotated[Any, "2*N"]  # state at the start of a step without what follows the sampled signals
     signal_terms: Annotated[Any, "tables, 6"]  # value and derivatives of every sampled signal
     values: Annotated[Any, "14"]  # coefficients of a polynomial
     norms: Annotated[Any, "N"]  # energy norms of the blocks, √(v² + k p²), √J
     driven_speed: Annotated[Any, "tables"]  # √J: energy norm that its largest value drives in a cell of a table
-    signal_bounds: Annotated[Any, "L"]  # bounds of the sampled signals on some cells
+    signal_bounds: Annotated[Any, "L, 4"]  # of the sampled signals and their three derivatives on some cells
     per_row: Annotated[Any, "R"]  # bounds of |δ̈| in m/s², errors of δ in m, or of δ̇ in m/s
-    split_state: Annotated[Any, "6, 2, N8"]  # p and v of the blocks, of several states; see `energy.flight_balance`
+    split_state: Annotated[Any, "7, 2, N8"]  # p and v of the blocks, of several states; see `energy.flight_balance`
     motion: Annotated[Any, "R+A, 2, S"]  # displacements of the rows and their rates at the nodes, δ and δ̇ of circles
     clipped: Annotated[Any, "S"]  # indentations of one stop at the nodes, not below 0
     free: Annotated[Any, "R, 2, S"]  # the motion of the rows without contact forces
@@ -388,6 +390,21 @@ def ripple_of_stop(run, s, alias, x):
     if is_circle(problem, s):
         ripple += ripple_of(run.tables.ripple_weight[row + 1], alias, x, n)
     return ripple
+
+
+@inner
+def note_swing(run):
+    """Write what oscillates in the state, without what follows the sampled signals, into ``scratch.swing``."""
+    swing = run.scratch.split_state[SWING]
+    split(run.problem, run.state.x, swing)
+    take_off_following(run, run.state.now[T], swing, swing)
+    join(run.problem, swing, run.scratch.swing)
+
+
+@merged
+def swing_of(run):
+    """(2N,) what oscillates in the state at the start of the step."""
+    return run.scratch.swing if run.tables.follows > 0.0 else run.state.x
 
 
 @reordered

@@ -83,6 +83,7 @@ from solvers.exponential.contact.node_response import (
     force_of,
     free_response,
     motion_of,
+    note_swing,
     own_accelerance,
     shortest_step,
 )
@@ -409,6 +410,8 @@ def advance_contact(run):
     # `longest` may be 0, beside a surface that is left or entered at rest
     level = level_of(tables, longest) if longest < tables.contact_step[wanted] else wanted
     copy(scratch.side, scratch.side_at_begin, scratch.side.size)
+    if tables.follows > 0.0:
+        note_swing(run)
     while True:
         tried = _attempt(run, node_set, level)
         element, border = tried.element, tried.border

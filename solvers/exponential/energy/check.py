@@ -5,7 +5,8 @@ force times the peak indentation. A run with an energy balance is refused if the
 `ROUNDING`) times the energy handled. `ROUNDED` roundings of the terms that cancel in the energy, of coordinates that
 stretch stiff parts and of coupled blocks, are tolerated too, up to `CANCELLED` of that; and `ROUNDINGS` roundings of
 the energy that each load would give alone, as loads may cancel, and of that of each contact's peak force over the
-distances whose difference δ is: at rest nothing else is handled.
+distances whose difference δ is: at rest nothing else is handled. A stiff coordinate that follows a sampled load, as
+that of a support's motion, moves at rounding of ωp: in the time T the load does work of ωT roundings of that energy.
 
 Without a balance, let E be the energy of the motion minus the steady response to tones. At the end it is at most that
 at the start plus the work of the contacts,
@@ -185,13 +186,15 @@ def _signs(count: int) -> Any:
 def _energy_of_loads(system: System, t: Array) -> float:
     """Energy, J, of the motion that the loads would give if they did not cancel, by their largest values at times t.
 
-    A block answers a force by at most about its static amplitude or, within a duration below 1/ω, by its impulse.
+    A block answers a force by at most about its static amplitude or, within a duration below 1/ω, by its impulse. That
+    of a sampled load counts 1 + ωT times.
     """
     k, n, root = system.blocks.k, system.size, 0.0
-    lasts = 1.0 / np.maximum(np.sqrt(k), 1.0 / t[-1])
+    lasts, times = 1.0 / np.maximum(np.sqrt(k), 1.0 / t[-1]), np.sqrt(1.0 + np.sqrt(k) * t[-1])
     for vector, signal in system.loads:
         rate = system.push @ np.asarray(vector)
-        size = np.linalg.norm(np.hypot(rate[n:], np.sqrt(k) * rate[:n]) * lasts)
+        amplitude = np.hypot(rate[n:], np.sqrt(k) * rate[:n]) * lasts
+        size = np.linalg.norm(amplitude if hasattr(signal, "tones") else amplitude * times)
         root += float(np.abs([signal(float(at)) for at in t]).max() * size)
     return 0.5 * root**2
 

@@ -1,9 +1,10 @@
 """Powers of loads and damping; state and energy balance inside a contact step, from the forces at its nodes.
 
 With x = E(t) y a block's equation is y' = E(-t) Σ push F. Gauss's collocation solves it, in panels of at most
-`_PANEL_RADIANS` of the fastest block: y at a panel's points is y₀ + Σ_r a_qr y'_r. Work, damping and impulses are sums
-over the same points. Such a method conserves quadratic forms: work of contacts and loads less damping adds up to the
-energy, even where the velocity of a stop is far from a polynomial through its values at the nodes.
+`_PANEL_RADIANS`, or `_FINE_RADIANS`, of the fastest block: y at a panel's points is y₀ + Σ_r a_qr y'_r. Work, damping
+and impulses are sums over the same points. Such a method conserves quadratic forms: work of contacts and loads less
+damping adds up to the energy, even where the velocity of a stop is far from a polynomial through its values at the
+nodes.
 
 At the end of a contact step the polynomials of the forces give the rate to h^15, inside to h^9 only. For a sample there
 they are replaced, if need be, by the laws' forces for the motion that they give: one iteration of Picard's, which makes
@@ -46,6 +47,7 @@ from solvers.exponential.contact.nodes import S
 from solvers.exponential.contact.step_integrals import is_weighted
 
 _PANEL_RADIANS = 3.0  # up to which the energy of a damped block is off by 5e-11 ζ of its own, and its motion by less
+_FINE_RADIANS = 2.0  # the same, 1e-13 ζ, where blocks follow signals: what follows handles much energy all the time
 _TERMS, _REACH = 14, 0.4  # of Taylor's series, and its radians of the fastest block: exact to 3e-17
 _INSIDE = 0.02  # largest integral of the next polynomial inside a step
 _RESOLVED = 0.5  # error of a rate inside a step, in units of its tolerance, up to which polynomials of forces do
@@ -359,7 +361,8 @@ def state_within(run, node_set, h, begin, end, row, ledger, by_laws):
     time_exponent = run.tables.time_exponent[node_set]
     sigma, last = (begin / h) ** (1.0 / time_exponent), (end / h) ** (1.0 / time_exponent)
     begun = run.scratch.stages[LANDED]  # no landing is under way
-    panels, size = 1 + int(time_exponent * run.tables.fastest * (end - begin) / _PANEL_RADIANS), 2 * run.problem.k.size
+    radians, size = _FINE_RADIANS if run.tables.follows > 0.0 else _PANEL_RADIANS, 2 * run.problem.k.size
+    panels = 1 + int(time_exponent * run.tables.fastest * (end - begin) / radians)
     width = (last - sigma) / panels
     for i in range(panels):
         _panel_points(run, node_set, h, sigma, width)
