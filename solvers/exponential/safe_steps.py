@@ -15,6 +15,9 @@ both ends by at most the error of linear interpolation, which one bound e covers
 
 `tables.cell_errors` derives it; |s|max is the largest Bézier coefficient of the quintics on these cells. No stop is
 reached on a cell at whose ends δ + e < 0. Only where this does not hold are steps of length τ taken.
+
+Blocks faster than the cells follow the signals. Of these ε is that of what is left, d of `tables.following`, and both
+bounds have parts in |ṡ|max, |s̈|max and |s⃛|max instead.
 """
 
 from __future__ import annotations
