@@ -3,6 +3,7 @@
 Fine beam meshes are hard on this problem: rounding of K alone moves ω² by about eps ω_max², for n Hermite
 elements eps n⁴ of the lowest. Given a factor R with RᵀR = K (curvatures instead of stiffness), the shapes are
 corrected until they settle and the frequencies are the singular values of R Φ; there rounding is about eps n² only.
+Rows that soften, as compression does, are imaginary: K = BᵀSB with S = diag(±1) has the root R = √S B.
 """
 
 from __future__ import annotations
@@ -37,6 +38,7 @@ SETTLED = 1e-9  # relative change of the frequencies by the last correction
 SHAPED = 1e-11  # same, of the shapes' curvature
 STALLED = 0.25  # of the correction before: the shapes' rounding, about eps (length/h)², is reached
 MOST_CORRECTIONS = 10
+UNSTABLE = "K must be positive semi-definite, got omega² = {:.6g} in modal_basis; the structure is unstable"
 
 
 def modal_basis(
@@ -55,7 +57,8 @@ def modal_basis(
     indices :
         Mode numbers instead, from 0, distinct, in any order (the basis is ordered by frequency).
     root : (k, N)
-        R with RᵀR = K, optional: low modes of fine meshes to full accuracy.
+        R with RᵀR = K, optional: low modes of fine meshes to full accuracy. Each row real, or imaginary where it
+        takes from K.
 
     Returns
     -------
@@ -155,10 +158,7 @@ def _without_root(M: sparse.csc_matrix, K: sparse.csc_matrix, omega_squared: Vec
     if np.any(omega_squared < -hidden):
         share = float(-omega_squared.min()) / scale
         rounded = f", or K is rounded, for this is {share:.1g} of the highest: give more digits" * (share < DECIMALS)
-        raise ValueError(
-            f"K must be positive semi-definite, got omega² = {omega_squared.min():.6g} in modal_basis; "
-            f"the structure is unstable{rounded}"
-        )
+        raise ValueError(UNSTABLE.format(omega_squared.min()) + rounded)
     return _ascending(np.sqrt(np.where(omega_squared > hidden, omega_squared, 0.0)), vectors)
 
 
@@ -200,7 +200,7 @@ def _with_root(
     if not mismatch <= SYMMETRY_TOLERANCE * abs(K).max():
         raise ValueError(f"root must satisfy rootᵀ root = K, got a difference of {mismatch} in modal_basis; fix it")
     solve: Callable[[Vector], Vector] = factored(K + shift * M).solve
-    omega, vectors = _ritz(M, R, vectors)
+    omega, vectors = _ritz(M, K, R, vectors)
     rigid = _rigid_with_root(omega, _scale(M, K))
     change, turn, before, corrections = np.inf, np.inf, np.inf, 0
     while not (change <= SETTLED and (turn <= SHAPED or turn > STALLED * before)):
@@ -209,10 +209,10 @@ def _with_root(
                 f"frequencies must settle to {SETTLED}, got a change of {change:.3g} in modal_basis; "
                 "use fewer elements or less extreme stiffnesses"
             )
-        step, old = solve(R.T @ (R @ vectors) - (M @ vectors) * omega**2), omega
+        step, old = solve((R.T @ (R @ vectors)).real - (M @ vectors) * omega**2), omega
         before, turn = turn, _largest(np.linalg.norm(R @ step, axis=0)[:count], omega[:count], rigid)
-        omega, vectors = _ritz(M, R, vectors - step)
-        change = _largest(np.abs(omega - old)[:count], omega[:count], rigid)
+        omega, vectors = _ritz(M, K, R, vectors - step)
+        change = _largest((np.abs(omega - old) / cancelling(R, vectors, omega))[:count], omega[:count], rigid)
         corrections += 1
     return Basis(vectors[:, :count], np.where(omega <= rigid, 0.0, omega)[:count])
 
@@ -237,11 +237,11 @@ def ritz(M: Matrix, K: Matrix, root: Matrix | None, vectors: Vector) -> tuple[Ve
         vectors = unit @ rotation
         basis = _ascending(np.sqrt(np.where(squares > _hidden(K, vectors), squares, 0.0)), vectors)
         return basis.omega, basis.vectors
-    omega, vectors = _ritz(M, sparse.csr_matrix(root), unit)
+    omega, vectors = _ritz(M, K, sparse.csr_matrix(root), unit)
     return np.where(omega <= _rigid_with_root(omega, _scale(M, K)), 0.0, omega), vectors
 
 
-def _ritz(M: sparse.csc_matrix, R: sparse.csr_matrix, vectors: Vector) -> tuple[Vector, Vector]:
+def _ritz(M: sparse.csc_matrix, K: sparse.csc_matrix, R: sparse.csr_matrix, vectors: Vector) -> tuple[Vector, Vector]:
     """Best frequencies and shapes in the span of the vectors: singular values of R Φ, lowest first."""
     try:
         factor = linalg.cholesky(vectors.T @ (M @ vectors), lower=True)
@@ -250,9 +250,34 @@ def _ritz(M: sparse.csc_matrix, R: sparse.csr_matrix, vectors: Vector) -> tuple[
                             "use fewer elements or less extreme stiffnesses") from None  # fmt: skip
     vectors = linalg.solve_triangular(factor, vectors.T, lower=True).T
     strain = R @ vectors
+    if np.iscomplexobj(strain):
+        omega, rotation = _softened(strain, RIGID_WITH_ROOT * _scale(M, K))
+        return omega, vectors @ rotation
     missing = max(0, strain.shape[1] - strain.shape[0])  # R of a free body may have fewer rows than modes
     _, omega, rotation = linalg.svd(np.pad(strain, ((0, missing), (0, 0))), full_matrices=False)
     return omega[::-1], vectors @ rotation.T[:, ::-1]
+
+
+def cancelling(R: Matrix, vectors: Vector, omega: Vector) -> Vector | float:
+    """‖R φ‖²/ω² (n,): what rounding of ω² grows by where compression takes much of it, near buckling; 1 of real R."""
+    if not np.iscomplexobj(R):
+        return 1.0
+    energy = np.linalg.norm(sparse.csr_matrix(R) @ vectors, axis=0) ** 2
+    return np.asarray(np.divide(energy, omega**2, out=np.ones_like(omega), where=omega > 0.0))
+
+
+def _softened(strain: Vector, level: float) -> tuple[Vector, Vector]:
+    """Frequencies, lowest first, and their combinations (n, n) of shapes with strains real and imaginary by rows.
+
+    strainᵀ strain + level² = AᵀA by Cholesky, which keeps each shape to its own size as strains do; ω² + level² are the
+    squares of the singular values of A. Without the level, far below elastic ω, rounding may make ω² = 0 negative.
+    """
+    square = (strain.T @ strain).real
+    try:
+        _, found, rotation = linalg.svd(linalg.cholesky(square + level**2 * np.eye(len(square))))
+    except linalg.LinAlgError:
+        raise ValueError(UNSTABLE.format(np.linalg.eigvalsh(square)[0])) from None
+    return np.sqrt(np.maximum(found**2 - level**2, 0.0))[::-1], rotation.T[:, ::-1]
 
 
 def _verify(basis: Basis, M: sparse.csc_matrix, K: sparse.csc_matrix) -> None:

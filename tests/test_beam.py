@@ -107,8 +107,9 @@ TAPERED = Taper(Section.rectangle(1.0, 12.0, 1.0, 1.0), Section.rectangle(1.0, 1
         (SPANS, UNEVEN),
         (Beam(1.0, UNIT), np.linspace(0.0, 1.0, 1001)),
         (Beam(1.0, TAPERED, foundation=3.0, axial_force=2.0), np.linspace(0.0, 1.0, 8) ** 1.5),
+        (Beam(1.0, TAPERED, foundation=3.0, axial_force=-2.0), np.linspace(0.0, 1.0, 8) ** 1.5),
     ],
-    ids=["two spans", "fine mesh", "tapered, on a foundation, under tension"],
+    ids=["two spans", "fine mesh", "tapered, on a foundation, under tension", "under compression"],
 )
 def test_root_squares_to_the_stiffness(beam, nodes):
     K, R = bending_matrices(beam, nodes)[0], bending_root(beam, nodes)

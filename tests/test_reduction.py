@@ -7,8 +7,9 @@ from refusals import refused, refused_by
 from scipy import sparse
 
 import reduction
+from contacts import KelvinVoigt
 from fembeam.beams import Beam, Section
-from fembeam.scene import Clamped, LumpedMass, Scene
+from fembeam.scene import Clamped, Impactor, LumpedMass, Pinned, Scene
 from reduction import modal
 
 UNIT = Section(E=1.0, rho=1.0, A=1.0, I=1.0)
@@ -262,3 +263,56 @@ def test_a_slow_mode_with_no_gap_behind_it_is_elastic():
     omega = np.array([3e-12, 1e-7, 1.0])
     found = reduction.modal_basis(np.eye(3), np.diag(omega**2), count=2, root=np.diag(omega)).omega
     np.testing.assert_allclose(found, omega[:2], rtol=1e-9)
+
+
+# --- under compression: rows of the root are imaginary where they take from K -----------------------------
+
+
+def compressed(share, elements, **parts):
+    """A pinned beam, EI = ρA = L = 1, pressed by a share of Euler's load."""
+    beam = Beam(1.0, UNIT, axial_force=-share * np.pi**2)
+    return Scene(beam, [Pinned(0.0), Pinned(1.0)], **parts).matrices(elements=elements)
+
+
+@pytest.mark.parametrize("elements", [400, 1000])
+@pytest.mark.parametrize("share", [0.01, 0.5, 0.999])
+def test_a_compressed_beam_on_a_fine_mesh(share, elements):
+    """ω_i² = (iπ)⁴ (1 - S/i² P): by K alone ω_1 was off by 4e-5 on 1000 elements, and 0 where S = 0.999 P."""
+    full, i = compressed(share, elements), np.arange(1, 4)
+    left = 1 - share / i**2
+    found = reduction.modal_basis(full.M, full.K, 3, root=full.root).omega
+    rounding, mesh = 4 * np.finfo(float).eps * elements**2, (np.pi * i / elements) ** 4 / 1440
+    assert np.all(np.abs(found / (np.pi**2 * i**2 * np.sqrt(left)) - 1) <= (rounding + mesh) / left)
+
+
+def test_a_rigid_body_mode_beside_a_compressed_beam():
+    striker = Impactor(0.5, 0.1, 1.0, KelvinVoigt(1e3, 1.0))
+    full = compressed(0.5, 20, impactors=[striker])
+    found = reduction.modal_basis(full.M, full.K, 2, root=full.root).omega
+    assert found[0] == 0.0
+    assert found[1] == pytest.approx(np.pi**2 * np.sqrt(0.5), rel=1e-6)
+
+
+def test_frequencies_far_apart_of_a_root_with_signs():
+    """Springs of 1e10 and 3 in a row, and -2 on the end: by eigenvalues of K alone the lower ω² was off by 1e-6."""
+    root = np.array([[1e5, 0.0], [-np.sqrt(3.0), np.sqrt(3.0)], [0.0, 1j * np.sqrt(2.0)]])
+    found = reduction.modal_basis(np.eye(2), (root.T @ root).real, root=root).omega
+    total, product = 1e10 + 4, 1e10 - 6  # of the two ω²: 1e10 + 3 + 1, (1e10 + 3) - 9
+    high = (total + np.sqrt(total**2 - 4 * product)) / 2
+    np.testing.assert_allclose(found**2, [product / high, high], rtol=1e-10)  # of ω: eps 1e5
+
+
+SOFTENED = np.array([[2.0, 0.0], [0.0, 1.0], [0.0, 1.5j]])  # K = diag(4, -1.25)
+
+
+test_roots_with_signs_that_are_refused = refused_by(
+    lambda K, root: reduction.modal_basis(np.eye(2), K, root=root),
+    (
+        np.diag([4.0, -1.25]),
+        SOFTENED,
+        "K must be positive semi-definite, got omega² = -1.25 in modal_basis; the struct",
+    ),
+    (np.diag([4.0, -1.25]), None, "K must be positive semi-definite, got omega² = -1.25 in modal_basis; the struct"),
+    (np.diag([4.0, 3.25]), SOFTENED, "root must satisfy rootᵀ root = K, got a difference of 4.5"),
+    (np.diag([4.0, -1.25]), np.abs(SOFTENED), "root must satisfy rootᵀ root = K, got a difference of 4.5"),
+)

@@ -200,14 +200,13 @@ def bending_matrices(beam: Beam, nodes: Vector) -> tuple[sparse.csr_matrix, spar
 
 
 @lru_cache(maxsize=16)  # scenes that differ in what stands on a beam, one after the other, have it in common
-def bare_beam(beam: Beam, at: bytes) -> tuple[sparse.csr_matrix, sparse.csr_matrix, sparse.csr_matrix | None]:
+def bare_beam(beam: Beam, at: bytes) -> tuple[sparse.csr_matrix, sparse.csr_matrix, sparse.csr_matrix]:
     """K, M and R of `bending_matrices` and `bending_root` on nodes given as bytes; not to be written to."""
     nodes = np.frombuffer(at)
     found = (*bending_matrices(beam, nodes), bending_root(beam, nodes))
     for matrix in found:
-        if matrix is not None:
-            matrix.sort_indices()
-            matrix.data.setflags(write=False)
+        matrix.sort_indices()
+        matrix.data.setflags(write=False)
     return found
 
 
@@ -246,18 +245,16 @@ def joining(h: Vector, nodal_dofs: NDArray[np.int64]) -> sparse.csr_matrix:
     return sparse.csr_matrix((values, (nodal_dofs.ravel(), columns)), shape=(4 * len(h), 2 * len(h) + 2))
 
 
-def bending_root(beam: Beam, nodes: Vector) -> sparse.csr_matrix | None:
-    """R (k, 2m) with RᵀR = K: √(EI w) times the curvature at Gauss points, and the like; None under compression.
+def bending_root(beam: Beam, nodes: Vector) -> sparse.csr_matrix:
+    """R (k, 2m) with RᵀR = K: √(EI w) times the curvature at Gauss points, and the like; compression's imaginary.
 
     ‖R u‖² keeps the strain energy of smooth shapes to about eps n² for n elements, uᵀK u only to eps n⁴.
     """
-    if beam.axial_force < 0:
-        return None
     h = np.diff(nodes)
     curvature, inside = _at_gauss_points(nodes, 4 if beam.tapered else 2, derivative=2)
     rows = [curvature(beam.bending_stiffness(inside))]
     for value, points, derivative in ((beam.axial_force, 3, 1), (beam.foundation, 4, 0)):
-        if value > 0:
+        if value != 0:
             rows.append(_at_gauss_points(nodes, points, derivative)[0](np.full(points * len(h), value)))
     return sparse.vstack(rows, format="csr")
 
@@ -275,7 +272,7 @@ def _at_gauss_points(nodes: Vector, points: int, derivative: int) -> tuple[Calla
     element = np.repeat(np.arange(len(nodes) - 1), points)
     x, weight = np.tile(x, len(nodes) - 1), np.tile(weight, len(nodes) - 1)
     rows = _rows(nodes, element, x, derivative)
-    return (lambda coefficient: sparse.diags(np.sqrt(coefficient * weight * h)) @ rows), nodes[element] + h * x
+    return (lambda coefficient: sparse.diags(np.emath.sqrt(coefficient * weight * h)) @ rows), nodes[element] + h * x
 
 
 def gauss_points(points: int) -> tuple[Vector, Vector]:

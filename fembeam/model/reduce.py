@@ -37,7 +37,6 @@ Vector = NDArray[np.float64]
 
 DEFAULT_MODES = 2  # modes of each body that a model keeps where none are asked for
 COARSE = 0.01  # estimated relative error of the highest kept frequency, above which elements as asked get a warning
-FINE = 1e-6  # estimated rounding of the lowest frequency, likewise
 FIRST_TRY = 8  # modes, doubled until a frequency or share of mass is reached
 MOST_DOFS = 20_000  # of the finest mesh
 EQUAL = 1e-9  # relative distance of frequencies whose shapes are arbitrary among themselves
@@ -316,17 +315,11 @@ def _warn_of_cut_pairs(beam: Matrices, omega: Vector, chosen: tuple[int, ...], o
 
 
 def _warn_of_the_mesh(matrices: Matrices, omega: float) -> None:
-    """Warn when elements given by number are far too coarse, or so fine that rounding shows."""
+    """Warn when elements given by number are far too coarse."""
     coarse = max(float(beam.frequency_error(omega)) for beam in matrices.beams)
-    rounding = max(beam.rounding for beam in matrices.beams)
-    troubles = [
-        (coarse > COARSE, f"too coarse for the highest mode: its frequency is off by about {coarse:.1%}"),
-        (rounding > FINE, f"too fine: rounding may change the lowest frequency by {rounding:.1g} of it"),
-    ]
-    for found, trouble in troubles:
-        if found:
-            advice = "leave them out: as few as the modes need are made"
-            warn(f"elements are {trouble}; {advice}")
+    if coarse > COARSE:
+        warn(f"elements are too coarse for the highest mode: its frequency is off by about {coarse:.1%}; "
+             "leave them out: as few as the modes need are made")  # fmt: skip
 
 
 def _chosen(

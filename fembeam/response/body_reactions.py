@@ -2,7 +2,8 @@
 
 K u_s = f - M (ü + r ẍ) on the free dofs,  reaction = K_all u_s - f + M_all (ü + r ẍ) on the supported ones.
 
-With K = RᵀR the stresses y = R u_s are refined: K u_s loses what rounding of u_s does to the stiffest element, Rᵀy not.
+With K = RᵀR the stresses y = R u_s, imaginary where R is, are refined: K u_s loses what rounding of u_s does to the
+stiffest element, Rᵀy not.
 """
 
 from __future__ import annotations
@@ -73,14 +74,14 @@ class BodyHeld:
         """(N_all, c): what is missing on each dof, that supports exert."""
         if self.stresses is None:
             return np.asarray(self.full.K @ self.displacement - self.columns)
-        return np.asarray(self.full.root.T @ self.stresses - self.columns)  # type: ignore[union-attr]
+        return np.asarray((self.full.root.T @ self.stresses).real - self.columns)  # type: ignore[union-attr]
 
     def _spring(self, part: Any) -> Vector:
         """Force or moment (c,) of a spring."""
         if self.stresses is None:
             return np.asarray(-part.stiffness * (self.full.own_row(part.z, part.along) @ self.displacement)[0])
         number = next(i for i, one in enumerate(self.scene.springs) if one is part) - len(self.scene.springs)
-        return np.asarray(-np.sqrt(part.stiffness) * self.stresses[number])
+        return np.asarray(-np.sqrt(part.stiffness) * self.stresses[number].real)
 
 
 def static_solver(K: sparse.csr_matrix, M: sparse.csr_matrix, rigid: Vector) -> Any:
@@ -97,5 +98,5 @@ def balanced(root: sparse.csr_matrix, solve: Any, load: Vector, stresses: Vector
     """Stresses Y (rows of R, c) with RᵀY = load, nearest to the given ones, which rounding keeps from it."""
     found = np.zeros((root.shape[0], load.shape[1])) if stresses is None else stresses
     for _ in range(1 + REFINED):
-        found = found + root @ solve(load - root.T @ found)
+        found = found + root @ solve(load - (root.T @ found).real)
     return np.asarray(found)

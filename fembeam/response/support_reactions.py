@@ -11,7 +11,7 @@ part of the internal forces.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -45,7 +45,6 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 REFINED = 4  # times; each gains the digits that rounding of K, eps n⁴ of n elements, leaves: one does to 1000 elements
-GAUSS = np.polynomial.legendre.leggauss(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,13 +309,14 @@ def _own_damping(full: Matrices) -> sparse.csr_matrix:
 class _Held:
     """One beam's static answer to unit loads: stresses y with B_freeᵀ y = load, reactions B_supportedᵀ y - load.
 
-    K = Bᵀ diag(sign) B. The stresses are refined, not the displacements: K u loses eps n³ of the load, Bᵀ y eps n.
+    K = BᵀB, rows of compression imaginary. The stresses are refined, not the displacements: K u loses eps n³ of the
+    load, Bᵀ y eps n.
     """
 
     def __init__(self, scene: Scene, matrices: Matrices, columns: Vector) -> None:
         self.matrices, self.columns = matrices, columns
         self.springs, self.nodes = list(scene.springs), matrices.nodes
-        self.B, self.sign = _factor(scene, matrices.nodes)
+        self.B = _factor(scene, matrices.nodes)
         self.free = np.flatnonzero(matrices.dofs.ravel() >= 0)
 
     @cached_property
@@ -324,41 +324,30 @@ class _Held:
         """Y (rows of B, c)."""
         B = self.B[:, self.free]
         solve = static_solver(self.matrices.K, self.matrices.M, rigid_shapes(self.matrices, 2))
-        stress = np.zeros((B.shape[0], self.columns.shape[1]))
+        stress = np.zeros((B.shape[0], self.columns.shape[1]), B.dtype)
         for _ in range(REFINED):
-            left = self.columns[self.free] - B.T @ (self.sign[:, None] * stress)
-            stress += B @ solve(left)
-        return self.sign[:, None] * stress
+            stress += B @ solve(self.columns[self.free] - (B.T @ stress).real)
+        return stress
 
     def by(self, part: Any) -> tuple[Vector, Vector]:
         """Force and moment (c,) of a support or spring per unit of each column."""
         if any(part is spring for spring in self.springs):
             first, count = self.springs.index(part) - 2 * len(self.springs), len(self.springs)
             stiffness = np.sqrt([part.stiffness, part.rotational])
-            return tuple(-stiffness[i] * self.stresses[first + i * count] for i in range(2))  # type: ignore[return-value]
+            return tuple(-stiffness[i] * self.stresses[first + i * count].real for i in range(2))  # type: ignore[return-value]
         dof = 2 * int(np.argmin(np.abs(self.nodes - part.z)))
-        balance = self.B[:, dof : dof + 2].T @ self.stresses - self.columns[dof : dof + 2]
+        balance = (self.B[:, dof : dof + 2].T @ self.stresses).real - self.columns[dof : dof + 2]
         return tuple(balance * np.array(part.fixed)[:, None])  # type: ignore[return-value]
 
 
-def _factor(scene: Scene, nodes: Vector) -> tuple[sparse.csr_matrix, Vector]:
-    """B on all dofs and the signs of its rows: -1 those of compression; the springs' rows come last, √k u then √κ u_z.
+def _factor(scene: Scene, nodes: Vector) -> sparse.csr_matrix:
+    """B on all dofs; the springs' rows come last, √k u then √κ u_z.
 
     Springs without stiffness have rows of zeros.
     """
-    force = scene.beam.axial_force
-    bending = bending_root(replace(scene.beam, axial_force=0.0), nodes)
-    assert bending is not None  # as it is but under compression
-    h = np.repeat(np.diff(nodes), 3)
-    inside = np.repeat(nodes[:-1], 3) + h * np.tile(0.5 + GAUSS[0] / 2, len(nodes) - 1)
-    weight = np.sqrt(abs(force) * h * np.tile(GAUSS[1] / 2, len(nodes) - 1))
-    slopes = sparse.diags(weight) @ hermite_rows(nodes, inside, 1)
     z = np.array([spring.z for spring in scene.springs], dtype=float)
     springs = [
         sparse.diags(np.sqrt([getattr(spring, name) for spring in scene.springs])) @ hermite_rows(nodes, z, derivative)
         for derivative, name in enumerate(("stiffness", "rotational"))
     ]
-    B = sparse.vstack([bending, slopes, *(springs if len(z) else ())], format="csr")
-    sign = np.ones(B.shape[0])
-    sign[bending.shape[0] : bending.shape[0] + len(weight)] = np.sign(force)
-    return B, sign
+    return sparse.vstack([bending_root(scene.beam, nodes), *(springs if len(z) else ())], format="csr")

@@ -47,8 +47,8 @@ class Matrices:
     ----------
     M, K : (N, N) sparse CSR, kg and N/m for displacements.
     C : (N, N) sparse CSR, N s/m: structural damping and dashpots, made when first read.
-    root : (k, N) sparse R with RᵀR = K; `reduction.modal_basis(M, K, root=root)` is accurate on fine meshes. None
-        under compression.
+    root : (k, N) sparse R with RᵀR = K, rows of compression imaginary; `reduction.modal_basis(M, K, root=root)` is
+        accurate on fine meshes. None where a structure comes by its matrices.
     dashpots : (N, N) sparse, the dashpots' part of C alone.
     base_load : (M_all r) (N,) in kg, columns of the supported dofs included; the load is -base_load ÿ. Of a body with
         directions that along y, else along the first that it has; `base_loads` has all.
@@ -196,11 +196,6 @@ class Matrices:
         """Relative error to expect in frequencies omega: max over elements of (β h)⁴/1440, β⁴ = ρA ω²/EI."""
         steps = np.diff(self.nodes) * mesh.slowness(self.beam, self.nodes)
         return mesh.ERROR_CONSTANT * steps.max() ** 4 * np.asarray(omega, dtype=float) ** 2
-
-    @property
-    def rounding(self) -> float:
-        """Relative error of the lowest frequency from rounding: about eps n² with a root, eps n⁴ without."""
-        return float(np.finfo(float).eps * self.elements ** (2 if self.root is not None else 4))
 
     @property
     def accuracy(self) -> str:
@@ -390,8 +385,7 @@ def _on_nodes(scene: Scene, nodes: Vector, modes: int | None) -> Matrices:
     springs = _lumped(nodes, [(s.z, s.stiffness, s.rotational, 0.0) for s in scene.springs])
     dashpots = _lumped(nodes, [(d.z, d.damping, d.rotational, 0.0) for d in scene.dashpots])
     M_all, K_all, C_all = _with(M, arms), _with(K, springs), _with(sparse.csr_matrix(M.shape), dashpots)
-    if root is not None:
-        root = (sparse.vstack([root, springs], format="csr") if springs.shape[0] else root)[:, free]
+    root = (sparse.vstack([root, springs], format="csr") if springs.shape[0] else root)[:, free]
 
     r = np.tile([1.0, 0.0], len(nodes))
     limit = {} if modes is None else {"y": float(r @ (M @ r)) + moved_by_rows(arms, free, r)}

@@ -77,11 +77,6 @@ class BodyMatrices(Matrices):
         """Zeros: the matrices are what the structure is."""
         return 0.0 * np.asarray(omega, dtype=float)
 
-    @property
-    def rounding(self) -> float:
-        """0: it is not told."""
-        return 0.0
-
     @cached_property
     def influence(self) -> Vector:
         """ValueError: its dofs move along several directions."""

@@ -153,8 +153,8 @@ def properties_of(
     return {**stiffness, **shear, **rotary, "rho_A": rho * A, "rho_I": rho * I, "rho_Ip": rho * (I + I2)}
 
 
-def stiffness_parts(elements: Elements) -> list[tuple[float, sparse.csr_matrix]]:
-    """(±1, R) with K = Σ ± RᵀR on the ends of the elements; minus only for members under compression."""
+def stiffness_root(elements: Elements) -> sparse.csr_matrix:
+    """R with K = RᵀR on the ends of the elements; imaginary in the rows of members under compression."""
     element, x, weight = elements.at_gauss(2)
     p = {name: values[element] for name, values in elements.properties.items()}
     curved = {plane: elements.turning(element, x, plane, 1) for plane in elements.planes}
@@ -169,16 +169,14 @@ def stiffness_parts(elements: Elements) -> list[tuple[float, sparse.csr_matrix]]
         rows.append(_scaled(p["EA"] * weight, elements.along(element, x, False, 1)))
     if elements.twists:
         rows.append(_scaled(p["GJ"] * weight, elements.along(element, x, True, 1)))
-    rows += _transverse(elements, "k", 1.0, 4, 0) + _transverse(elements, "N", 1.0, 3, 1) + _shear_strain(elements)
-    pressed = _transverse(elements, "N", -1.0, 3, 1)
-    parts = [(1.0, sparse.vstack(rows, format="csr"))]
-    return parts + ([(-1.0, sparse.vstack(pressed, format="csr"))] if pressed else [])
+    rows += _transverse(elements, "k", 4, 0) + _transverse(elements, "N", 3, 1) + _shear_strain(elements)
+    return sparse.vstack(rows, format="csr")
 
 
-def _transverse(elements: Elements, name: str, sign: float, points: int, derivative: int) -> list[sparse.csr_matrix]:
-    """Rows of √(±p) v and w, or of their slopes, where a property p has the sign; none if nowhere."""
+def _transverse(elements: Elements, name: str, points: int, derivative: int) -> list[sparse.csr_matrix]:
+    """Rows of √p v and w, or of their slopes, of a property p; none where it is zero everywhere."""
     element, x, weight = elements.at_gauss(points)
-    value = np.maximum(sign * elements.properties[name][element], 0.0) * weight
+    value = elements.properties[name][element] * weight
     if not np.any(value):
         return []
     return [_scaled(value, elements.bending(element, x, plane, derivative)) for plane in elements.planes]
@@ -236,4 +234,4 @@ def _sheared(x: Vector, derivative: int) -> Vector:
 
 def _scaled(value: Vector, rows: sparse.csr_matrix) -> sparse.csr_matrix:
     """√value times each row."""
-    return sparse.diags(np.sqrt(value)) @ rows
+    return sparse.diags(np.emath.sqrt(value)) @ rows

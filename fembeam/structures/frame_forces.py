@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fembeam.beams import hermite_shapes
-from fembeam.structures.element_matrices import ACROSS, ALONG, UP, WIDTH, Elements, inertia_root, stiffness_parts
+from fembeam.structures.element_matrices import ACROSS, ALONG, UP, WIDTH, Elements, inertia_root, stiffness_root
 from fembeam.support import is_finite, require
 
 if TYPE_CHECKING:
@@ -126,12 +126,8 @@ def frame_forces(made: FrameMatrices, vectors: Vector, inertia: Vector, stresses
     """
     elements = made.mesh.elements
     u, a = elements.join @ vectors, elements.join @ inertia
-    P = inertia_root(elements)
-    parts = stiffness_parts(elements)
-    if stresses is None:
-        forces = sum(sign * (R.T @ (R @ u)) for sign, R in parts) - P.T @ (P @ a)
-    else:
-        forces = parts[0][1].T @ stresses - P.T @ (P @ a)
+    P, R = inertia_root(elements), stiffness_root(elements)
+    forces = (R.T @ (R @ u if stresses is None else stresses)).real - P.T @ (P @ a)
     (push, turn), (shift, tilt) = (_at_ends(values, vectors.shape[1]) for values in (forces, a))
     side, p = np.array([-1.0, 1.0])[None, :, None], elements.properties
 

@@ -41,7 +41,7 @@ from fembeam.structures.element_matrices import (
     gyroscopic,
     inertia_root,
     properties_of,
-    stiffness_parts,
+    stiffness_root,
 )
 from fembeam.structures.frame_checks import arm_matrix
 from fembeam.structures.frame_forces import FrameForces, frame_forces
@@ -357,14 +357,14 @@ def _on(frame: Frame, borders: list[Vector], promise: str) -> FrameMatrices:
     labels, join = _numbered(frame, borders)
     mesh = FrameMesh(frame, tuple(borders), tuple(labels), join)
     elements = mesh.elements
-    parts = [(sign, (R @ elements.join).tocsr()) for sign, R in stiffness_parts(elements)]
+    R = (stiffness_root(elements) @ elements.join).tocsr()
     P = inertia_root(elements) @ elements.join
     moved = [name for name in frame.components if name in COMPONENTS[:3]]
     translations = [[float(component == name) for name in moved] for _, component in labels]
     return FrameMatrices(
-        *((P.T @ P).tocsr(), sum(sign * (R.T @ R) for sign, R in parts).tocsr(), mesh.labels, mesh.rows),
+        *((P.T @ P).tocsr(), (R.T @ R).real.tocsr(), mesh.labels, mesh.rows),
         np.array(translations).reshape(len(labels), len(moved)),
-        root=parts[0][1] if len(parts) == 1 else None,
+        root=R,
         gyroscopic=_spun(frame, elements) if frame.spin != 0 else None,
         accuracy=f"{elements.count} elements, {len(labels)} dofs: {promise}",
         mesh=mesh,

@@ -105,9 +105,12 @@ def _stiffness(made: Assembled, T: Vector, count: int) -> tuple[Vector, sparse.c
         K[count:, count:] = np.diag(np.diag(K)[count:])
         return (K + K.T) / 2, None
     strain = np.asarray(made.root @ T)
-    interface = np.linalg.qr(strain[:, :count], mode="r")
-    root = sparse.block_diag([interface, np.diag(np.linalg.norm(strain[:, count:], axis=0))], format="csr")
-    return (root.T @ root).toarray(), root
+    interface = np.asarray(np.linalg.qr(strain[:, :count].real, mode="r"))
+    if np.iscomplexobj(strain):  # rows are real or imaginary
+        interface = np.vstack([interface, 1j * np.asarray(np.linalg.qr(strain[:, :count].imag, mode="r"))])
+    modes = np.sqrt(np.sum(strain[:, count:] ** 2, axis=0).real)
+    root = sparse.block_diag([interface, np.diag(modes)], format="csr")
+    return (root.T @ root).real.toarray(), root
 
 
 def _lines(body: Any) -> list[tuple[Any, Any]]:
