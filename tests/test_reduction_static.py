@@ -92,6 +92,31 @@ def test_static_shapes_of_a_compressed_beam_are_not_refused(force, modes):
     assert model.omega.size == modes + 3
 
 
+@pytest.mark.parametrize("apart", [2e-4, 3e-3])
+def test_places_close_together_under_compression(apart):
+    """EI = L = 1, N = k²: u(a) = sin ka sin k(1-b)/(k³ sin k) - a (1-b)/k² of a load at b ≥ a.
+
+    Of opposite loads at two places; they once shared an element, and u was off by 7e-4 and 4e-3.
+    """
+    k, z = np.pi * np.sqrt(0.5), np.array([0.5, 0.5 + apart])
+    stops = [Stop(place, KelvinVoigt(1.0, 1.0)) for place in z]
+    scene = Scene(Beam(1.0, UNIT, axial_force=-(k**2)), [Pinned(0.0), Pinned(1.0)], stops=stops)
+    model = scene.reduce(modes=3, elements=100, residual=True)
+    a, b = np.minimum.outer(z, z), np.maximum.outer(z, z)
+    exact = np.sin(k * a) * np.sin(k * (1 - b)) / (k**3 * np.sin(k)) - a * (1 - b) / k**2
+    apart_by = np.array([1.0, -1.0])
+    found = np.sum((apart_by @ model.directions / model.omega) ** 2)
+    assert found == pytest.approx(apart_by @ exact @ apart_by, rel=1e-6, abs=0.0)  # eps (L/h)² = 6e-9
+
+
+def test_supports_close_together_under_compression():
+    """Two pins 3e-4 apart, once refused, are a clamping but for a share of 3e-4."""
+    beam = Beam(1.0, UNIT, axial_force=-5.0)
+    pins = [Pinned(0.0), Pinned(3e-4), Pinned(1.0)]
+    found, clamped = (Scene(beam, held).reduce(2).omega for held in (pins, [Clamped(0.0), Pinned(1.0)]))
+    np.testing.assert_allclose(found, clamped, rtol=1e-3)
+
+
 def test_craig_bampton_with_all_modes_is_the_full_model():
     full = Scene(Beam(1.0, UNIT), [Clamped(0.0)], [LumpedMass(0.8, 0.5, 0.01)]).matrices(elements=6)
     size = full.M.shape[0]

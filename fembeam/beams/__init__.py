@@ -23,7 +23,7 @@ from fembeam.beams.mesh import (
     MOST_MODES,
     SAME_PLACE,
     SHORTEST,
-    SHORTEST_PRESSED,
+    SHORTEST_ROOTLESS,
     WAVE_STEP,
     divided,
     on_beam,

@@ -25,7 +25,7 @@ MOST_MODES = 300  # of one mesh: 5400 elements, about a minute; a slender beam h
 MOST_ELEMENTS = 10_000  # of one mesh: above it rounding of K hides the lowest frequencies
 SAME_PLACE = 1e-9  # of the length: features closer than this share a node
 SHORTEST = 1e-4  # of the length: rounding of K grows like (length/h)³, 2e-4 of the first omega² here
-SHORTEST_PRESSED = 4e-3  # the same under compression, where K has no root that keeps rounding away from frequencies
+SHORTEST_ROOTLESS = 4e-3  # the same where K has no root that keeps rounding away from frequencies
 INSIDE = np.array([1e-9, 0.5, 1 - 1e-9])  # where a tapered interval is sampled
 
 

@@ -467,14 +467,12 @@ def borders_of(scene: Scene, probes: Sequence[float]) -> Vector:
     for index, z in enumerate(probes):
         require_finite(f"probes[{index}]", z, "Scene.matrices", "give coordinates in m")
     asked = mesh.on_beam(np.asarray(list(probes), dtype=float), scene.beam, "probes of Scene.matrices")
-    pressed = scene.beam.axial_force < 0
-    shortest = (mesh.SHORTEST_PRESSED if pressed else mesh.SHORTEST) * scene.beam.length
-    least = shortest / 4 if pressed else shortest  # a few such elements leave frequencies right to 1e-6
+    shortest = mesh.SHORTEST * scene.beam.length
     needed = np.sort(np.array([*scene.beam.borders, *(support.z for support in scene.supports)], dtype=float))
     nodes = needed[np.diff(needed, prepend=-np.inf) > mesh.SAME_PLACE * scene.beam.length]
     gaps = np.diff(nodes)
-    rule = f"supports and span ends must be {least:.3g} m apart or at one place"
-    require(bool(np.all(gaps >= least)), rule, float(gaps.min()), "Scene", "move or merge them")
+    rule = f"supports and span ends must be {shortest:.3g} m apart or at one place"
+    require(bool(np.all(gaps >= shortest)), rule, float(gaps.min()), "Scene", "move or merge them")
     for z in [*scene.places, *asked]:
         if np.min(np.abs(nodes - z)) >= shortest:  # nearer ones are interpolated inside their element
             nodes = np.append(nodes, float(z))

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 Vector = NDArray[np.float64]
-NONE = -1e-30  # N: an axial force that does nothing, but keeps the mesh, which is that of a pressed frame
 LEVEL = 1e-12  # of the stiffness, which keeps K₀ regular where the body floats
 
 
@@ -57,4 +56,4 @@ def _relaxed(body: Any, keys: list[tuple[int, str]]) -> Any:
     if not hasattr(body, "members"):
         return body
     names = {name for _, name in keys}
-    return replace(body, members=[replace(m, axial_force=NONE) if m.name in names else m for m in body.members])
+    return replace(body, members=[replace(m, axial_force=0.0) if m.name in names else m for m in body.members])

@@ -347,8 +347,8 @@ class Frame:
         elements : how many, at least one between neighbouring places; None: as few as make the lowest frequencies right
             to 1e-6 relative, by the wavelengths of bending, stretch and twist: (γ h)⁴/1440 ≤ 0.65e-6.
         modes : how many frequencies that shall hold for, whatever holds the frame at `places`; None: 10.
-        places : that shall be nodes, those of supports first. One closer than 1e-4 of a member's length, in a
-            frame under compression 4e-3, to another is interpolated inside its element instead, for rounding.
+        places : that shall be nodes, those of supports first. One closer than 1e-4 of a member's length
+            to another is interpolated inside its element instead, for rounding.
         omega : rad/s: the highest frequency kept, where it is known: fewer elements than whatever may hold it needs.
 
         Returns

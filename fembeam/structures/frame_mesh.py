@@ -25,7 +25,6 @@ from fembeam.beams import (
     MOST_MODES,
     SAME_PLACE,
     SHORTEST,
-    SHORTEST_PRESSED,
     WAVE_STEP,
     Section,
     divided,
@@ -263,8 +262,7 @@ def assemble(
 def _stops(frame: Frame, places: Sequence[Any]) -> list[Vector]:
     """For every member the distances that must be nodes, ends included, ascending."""
     wanted: list[list[float]] = [[0.0, float(length)] for length in frame.lengths]
-    shortest = SHORTEST_PRESSED if any(one.axial_force < 0 for one in frame.members) else SHORTEST
-    for place in spaced(frame, places, shortest):
+    for place in spaced(frame, places, SHORTEST):
         site = frame.site(place, "places of Frame.assembled")
         if not isinstance(site, str):
             wanted[site[0]].append(site[1])

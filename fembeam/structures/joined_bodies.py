@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from fembeam.beams import SHORTEST_PRESSED
+from fembeam.beams import SHORTEST_ROOTLESS
 from fembeam.structures.assembled import COMPONENTS, Assembled
 from fembeam.structures.directions import nearest
 from fembeam.structures.frame import Frame
@@ -263,7 +263,7 @@ class JoinedBodies:
         if not any(_rootless(body) for body in self.bodies):
             return each
         pairs = zip(self.bodies, each, strict=True)  # K of all bodies has no root then, and short elements lose digits
-        return [spaced(one, own, SHORTEST_PRESSED) if isinstance(one, Frame) else own for one, own in pairs]
+        return [spaced(one, own, SHORTEST_ROOTLESS) if isinstance(one, Frame) else own for one, own in pairs]
 
     def joined(self, made: Sequence[Assembled]) -> JoinedMatrices:
         """The matrices of all bodies from those of each; a place is (number of the body, its place)."""
@@ -428,9 +428,8 @@ def has_place(body: Any, place: Any) -> bool:
 
 
 def _rootless(body: Any) -> bool:
-    """Whether no R with RᵀR = K comes with a body: of pressed frames, and of structures by their matrices."""
-    pressed = any(one.axial_force < 0 for one in getattr(body, "members", ()))
-    return pressed or (hasattr(body, "root") and body.root is None)
+    """Whether no R with RᵀR = K comes with a body: with structures by their matrices."""
+    return hasattr(body, "root") and body.root is None
 
 
 def _node(body: Any, place: Any) -> Any:
