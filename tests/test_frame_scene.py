@@ -280,6 +280,22 @@ def test_a_compressed_column_on_a_fine_mesh(share, elements, space):
     assert found == pytest.approx((np.tan(k) - k) / (EI * k**3), rel=2 * (rounding + mesh) / (1 - share))
 
 
+def test_reactions_of_joined_frames_near_buckling():
+    """Under 1 N across the end of two halves of a column, N = EI k², moment tan(k)/k; both were off by 3e-4."""
+    k, EI = 0.5 * np.pi * np.sqrt(0.999), STEEL.bending_stiffness
+    lower, upper = (
+        fb.Frame({a: (start, 0), b: (end, 0)}, [fb.Member(a, b, STEEL, axial_force=-EI * k**2)])
+        for a, b, start, end in (("A", "B", 0.0, 0.4), ("B", "C", 0.4, 1.0))
+    )
+    push = fb.PointForce("C", fb.Harmonic(1.0, 0.0), direction="y")
+    scene = fb.Scene(lower, [fb.Clamped("A")], damping=fb.ModalDamping(0.8), bodies=[fb.Scene(upper, forces=[push])],
+                     joints=[fb.Joint("B", to=(1, "B"))])  # fmt: skip
+    model = scene.reduce(4, elements=400, residual=True)
+    foot = model.simulate(400.0 / model.omega[0], 10.0 / model.omega[0]).reactions()[0]
+    assert abs(foot["y"][-1]) == pytest.approx(1.0, rel=1e-6)
+    assert abs(foot["rz"][-1]) == pytest.approx(np.tan(k) / k, rel=1e-6)
+
+
 def test_a_superelement_of_a_compressed_frame():
     """In all its modes it is the frame itself; its K keeps a root."""
     frame = pressed(-20.0, 5.0).beam

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 REFINED = 2  # times
+REFINED_SOFT = 10  # same under compression: the nearer to buckling, the fewer digits each gains
 
 
 class BodyHeld:
@@ -97,6 +98,6 @@ def static_solver(K: sparse.csr_matrix, M: sparse.csr_matrix, rigid: Vector) -> 
 def balanced(root: sparse.csr_matrix, solve: Any, load: Vector, stresses: Vector | None = None) -> Vector:
     """Stresses Y (rows of R, c) with RᵀY = load, nearest to the given ones, which rounding keeps from it."""
     found = np.zeros((root.shape[0], load.shape[1])) if stresses is None else stresses
-    for _ in range(1 + REFINED):
+    for _ in range(1 + (REFINED_SOFT if np.iscomplexobj(root) else REFINED)):
         found = found + root @ solve(load - (root.T @ found).real)
     return np.asarray(found)
