@@ -75,7 +75,7 @@ def demand(beam: Beam, borders: Vector, omega: float) -> Vector:
     z = borders[:-1, None] + h * np.clip(x, INSIDE[0], INSIDE[-1])
     dense = _waves(beam, z, omega) / WAVE_STEP
     if beam.tapered:
-        finest = 2.0 / (beam.length * (SHORTEST_PRESSED if beam.axial_force < 0 else SHORTEST))
+        finest = 2.0 / (beam.length * SHORTEST)
         dense = np.hypot(dense, np.minimum(_change(beam, z) / TAPER_STEP, finest))  # errors of curvature go with h²
     steps = h * np.diff(x) * (dense[:, 1:] + dense[:, :-1]) / 2
     return np.hstack([0.0 * h, np.cumsum(steps, axis=1)])
