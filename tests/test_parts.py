@@ -15,7 +15,7 @@ from numba import types
 import solvers
 from solvers.compiled import parts
 from solvers.compiled.kernels import PROBLEM, VECTOR, Problem, entry
-from solvers.compiled.packed import Packed, unpacker
+from solvers.compiled.packed import Packed, PackedType, unpacker
 
 PLACE = parts.PASSED  # lent for the test
 HOME = Path(solvers.__file__).parent.parent
@@ -64,12 +64,12 @@ def test_a_part_gets_its_arguments_and_returns_a_tuple(problem):
     def call(address, x):
         return scaled(unpacked(address), 1, x, 2, False)
 
-    parts.load({"problem": PROBLEM}, [PLACE])
+    parts.load({"problem": PackedType(PROBLEM)}, [PLACE])
     x = np.zeros(1)
     assert call(problem.address, x) == (7.0, 6, True)
     assert x[0] == 6.0
     loaded = parts.addresses_of(Problem).copy()
-    parts.load({"problem": PROBLEM}, [PLACE])
+    parts.load({"problem": PackedType(PROBLEM)}, [PLACE])
     assert np.array_equal(loaded, parts.addresses_of(Problem))
     assert np.count_nonzero(loaded) == 1
 
@@ -85,7 +85,7 @@ def test_two_threads_compile_a_part_once(problem, monkeypatch):
     monkeypatch.setattr(parts, "c_function", slow)
     parts.part(PLACE, types.void)(lambda problem: None)
     with ThreadPoolExecutor(4) as pool:
-        list(pool.map(lambda _: parts.load({"problem": PROBLEM}, [PLACE]), range(4)))
+        list(pool.map(lambda _: parts.load({"problem": PackedType(PROBLEM)}, [PLACE]), range(4)))
     assert len(made) == 1
     assert parts.addresses_of(Problem)[PLACE] == 1
 
