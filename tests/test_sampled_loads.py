@@ -379,3 +379,23 @@ def test_a_time_on_a_node_is_in_the_cell_behind_it_however_late(dt):
     cells = np.random.default_rng(1).integers(0, 1 << 33, 2000).tolist()
     for times in ([cell * dt for cell in cells], [cell * dt - dt + dt for cell in cells]):
         assert [cell_of.py_func(problem, t)[0] for t in times] == cells
+
+
+@pytest.mark.parametrize(
+    "law", [KelvinVoigt(1e5, 0.0), KelvinVoigt(1e5, 5.0), Hertz(1e7)], ids=["linear", "damped", "hertz"]
+)
+@pytest.mark.parametrize("omega", [1e4, 3e4])
+def test_contacts_of_a_mode_that_follows_the_load(omega, law):
+    """Two modes, one of which follows the load with ωh of some hundred: by DormandPrince, and in few steps.
+
+    The mode rests on the load when a contact begins: what the contact's force sets swinging counts from then on.
+    """
+    load = [1.0, 1e-3 * omega**2], fb.SineSweep(1.0, 2.0, 6.0, 1.5)
+    system = System.modal([10.0, omega], [0.001, 0.05], [Contact([0.6, 0.8], law, 0.002)], [load])
+    run, by_stages = (
+        integrate(system, [0.0, 0.0], [0.3, 0.0], 1.5, method=method)
+        for method in (Exponential(1e-10), DormandPrince(1e-12))
+    )
+    assert len(run.contacts) == len(by_stages.contacts) > 3
+    assert np.abs(run.end - by_stages.end)[[0, 2]].max() < 3e-9 * np.abs(by_stages.end[[0, 2]]).max()  # 1e-10 measured
+    assert run.cost.steps < by_stages.cost.steps / 20

@@ -55,7 +55,6 @@ from solvers.exponential.contact.node_response import (
     motion_of,
     rate_ripple_of,
     ripple_of,
-    swing_of,
 )
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import maximum_and_place, motion_around, polynomial
@@ -143,8 +142,8 @@ def _margins_on_step(run, s, node_set, level):
     if rubs(problem, s):
         slider_margins_on_step(run, s, node_set, level)
         return
-    n, delta, rate = problem.k.size, scratch.start_motion[s, 0], scratch.start_motion[s, 1]
-    weight, alias = tables.ripple_weight[row_of(problem, s)], tables.alias[tables.kind[node_set], level]
+    delta, rate = scratch.start_motion[s, 0], scratch.start_motion[s, 1]
+    row, alias = row_of(problem, s), tables.alias[tables.kind[node_set], level]
     deltas, rates = scratch.local_motion[KNOWN, :ENDS], scratch.local_motion[KNOWN, ENDS : 2 * ENDS]
     direction, rounding = math.copysign(1.0, rate), surface_tolerance(problem, s, state.x)
     for i in range(ENDS):
@@ -152,8 +151,8 @@ def _margins_on_step(run, s, node_set, level):
     deltas[END], rates[END] = indentation_and_rate(problem, s, scratch.x_new)
     deltas[DELTA_ROUNDED] += direction * rounding
     rates[RATE_ROUNDED] += direction * max(rate_tolerance(problem, s, state.x), REST * scratch.reference_speed[s])
-    deltas[DELTA_RIPPLED] += direction * ripple_of(weight, alias, swing_of(run), n)
-    rates[RATE_RIPPLED] += direction * rate_ripple_of(weight, problem.k, alias, swing_of(run), n)
+    deltas[DELTA_RIPPLED] += direction * ripple_of(run, row, alias)
+    rates[RATE_RIPPLED] += direction * rate_ripple_of(run, row, alias)
     margins(problem, state, s, ENDS, deltas, rates, scratch.ends)
     _margins_at_nodes(run, s, node_set, tables.contact_step[level])
     for j in range(problem.border_count[s]):

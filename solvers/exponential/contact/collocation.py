@@ -47,6 +47,7 @@ from solvers.compiled.kernels import (
     merged,
     off_knots,
     place_of,
+    push_of,
     row_of,
     rubs,
     slider_of,
@@ -56,6 +57,7 @@ from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import largest8, least8, load8
 from solvers.compiled.state import CALLS, LAST_EVENT, T_END, T, acts, rate_tolerance
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
+from solvers.exponential.contact.first_step import NEW, SEGMENT
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
 from solvers.exponential.contact.node_response import (
@@ -71,7 +73,6 @@ from solvers.exponential.contact.node_response import (
     own_accelerance,
     respond_all,
     ripple_of,
-    swing_of,
     unresolved_part,
     unresolved_signal,
 )
@@ -246,7 +247,7 @@ def _find_unresolved(run, node_set, level, u):
     Returns its `_memory_error`.
     """
     problem, tables, scratch = run.problem, run.tables, run.scratch
-    s, n, h = element_of(problem, u), problem.k.size, tables.contact_step[level]
+    s, h = element_of(problem, u), tables.contact_step[level]
     combine(tables.summary[node_set], scratch.force[u], S, None, scratch.summary[u])
     if is_circle(problem, s) and u == row_of(problem, s):
         own = place_of(problem, s)
@@ -258,7 +259,10 @@ def _find_unresolved(run, node_set, level, u):
         if unresolved > _TOO_MUCH * scratch.force_tolerance[s]:
             rounding = _force_rounding(run, s)
             unresolved = max(unresolved - rounding, _LITTLE * scratch.force_tolerance[s])
-        ripple = ripple_of(tables.ripple_weight[u], tables.alias[tables.kind[node_set], level], swing_of(run), n)
+        alias = tables.alias[tables.kind[node_set], level]
+        ripple = ripple_of(run, u, alias)
+        if scratch.control[NEW] == SEGMENT:
+            ripple += _ripple_begun(run, u, alias)
         damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # nothing damps motion across a radius
         if rubs(problem, s):
             damped, stiffness = False, max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
@@ -267,11 +271,43 @@ def _find_unresolved(run, node_set, level, u):
     return error
 
 
+@inner
+def _note_ringing(run, h):
+    """Write into ``norms`` what the forces set swinging in the blocks, m/s, as their slopes jump at the step's start.
+
+    A force that begins with the slope Ḟ leaves a block swinging about what follows it with |push| Ḟ/k. This shows in
+    the state at the end of the step only, and the nodes of a long one may tell it as a part of a smooth force.
+    """
+    problem, norms = run.problem, run.scratch.norms
+    n = problem.k.size
+    for b in range(n):
+        norms[b] = 0.0
+    for u in range(problem.gap.size):
+        if acts(problem, run.state, u):
+            force, push = load8(run.scratch.force[u], 0), push_of(problem, u)
+            slope = (largest8(force) - least8(force)) / h
+            for b in range(n):
+                if problem.k[b] > 0.0:
+                    size = math.sqrt(push[n + b] ** 2 + problem.k[b] * push[b] ** 2)
+                    norms[b] += size * slope / problem.k[b]
+
+
+@inner
+def _ripple_begun(run, u, alias):
+    """Error of row u's displacement between the nodes, m, by what the forces have set swinging."""
+    weight, norms, n, error = run.tables.ripple_weight[u], run.scratch.norms, run.problem.k.size, 0.0
+    for b in range(n):
+        error += weight[b] * alias[n + b] * norms[b]
+    return error
+
+
 @part(ERROR, REAL, types.int64, types.int64)
 def step_error(run, node_set, level):
     """Largest error of an indentation rate over the step just solved, in units of its tolerance rtol × speed."""
     problem, scratch = run.problem, run.scratch
     h, worst = run.tables.contact_step[level], 0.0
+    if scratch.control[NEW] == SEGMENT:
+        _note_ringing(run, h)
     for u in range(problem.gap.size):
         scratch.unresolved[u] = 0.0
         if acts(problem, run.state, u):

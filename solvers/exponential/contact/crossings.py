@@ -50,7 +50,6 @@ from solvers.exponential.contact.node_response import (
     respond,
     ripple_of_stop,
     shortest_step,
-    swing_of,
 )
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import largest_indentation, maximum_and_place, motion_around
@@ -197,7 +196,7 @@ def leaves_segment(run, node_set, level):
                 continue
             forces_added = _follow(run, node_set, level, s, forces_added)
             alias = tables.alias[tables.kind[node_set], level]
-            ripple = ripple_of_stop(run, s, alias, swing_of(run))
+            ripple = ripple_of_stop(run, s, alias)
         else:
             lower = problem.knots[s, segment - 1]
         motion = motion_of(run, s)

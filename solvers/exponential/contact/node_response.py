@@ -382,14 +382,11 @@ def law_slopes_at_nodes(run, s):
 
 
 @inlined
-def ripple_of_stop(run, s, alias, x):
+def ripple_of_stop(run, s, alias):
     """Error of a stop's indentation between the nodes by fast blocks, m; see `ripple_of`."""
-    problem = run.problem
-    row, n = row_of(problem, s), problem.k.size
-    ripple = ripple_of(run.tables.ripple_weight[row], alias, x, n)
-    if is_circle(problem, s):
-        ripple += ripple_of(run.tables.ripple_weight[row + 1], alias, x, n)
-    return ripple
+    row = row_of(run.problem, s)
+    ripple = ripple_of(run, row, alias)
+    return ripple + ripple_of(run, row + 1, alias) if is_circle(run.problem, s) else ripple
 
 
 @inner
@@ -407,21 +404,28 @@ def swing_of(run):
     return run.scratch.swing if run.tables.follows > 0.0 else run.state.x
 
 
-@reordered
-def ripple_of(ripple_weight, alias, x, n):
-    """Bound, m, of the error of a row's displacement between the nodes, by blocks too fast for the nodes."""
-    error = 0.0
+@inner
+def ripple_of(run, r, alias):
+    """Bound, m, of the error of row r's displacement between the nodes, by blocks too fast for the nodes."""
+    return _sum_of_swings(run.tables.ripple_weight[r], alias, swing_of(run), run.problem.k.size)
+
+
+@inner
+def rate_ripple_of(run, r, alias):
+    """The same of its rate, m/s."""
+    problem, weight, x = run.problem, run.tables.ripple_weight[r], swing_of(run)
+    error, n = 0.0, problem.k.size
     for b in range(n):
-        error += ripple_weight[b] * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
+        error += weight[b] * math.sqrt(problem.k[b]) * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
     return error
 
 
 @reordered
-def rate_ripple_of(ripple_weight, k, alias, x, n):
-    """The same of its rate, m/s."""
+def _sum_of_swings(weight, alias, x, n):
+    """Σ weight (alias |p| + alias |v|) over the blocks."""
     error = 0.0
     for b in range(n):
-        error += ripple_weight[b] * math.sqrt(k[b]) * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
+        error += weight[b] * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
     return error
 
 

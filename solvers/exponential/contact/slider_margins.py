@@ -54,7 +54,7 @@ from solvers.exponential.circles.friction import (
 )
 from solvers.exponential.contact.crossings import REST, ROUNDING
 from solvers.exponential.contact.first_step import NEW
-from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, rate_ripple_of, ripple_of, swing_of
+from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import AT_BEGIN, AT_END, LOCAL_SLOPES, SLOPE_AT_BEGIN, SLOPE_AT_END, S
 from solvers.exponential.contact.peaks import BELOW_PEAK, local_maximum, motion_around
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR
@@ -314,8 +314,8 @@ def _ripples(run, s, alias):
     problem = run.problem
     ripple, faster, first = 0.0, 0.0, row_of(problem, s)
     for r in range(first, first + 2):
-        ripple += ripple_of(run.tables.ripple_weight[r], alias, swing_of(run), problem.k.size)
-        faster += rate_ripple_of(run.tables.ripple_weight[r], problem.k, alias, swing_of(run), problem.k.size)
+        ripple += ripple_of(run, r, alias)
+        faster += rate_ripple_of(run, r, alias)
     return ripple, faster
 
 

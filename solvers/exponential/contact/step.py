@@ -410,9 +410,7 @@ def advance_contact(run):
     # `longest` may be 0, beside a surface that is left or entered at rest
     level = level_of(tables, longest) if longest < tables.contact_step[wanted] else wanted
     copy(scratch.side, scratch.side_at_begin, scratch.side.size)
-    if tables.follows > 0.0 and control[NEW]:  # what a force sets swinging as it begins is not in the state yet
-        copy(state.x, scratch.swing, scratch.swing.size)
-    elif tables.follows > 0.0:
+    if tables.follows > 0.0:
         note_swing(run)
     while True:
         tried = _attempt(run, node_set, level)
