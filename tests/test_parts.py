@@ -22,6 +22,7 @@ HOME = Path(solvers.__file__).parent.parent
 BEGIN = """
 import numpy as np
 from contacts import Hertz, KelvinVoigt
+from fembeam import Step
 from solvers import Contact, Exponential, System, integrate
 from solvers.compiled.kernels import PlanarProblem, Problem
 from solvers.compiled.parts import *
@@ -30,9 +31,9 @@ class Kink:
         return abs(t - 0.01)
     def nodes(self, duration, rtol):
         return 0.01, np.array([[0.01, -1, 0, 0.01, -1, 0], [0, 1, 0, 0, -1, 0], [0.01, 1, 0, 0.01, 1, 0]])
-def run(law=Hertz(1e6), stops=1, loads=(), **options):
+def run(law=Hertz(1e6), stops=1, loads=(), stiffness=0.0, **options):
     contacts = [Contact([1.0], law, 1e-4 * i) for i in range(stops)]
-    ball = System(M=[[2.0]], C=[[0.0]], K=[[0.0]], contacts=contacts, loads=loads)
+    ball = System(M=[[2.0]], C=[[0.0]], K=[[stiffness]], contacts=contacts, loads=loads)
     integrate(ball, [1e-3], [-0.5], duration=0.02, **options)
 def loaded():
     return [np.flatnonzero(addresses_of(kind)).tolist() for kind in (Problem, PlanarProblem)]
@@ -93,7 +94,7 @@ def test_two_threads_compile_a_part_once(problem, monkeypatch):
 def test_every_place_has_a_function():
     importlib.import_module("solvers.exponential.method")
     groups = parts.EVERY_RUN, parts.ENERGY, parts.BORDERS, parts.TWO_STOPS, parts.MANY_STOPS, parts.CIRCLES
-    groups += parts.KINKS, parts.FRICTION
+    groups += parts.KINKS, parts.FOLLOWING, parts.FRICTION
     assert sorted(place for group in groups for place in group) == list(range(parts.PLACES))
     assert sorted(parts._DECLARED) == list(range(parts.PLACES))
 
@@ -110,6 +111,7 @@ def test_a_run_loads_what_it_needs_and_nothing_of_circles():
         ("run(stops=2)", "TWO_STOPS"),
         ("run(stops=4)", "MANY_STOPS"),
         ("run(loads=[([1.0], Kink())])", "KINKS"),
+        ("run(loads=[([1.0], Step(1.0, 0.01))], stiffness=1e12)", "FOLLOWING"),
     ):
         code += f"{run}\nneeded |= set({needed})\nassert loaded() == [sorted(needed), []], ({run!r}, loaded())\n"
     fresh_process.run(code, HOME, {**os.environ, "PYTHONPATH": str(HOME)})

@@ -27,17 +27,18 @@ from solvers.compiled.packed import PackedType
 (SIDE, FIRST_END, LAND_IN_TIME, GO_BEYOND, PASSED, BEHIND) = range(14, 20)
 (PRESSED,) = range(20, 21)
 (PAIR, FREE_BLOCKS, PUSHED_BLOCKS, PUSHED_END, STOP_AT_NODES, BOUNDS) = range(21, 27)
-(TO_KINK,) = range(27, 28)
-(CIRCLE_SPAN, CIRCLE_SPAN_AT, CIRCLE_NEAR, CIRCLE_ROOT, CIRCLE_MOTION, CIRCLE_FORCES, CIRCLE_GUESS) = range(28, 35)
-(CIRCLE_AWAY, CIRCLE_NEWTON, CIRCLE_WORK, CIRCLE_WITHIN, CIRCLE_LANDED) = range(35, 40)
-(RADIAL_MOTION, RADIAL_ACCELERATION, RADIAL_PUSH) = range(40, 43)
-(RUB_FORCES, RUB_GUESS, RUB_NEWTON, RUB_WORK, RUB_WITHIN, RUB_MARGINS, RUB_IN, RUB_AROUND, RUB_PEAK) = range(43, 52)
+TO_KINK, FOLLOWED = range(27, 29)
+(CIRCLE_SPAN, CIRCLE_SPAN_AT, CIRCLE_NEAR, CIRCLE_ROOT, CIRCLE_MOTION, CIRCLE_FORCES, CIRCLE_GUESS) = range(29, 36)
+(CIRCLE_AWAY, CIRCLE_NEWTON, CIRCLE_WORK, CIRCLE_WITHIN, CIRCLE_LANDED) = range(36, 41)
+(RADIAL_MOTION, RADIAL_ACCELERATION, RADIAL_PUSH) = range(41, 44)
+(RUB_FORCES, RUB_GUESS, RUB_NEWTON, RUB_WORK, RUB_WITHIN, RUB_MARGINS, RUB_IN, RUB_AROUND, RUB_PEAK) = range(44, 53)
 EVERY_RUN, ENERGY = range(10), range(10, 14)
-BORDERS, TWO_STOPS, MANY_STOPS, KINKS = range(14, 20), range(20, 21), range(21, 27), range(27, 28)
-CIRCLES, FRICTION = range(28, 43), range(43, 52)
+BORDERS, TWO_STOPS, MANY_STOPS = range(14, 20), range(20, 21), range(21, 27)
+KINKS, FOLLOWING = range(27, 28), range(28, 29)
+CIRCLES, FRICTION = range(29, 44), range(44, 53)
 """What needs them: every run, those with an energy balance, with bends or memory in a law, with two or many stops, with
-kinks of sampled loads, with circular clearances, with friction."""
-PLACES = 52
+kinks of sampled loads, with blocks that follow them, with circular clearances, with friction."""
+PLACES = 53
 
 _DECLARED: dict[int, tuple[Any, Any, tuple[Any, ...]]] = {}
 _LOADED: dict[tuple[type, int], Any] = {}

@@ -9,8 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import types
 
-from solvers.compiled.kernels import at_end, copy, inlined, inner, quintic
+from solvers.compiled.kernels import REAL, at_end, copy, inlined, inner, quintic
+from solvers.compiled.parts import FOLLOWED, part
 from solvers.compiled.simd import WIDTH, bit_pattern, load8, splat8, sqrt8, store8, sum8
 from solvers.compiled.sums import combine
 
@@ -93,10 +95,10 @@ def join(problem, parts, x):
         x[b], x[n + b] = parts[0, b], parts[1, b]
 
 
-@inner
-def take_off_following(run, t, x, out):
-    """Write p and v of the blocks without what follows the sampled signals at t into ``out``; see `following`."""
-    problem, tables, terms = run.problem, run.tables, run.scratch.signal_terms
+@part(FOLLOWED, types.void, REAL)
+def take_off_following(run, t):
+    """Take what follows the sampled signals at t off the state in ``split_state[SWING]``; see `tables.following`."""
+    problem, tables, terms, x = run.problem, run.tables, run.scratch.signal_terms, run.scratch.split_state[SWING]
     derive_signals(problem, t, terms)
     for i in range(0, x.shape[1], WIDTH):
         p, v = load8(x[0], i), load8(x[1], i)
@@ -105,8 +107,8 @@ def take_off_following(run, t, x, out):
             for d in range(3):
                 p = p - splat8(terms[j, d]) * load8(rows[d, 0], i)
                 v = v - splat8(terms[j, d]) * load8(rows[d, 1], i)
-        store8(out[0], i, p)
-        store8(out[1], i, v)
+        store8(x[0], i, p)
+        store8(x[1], i, v)
 
 
 @inlined

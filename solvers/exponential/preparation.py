@@ -12,7 +12,18 @@ from numba import types
 from solvers.compiled.fields import packed_type, shapes_of
 from solvers.compiled.kernels import Problem, type_of
 from solvers.compiled.packed import Layout, Packed, PackedTemplate, PackedType, aligned
-from solvers.compiled.parts import BORDERS, CIRCLES, ENERGY, EVERY_RUN, FRICTION, KINKS, MANY_STOPS, TWO_STOPS, load
+from solvers.compiled.parts import (
+    BORDERS,
+    CIRCLES,
+    ENERGY,
+    EVERY_RUN,
+    FOLLOWING,
+    FRICTION,
+    KINKS,
+    MANY_STOPS,
+    TWO_STOPS,
+    load,
+)
 from solvers.compiled.state import (
     NO_ROWS,
     STATE,
@@ -162,6 +173,8 @@ def prepare_run(system: System, forcing: Forcing, duration: float, rtol: float) 
     kind = type_of(prepared.problem.value)
     if _is_kinked(taken):
         load_parts(kind, KINKS)
+    if prepared.tables.value.follows:
+        load_parts(kind, FOLLOWING)
     if taken.table.size:
         sampled = prepared.problem.replaced(kind, table=taken.table, table_start=taken.table_start)
         prepared = prepared._replace(problem=sampled)

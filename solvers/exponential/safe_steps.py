@@ -112,15 +112,6 @@ def _acceleration_bound(run, r, swing, horizon):
     return total
 
 
-@inner
-def _swing_at(run, t, x):
-    """Write what oscillates in the state x at t into ``scratch.split_state[SWING]``."""
-    swing = run.scratch.split_state[SWING]
-    copy_split(x, swing)
-    if run.tables.follows > 0.0:
-        take_off_following(run, t, swing, swing)
-
-
 @inlined
 def _target(run, first):
     """Time at which a step must end: the end, or an output time too late to be evaluated from the step's start."""
@@ -202,7 +193,9 @@ def _bound_cells(run, x, cell, count):
     """Bound the interpolation errors e of all rows for the next ``count`` cells; returns whether a stop may be near."""
     problem, tables, scratch = run.problem, run.tables, run.scratch
     _bound_signals(run, cell, count)
-    _swing_at(run, cell * problem.table_dt[0], x)
+    copy_split(x, scratch.split_state[SWING])
+    if tables.follows > 0.0:
+        take_off_following(run, cell * problem.table_dt[0])
     for r in range(problem.gap.size):
         error = weighted_norms(tables.cell_error[r], tables, scratch.split_state[SWING])
         for j in range(problem.table_dt.size):
@@ -275,7 +268,8 @@ def _safe_span(run, span, horizon, renew_bounds):
     problem, state, scratch = run.problem, run.state, run.scratch
     if renew_bounds:
         split(problem, state.x, scratch.split_state[SWING])
-        _swing_at(run, state.now[T], scratch.split_state[SWING])
+        if run.tables.follows > 0.0:
+            take_off_following(run, state.now[T])
         for r in range(problem.gap.size):
             scratch.per_row[r] = _acceleration_bound(run, r, scratch.split_state[SWING], horizon)
     for s in range(problem.law.size):

@@ -392,10 +392,9 @@ def ripple_of_stop(run, s, alias):
 @inner
 def note_swing(run):
     """Write what oscillates in the state, without what follows the sampled signals, into ``scratch.swing``."""
-    swing = run.scratch.split_state[SWING]
-    split(run.problem, run.state.x, swing)
-    take_off_following(run, run.state.now[T], swing, swing)
-    join(run.problem, swing, run.scratch.swing)
+    split(run.problem, run.state.x, run.scratch.split_state[SWING])
+    take_off_following(run, run.state.now[T])
+    join(run.problem, run.scratch.split_state[SWING], run.scratch.swing)
 
 
 @merged
