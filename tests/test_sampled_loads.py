@@ -399,3 +399,23 @@ def test_contacts_of_a_mode_that_follows_the_load(omega, law):
     assert len(run.contacts) == len(by_stages.contacts) > 3
     assert np.abs(run.end - by_stages.end)[[0, 2]].max() < 3e-9 * np.abs(by_stages.end[[0, 2]]).max()  # 1e-10 measured
     assert run.cost.steps < by_stages.cost.steps / 20
+
+
+@pytest.mark.parametrize("coupled", ["gyroscopic", "dashpot"])
+@pytest.mark.parametrize("depth", [1e-4, 1e-6])
+def test_a_touch_by_a_mode_that_a_coupled_one_drives(coupled, depth):
+    """A fast mode follows the load, and its rate drives a slow one to 1 + depth of the gap: the contact is found.
+
+    Coupled blocks share the load out as rates of their places, whose part in the signal's slope bends the slow share.
+    """
+    turn, dashpot = np.array([[0.0, -10.0], [10.0, 0.0]]), np.array([[10.0, -10.0], [-10.0, 10.0]])
+    damping, gyroscopic = (np.zeros((2, 2)), turn) if coupled == "gyroscopic" else (dashpot, None)
+    load, stiffness = [0.0, 1e6], np.diag([1.0, 1e8])
+
+    def run(contacts, dt=None):
+        loads = [(load, fb.SineSweep(1.0, 30.0, 39.0, 1.0))]
+        system = System(np.eye(2), damping, stiffness, contacts, loads, gyroscopic=gyroscopic)
+        return integrate(system, REST, REST, 1.0, dt, Exponential(1e-8))
+
+    largest = -run([], 2.5e-5).q[:, 0].min()
+    assert len(run([Contact([1.0, 0.0], KelvinVoigt(1e4, 0.0), (1.0 - depth) * largest)]).contacts) > 0

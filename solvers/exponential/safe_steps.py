@@ -17,14 +17,24 @@ both ends by at most the error of linear interpolation, which one bound e covers
 reached on a cell at whose ends δ + e < 0. Only where this does not hold are steps of length τ taken.
 
 Blocks faster than the cells follow the signals. Of these ε is that of what is left, d of `tables.following`, and both
-bounds have parts in |ṡ|max, |s̈|max and |s⃛|max instead.
+bounds have parts in |ṡ|max, |s̈|max and |s⃛|max instead. Under coupling, |ṡ|max adds to e.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from solvers.compiled.kernels import copy, indentation, indentation_rate, inlined, inner, is_circle, merged, row_of
+from solvers.compiled.kernels import (
+    at_end,
+    copy,
+    indentation,
+    indentation_rate,
+    inlined,
+    inner,
+    is_circle,
+    merged,
+    row_of,
+)
 from solvers.compiled.state import LEFT, SAMPLED, STEPS, T_END, T, move_clock, summed
 from solvers.exponential.circles.flight import circle_is_near, span_of_circle, span_of_circle_at
 from solvers.exponential.energy.flight_balance import (
@@ -67,7 +77,7 @@ _GROUP = 8  # cells that one bound covers: with more the bound grows, with fewer
 def _bound_signals(run, cell, count):
     """Bounds of |s| on ``count`` cells by Bézier coefficients, each at most |s| + 2h/5 |ṡ| + h²/20 |s̈|.
 
-    Where blocks follow the signals, also of |ṡ|, |s̈| and |s⃛|, by differences of the coefficients.
+    Where a bound takes them, also of |ṡ|, |s̈| and |s⃛|, by differences of the coefficients.
     """
     problem = run.problem
     for j in range(problem.table_dt.size):
@@ -79,7 +89,7 @@ def _bound_signals(run, cell, count):
             for side in range(0, sides, 3):
                 s, rate, curvature = problem.table[row, side : side + 3]
                 bounds[0] = max(bounds[0], abs(s) + slope * abs(rate) + curving * abs(curvature))
-        for row in range(first, first + count if run.tables.follows > 0.0 else first):
+        for row in range(first, first + count if run.tables.derived > 0.0 else first):
             _bound_derivatives(problem, problem.table_dt[j], row, bounds)
 
 
@@ -87,7 +97,8 @@ def _bound_signals(run, cell, count):
 def _bound_derivatives(problem, h, row, bounds):
     """Raise the bounds of |ṡ|, |s̈| and |s⃛| to those on the cell of length h behind a row of the table."""
     s, rate, curvature = problem.table[row, :3]
-    to, rate_to, curvature_to = problem.table[row + 1, :3]
+    end = at_end(problem)
+    to, rate_to, curvature_to = problem.table[row + 1, end : end + 3]
     a, b = s + 0.2 * h * rate, s + 0.4 * h * rate + 0.05 * h * h * curvature
     c, d = to - 0.4 * h * rate_to + 0.05 * h * h * curvature_to, to - 0.2 * h * rate_to
     steps = a - s, b - a, c - b, d - c, to - d
@@ -201,7 +212,7 @@ def _bound_cells(run, x, cell, count):
         for j in range(problem.table_dt.size):
             factors, bounds = tables.cell_error_signal[r, problem.table_load[j]], scratch.signal_bounds[j]
             error += bounds[0] * (factors[0] + count * factors[1]) + bounds[2] * factors[2]
-            error += bounds[3] * (factors[3] + count * factors[4])
+            error += bounds[3] * (factors[3] + count * factors[4]) + bounds[1] * factors[5]
         scratch.per_row[r] = error
     return _is_any_near(run, x)
 

@@ -51,9 +51,10 @@ class Tables(NamedTuple):
     cell: Annotated[Any, "2, N8"]  # α, β over a whole cell of the sampled signals
     cell_signal: Annotated[Any, "L, 6, 2, N8"]  # state change over a cell by s, s', s'' at its start, then at its end
     cell_error: Annotated[Any, "R, N8"]  # see `cell_errors`
-    cell_error_signal: Annotated[Any, "R, L, 5"]
+    cell_error_signal: Annotated[Any, "R, L, 6"]
     following: Annotated[Any, "L, 3, 2, N8"]  # see `following`
     follows: Annotated[float, "number"]  # 1 where any block follows a signal
+    derived: Annotated[float, "number"]  # 1 where bounds have parts in the derivatives of signals
     load_rows: Annotated[Any, "L, 2, N8"]  # state rate of p and v per unit of a signal
     block_k_c: Annotated[Any, "2, N8"]  # k in 1/s², c in 1/s
     stop_rows: Annotated[Any, "R, 4, N8"]  # the first two rows give δ + gap from p and v, the others δ̇
@@ -183,6 +184,7 @@ def build(
         cell_error_signal=cell_error_signal,
         following=_in_eights(response.reshape(-1, 3, 2, size)),
         follows=float(response.any()),
+        derived=float(response.any() or cell_error_signal[:, :, 2:].any()),
         load_rows=_in_eights(problem.load.reshape(-1, 2, size)),
         block_k_c=_in_eights(np.array([problem.k, problem.c])),
         stop_rows=_in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
@@ -294,7 +296,7 @@ def following(problem: Problem, h: float) -> Any:
 
 
 def cell_errors(problem: Problem, h: float, response: Any) -> tuple[Any, Any]:
-    """Weights (R, N) and (R, L, 5) of a bound of how far δ is from its linear interpolant between the ends of a cell.
+    """Weights (R, N) and (R, L, 6) of a bound of how far δ is from its linear interpolant between the ends of a cell.
 
     A block's share of δ differs from its interpolant by at most h²/8 max|δ̈_b|, and by at most twice its amplitude
     r_b E_b, whichever is smaller. With E_b the largest energy norm, |δ̈_b| <= w_b E_b + |a_b s|, so that
@@ -302,11 +304,13 @@ def cell_errors(problem: Problem, h: float, response: Any) -> tuple[Any, Any]:
         error <= Σ_b W_b E_b + A |s|max,    W_b = min(w_b h²/8, 2 r_b),    A = |Σ_b a_b| h²/8
 
     where A is the sum over the blocks whose first bound is taken. As dε_b/dt <= ν_b |s|, E_b <= ε_b + m h ν_b |s|max
-    within m cells; what the signal adds is |s|max (A + m G), G = h Σ W_b ν_b.
+    within m cells; what the signal adds is |s|max (A + m G), G = h Σ W_b ν_b. Coupling lets a signal move places of
+    blocks by ṗ_b = v_b + b_b s, so that δ̈_b has a part in ṡ too. In the sum over all blocks it is zero, δ̇ being free
+    of s; where some take the second bound it adds |ṡ|max |Σ_b d_b b_b| h²/8, summed over these, d_b b_b s in δ̇_b.
 
     Of blocks that follow the signal E_b is that of d, see `following`, W_b = 2 r_b, dε_b/dt <= μ_b |s⃛|, and the rest
     is c_0 s + c_1 ṡ + c_2 s̈, which adds |s̈|max (h²/8 |c_0| + 2 |c_2|) + |s⃛|max (h²/8 |c_1| + m h Σ W_b μ_b). Returned
-    are W, then A, G, and these three factors.
+    are W, then A, G, these three factors, and that of the part in ṡ.
     """
     follows, growth = _left_over(response, problem.k)
     bent, both = _cell_weights(problem, h)
@@ -314,10 +318,12 @@ def cell_errors(problem: Problem, h: float, response: Any) -> tuple[Any, Any]:
     weight = np.where(oscillates, both, bent)
     rate = np.where(np.tile(oscillates, 2), 0.0, problem.read_rate)
     at_once = np.abs(rate @ problem.load.T) * (h * h / 8.0)
+    moved = np.abs(np.where(np.tile(oscillates, 2), problem.read, 0.0) @ problem.load.T) * (h * h / 8.0)
     place = np.abs(problem.read @ response.transpose(1, 2, 0))  # (3, R, L): |c_0|, |c_1|, |c_2|
     factors = (
         *(at_once, h * np.where(follows, 0.0, weight) @ _load_norm(problem).T),
         *(h * h / 8.0 * place[0] + 2.0 * place[2], h * h / 8.0 * place[1], h * (follows * weight) @ growth.T),
+        moved,
     )
     return weight, np.stack(factors, axis=2)
 
