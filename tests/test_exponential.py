@@ -730,3 +730,28 @@ def test_what_systems_share_does_not_hold_on_to_sampled_signals():
     tracemalloc.stop()
     assert peak > 8e6
     assert kept < 6e6
+
+
+@pytest.mark.parametrize(
+    ("law", "direction", "omega", "zeta", "speed", "load", "rtol"),
+    [
+        (Hertz(8e7), [0.8, 0.6], 2.8e4, 0.05, 1.25, [0.0, 0.0], 1e-6),
+        (Hysteretic(8e7, 0.05), [0.8, 0.6], 2.8e4, 0.05, 1.25, [10.0, 8e5], 1e-8),
+        (KelvinVoigt(2e5, 0.0), [0.98, 0.2], 1.4e4, 1.5, 0.45, [0.0, 0.0], 1e-10),
+    ],
+    ids=["hertz", "hysteretic", "linear"],
+)
+def test_many_contacts_of_a_fast_mode_at_rest(law, direction, omega, zeta, speed, load, rtol):
+    """First steps grow from contact to contact, but resolve what the force sets swinging as it begins.
+
+    A change of the start by 1e-10 changes the end by some 1e-8 to 5e-8.
+    """
+    stops = [Contact(np.multiply(side, direction), law, 0.002) for side in (1.0, -1.0)]
+    system = System.modal([10.0, omega], [0.0, zeta], stops, [(load, fb.Step(1.0, 0.4, 0.1))])
+    run, by_stages = (
+        integrate(system, [0.0, 0.0], [speed, 0.0], 1.4, method=method, check=False)
+        for method in (Exponential(rtol), DormandPrince(1e-12))
+    )
+    assert len(run.contacts) == len(by_stages.contacts) > 60
+    place, _, rate, _ = np.abs(run.end - by_stages.end)
+    assert max(place / 0.002, rate / speed) < 500 * rtol

@@ -58,7 +58,7 @@ from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import largest8, least8, load8
 from solvers.compiled.state import CALLS, LAST_EVENT, T_END, T, acts, rate_tolerance
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
-from solvers.exponential.contact.first_step import NEW, SEGMENT
+from solvers.exponential.contact.first_step import NEW
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
 from solvers.exponential.contact.node_response import (
@@ -262,7 +262,7 @@ def _find_unresolved(run, node_set, level, u):
             unresolved = max(unresolved - rounding, _LITTLE * scratch.force_tolerance[s])
         alias = tables.alias[tables.kind[node_set], level]
         ripple = ripple_of(run, u, alias)
-        if scratch.control[NEW] == SEGMENT:
+        if scratch.control[NEW]:
             ripple += _ripple_begun(run, u, alias)
         damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # nothing damps motion across a radius
         if rubs(problem, s):
@@ -274,7 +274,7 @@ def _find_unresolved(run, node_set, level, u):
 
 @inner
 def _note_ringing(run, h):
-    """Write into ``norms`` what the forces set swinging in the blocks, m/s, as their slopes jump at the step's start.
+    """Write into ``norms`` what the forces set swinging in the blocks, m/s, as a contact or segment begins.
 
     A force that begins with the slope Ḟ leaves a block swinging about what follows it with |push| Ḟ/k. This shows in
     the state at the end of the step only, and the nodes of a long one may tell it as a part of a smooth force.
@@ -307,7 +307,7 @@ def step_error(run, node_set, level):
     """Largest error of an indentation rate over the step just solved, in units of its tolerance rtol × speed."""
     problem, scratch = run.problem, run.scratch
     h, worst = run.tables.contact_step[level], 0.0
-    if scratch.control[NEW] == SEGMENT:
+    if scratch.control[NEW]:
         _note_ringing(run, h)
     for u in range(problem.gap.size):
         scratch.unresolved[u] = 0.0
