@@ -1,7 +1,5 @@
 """Whole cells of sampled signals are crossed where no stop is near: the bound holds, and no contact is missed."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -66,10 +64,10 @@ def test_the_bound_of_cells_holds_for_any_modes(fast, damping, seed):
     assert np.all(largest <= 1.00001 * bounds[:, 0])
     for m in (1, 8):
         for k in range(0, CELLS - m, m):
-            s, _, second, third = bounds[k : k + m].max(axis=0)
-            by_s, growing, by_second, by_third, left_over = known.cell_error_signal[0, 0]
+            s, rate, second, third = bounds[k : k + m].max(axis=0)
+            by_s, growing, by_second, by_third, left_over, by_rate = known.cell_error_signal[0, 0]
             bound = norms[k] @ known.cell_error[0, :n] + s * (by_s + m * growing) + second * by_second
-            bound += third * (by_third + m * left_over)
+            bound += third * (by_third + m * left_over) + rate * by_rate
             assert apart[k : k + m].max() <= bound * (1.0 + 1e-9) + 1e-13 * np.abs(delta).max()
     signal = BPoly.from_derivatives(h * np.arange(CELLS + 1), problem.table[: CELLS + 1])  # as it is integrated
     value = signal(t)[:, None] * push
@@ -86,7 +84,7 @@ def derivative_bounds(problem, cell):
     """Bounds of |s|, |ṡ|, |s̈| and |s⃛| on a cell, those of the derivatives by the compiled function's Python code."""
     h, nodes, found = problem.table_dt[0], problem.table[cell : cell + 2], np.zeros(4)
     found[0] = (np.abs(nodes) @ (1.0, 0.4 * h, 0.05 * h * h)).max()
-    safe_steps._bound_derivatives.py_func(problem, h, cell, found)
+    safe_steps._bound_derivatives.py_func(*nodes, h, found)
     return found
 
 
@@ -96,13 +94,13 @@ def test_bounds_of_derivatives_hold_and_are_attained():
     h = 0.3
     for drawn in rng.standard_normal((200, 2, 3)):
         found, x = np.zeros(4), np.linspace(0.0, h, 200)
-        safe_steps._bound_derivatives.py_func(SimpleNamespace(table=drawn), h, 0, found)
+        safe_steps._bound_derivatives.py_func(*drawn, h, found)
         quintic = BPoly.from_derivatives([0.0, h], drawn)
         for d in (1, 2, 3):
             top = np.abs(quintic(x, nu=d)).max()
             assert top * (1.0 - 1e-12) <= found[d] <= 4.0 * top
     rising = np.array([[1.0, 2.0, 3.0], [1.0 + 2.0 * h + 1.5 * h**2 + h**3, 2.0 + 3.0 * h + 3.0 * h**2, 3.0 + 6.0 * h]])
-    safe_steps._bound_derivatives.py_func(SimpleNamespace(table=rising), h, 0, found := np.zeros(4))
+    safe_steps._bound_derivatives.py_func(*rising, h, found := np.zeros(4))
     assert found[3] == pytest.approx(6.0, rel=1e-9)
 
 

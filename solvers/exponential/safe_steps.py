@@ -25,7 +25,7 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.compiled.kernels import (
-    at_end,
+    cell_ends,
     copy,
     indentation,
     indentation_rate,
@@ -90,15 +90,15 @@ def _bound_signals(run, cell, count):
                 s, rate, curvature = problem.table[row, side : side + 3]
                 bounds[0] = max(bounds[0], abs(s) + slope * abs(rate) + curving * abs(curvature))
         for row in range(first, first + count if run.tables.derived > 0.0 else first):
-            _bound_derivatives(problem, problem.table_dt[j], row, bounds)
+            begin, end = cell_ends(problem, row)
+            _bound_derivatives(begin, end, problem.table_dt[j], bounds)
 
 
 @inlined
-def _bound_derivatives(problem, h, row, bounds):
-    """Raise the bounds of |ṡ|, |s̈| and |s⃛| to those on the cell of length h behind a row of the table."""
-    s, rate, curvature = problem.table[row, :3]
-    end = at_end(problem)
-    to, rate_to, curvature_to = problem.table[row + 1, end : end + 3]
+def _bound_derivatives(begin, end, h, bounds):
+    """Raise the bounds of |ṡ|, |s̈| and |s⃛| to those on a cell of length h, from s, ṡ and s̈ at its ends."""
+    s, rate, curvature = begin[0], begin[1], begin[2]  # of two-sided tables `begin` goes on
+    to, rate_to, curvature_to = end[0], end[1], end[2]
     a, b = s + 0.2 * h * rate, s + 0.4 * h * rate + 0.05 * h * h * curvature
     c, d = to - 0.4 * h * rate_to + 0.05 * h * h * curvature_to, to - 0.2 * h * rate_to
     steps = a - s, b - a, c - b, d - c, to - d

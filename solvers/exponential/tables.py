@@ -93,6 +93,7 @@ class Tables(NamedTuple):
     block_response: Annotated[Any, "weightings, j, S, 2*own, S"]  # α, then β, of the blocks at the nodes per node value
     block_end_response: Annotated[Any, "weightings, j, 2, own, S"]  # the same at the end
     alias: Annotated[Any, "kinds, j, 2*N"]  # error of δ between the nodes <= Σ ripple_weight (alias |p| + alias |v|)
+    ringing: Annotated[Any, "R, N"]  # rate at which a block swings once a force begins, per unit of its slope: |push|/k
     ripple_weight: Annotated[Any, "R, N"]  # amplitude of δ per unit of an oscillating block's rate
     signal_rows: Annotated[Any, "L, 2*N"]  # a load's tones from the state
     power_rows: Annotated[Any, "L, 2*N"]  # input power = signal × power row
@@ -197,6 +198,8 @@ def build(
         own_blocks=float(size - tones),
         accelerance=-problem.read_rate @ problem.push.T,
         contact_step=contact_h,
+        ringing=np.hypot(problem.push[:, size:], omega * problem.push[:, :size])
+        / np.where(omega > 0.0, problem.k, np.inf),
         ripple_weight=_ripple_weight(problem.read, omega),
         signal_rows=signal_rows,
         power_rows=power_rows,

@@ -48,7 +48,6 @@ from solvers.compiled.kernels import (
     merged,
     off_knots,
     place_of,
-    push_of,
     row_of,
     rubs,
     slider_of,
@@ -285,12 +284,10 @@ def _note_ringing(run, h):
         norms[b] = 0.0
     for u in range(problem.gap.size):
         if acts(problem, run.state, u):
-            force, push = load8(run.scratch.force[u], 0), push_of(problem, u)
+            force, ringing = load8(run.scratch.force[u], 0), run.tables.ringing[u]
             slope = (largest8(force) - least8(force)) / h
             for b in range(n):
-                if problem.k[b] > 0.0:
-                    size = math.sqrt(push[n + b] ** 2 + problem.k[b] * push[b] ** 2)
-                    norms[b] += size * slope / problem.k[b]
+                norms[b] += ringing[b] * slope
 
 
 @inner
