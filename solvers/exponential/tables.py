@@ -57,6 +57,8 @@ class Tables(NamedTuple):
     derived: Annotated[float, "number"]  # 1 where bounds have parts in the derivatives of signals
     load_rows: Annotated[Any, "L, 2, N8"]  # state rate of p and v per unit of a signal
     block_k_c: Annotated[Any, "2, N8"]  # k in 1/s², c in 1/s
+    compliance: Annotated[Any, "N8"]  # 1/k, s²; 0 where k is 0
+    push_rows: Annotated[Any, "R, 2, N8"]  # state rate of p and v per newton on a row
     stop_rows: Annotated[Any, "R, 4, N8"]  # the first two rows give δ + gap from p and v, the others δ̇
     acceleration_weight: Annotated[Any, "R, N8"]  # |δ̈| <= Σ weight × energy norm
     acceleration_signal: Annotated[Any, "R, L, 5"]  # see `_acceleration_by_signal`
@@ -188,6 +190,8 @@ def build(
         derived=float(response.any() or cell_error_signal[:, :, 2:].any()),
         load_rows=_in_eights(problem.load.reshape(-1, 2, size)),
         block_k_c=_in_eights(np.array([problem.k, problem.c])),
+        compliance=_in_eights(1.0 / np.where(problem.k > 0.0, problem.k, np.inf)),
+        push_rows=_in_eights(problem.push.reshape(-1, 2, size)),
         stop_rows=_in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
         acceleration_weight=_in_eights(_acceleration_weight(problem)),
         acceleration_signal=_acceleration_by_signal(problem, response),

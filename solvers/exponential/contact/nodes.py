@@ -49,6 +49,15 @@ def gauss(count: int) -> Any:
     return np.array([0.5 * (1.0 + x), 0.5 * w])
 
 
+def _powers(points: Any) -> Any:
+    """(i, m) coefficient of x^m in the polynomial that is 1 at point i and 0 at the others."""
+    others = [np.delete(points, i) for i in range(len(points))]
+    return np.array([np.poly(rest)[::-1] / np.prod(x - rest) for x, rest in zip(points, others, strict=True)])
+
+
+POWERS = _powers(gauss(int(S))[0])  # of t/h in a force, from its values at the smooth nodes
+
+
 def so_far(points: Any) -> Any:
     """(q, r) integral from 0 to point q of (0, 1) of the polynomial that is 1 at point r and 0 at the others."""
     legendre = np.polynomial.legendre
