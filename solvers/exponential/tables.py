@@ -57,8 +57,7 @@ class Tables(NamedTuple):
     derived: Annotated[float, "number"]  # 1 where bounds have parts in the derivatives of signals
     load_rows: Annotated[Any, "L, 2, N8"]  # state rate of p and v per unit of a signal
     block_k_c: Annotated[Any, "2, N8"]  # k in 1/s², c in 1/s
-    compliance: Annotated[Any, "N8"]  # 1/k, s²; 0 where k is 0
-    push_rows: Annotated[Any, "R, 2, N8"]  # state rate of p and v per newton on a row
+    force_following: Annotated[Any, "R, 4, 2*N"]  # the same of forces on the rows, of all blocks with k > 0
     stop_rows: Annotated[Any, "R, 4, N8"]  # the first two rows give δ + gap from p and v, the others δ̇
     acceleration_weight: Annotated[Any, "R, N8"]  # |δ̈| <= Σ weight × energy norm
     acceleration_signal: Annotated[Any, "R, L, 5"]  # see `_acceleration_by_signal`
@@ -173,7 +172,8 @@ def build(
     h, contact_h = _steps(omega, damping, tones, shortened)
     node_sets = node_sets_of(series)
     blocks = blocks_of(problem, tones, h, contact_h, node_sets)
-    response = following(problem, 0.0 if kinked else dt_cell)
+    follows = not kinked and dt_cell > 0.0
+    response = following(problem, problem.load, _FOLLOWS / dt_cell if follows else np.inf)
     cell_error, cell_error_signal = cell_errors(problem, dt_cell, response)
     ready = {**node_sets._asdict(), **blocks._asdict(), **laws}  # `alias` is that of the blocks
     signal_rows, power_rows, loss_rows = energy_rows
@@ -190,8 +190,7 @@ def build(
         derived=float(response.any() or cell_error_signal[:, :, 2:].any()),
         load_rows=_in_eights(problem.load.reshape(-1, 2, size)),
         block_k_c=_in_eights(np.array([problem.k, problem.c])),
-        compliance=_in_eights(1.0 / np.where(problem.k > 0.0, problem.k, np.inf)),
-        push_rows=_in_eights(problem.push.reshape(-1, 2, size)),
+        force_following=following(problem, problem.push, 0.0, 4),
         stop_rows=_in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
         acceleration_weight=_in_eights(_acceleration_weight(problem)),
         acceleration_signal=_acceleration_by_signal(problem, response),
@@ -286,20 +285,21 @@ def _load_norm(problem: Problem) -> Any:
     return np.sqrt(problem.load[:, size:] ** 2 + problem.k * problem.load[:, :size] ** 2)
 
 
-def following(problem: Problem, h: float) -> Any:
-    """(L, 3, 2N) response F_0 s + F_1 ṡ + F_2 s̈ that follows a signal s, of blocks with ωh ≥ 4; zero of the others.
+def following(problem: Problem, rates: Any, slowest: float, terms: int = 3) -> Any:
+    """(L, terms, 2N) response Σ F_i s⁽ⁱ⁾ that follows signals s, of blocks from ``slowest`` on; zero of the others.
 
-    With ẋ = A x + g s it is F_0 = -A⁻¹g, F_i = A⁻¹F_{i-1}, and what is left, d = x - Σ F_i s⁽ⁱ⁾, obeys ḋ = A d - F_2 s⃛.
+    With ẋ = A x + g s, g the row of ``rates`` (L, 2N), it is F_0 = -A⁻¹g, F_i = A⁻¹F_{i-1}, and what is left,
+    d = x - Σ F_i s⁽ⁱ⁾, obeys ḋ = A d - F_m s⁽ᵐ⁺¹⁾, F_m the last.
     """
     n = len(problem.k)
-    fast = np.sqrt(problem.k) * h >= _FOLLOWS
-    stiff, c, out = np.where(fast, problem.k, np.inf), problem.c, np.zeros((len(problem.load), 3, 2, n))
-    response = -problem.load.reshape(-1, 2, n)
-    for i in range(3):
+    fast = (problem.k > 0.0) & (np.sqrt(problem.k) >= slowest)
+    stiff, c, out = np.where(fast, problem.k, np.inf), problem.c, np.zeros((len(rates), terms, 2, n))
+    response = -rates.reshape(-1, 2, n)
+    for i in range(terms):
         p, v = response[:, 0], response[:, 1]
         response = np.stack((-(v + c * p) / stiff, np.where(fast, p, 0.0)), axis=1)
         out[:, i] = response
-    return out.reshape(-1, 3, 2 * n)
+    return out.reshape(-1, terms, 2 * n)
 
 
 def cell_errors(problem: Problem, h: float, response: Any) -> tuple[Any, Any]:

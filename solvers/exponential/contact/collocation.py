@@ -57,7 +57,7 @@ from solvers.compiled.parts import ERROR, SOLVE, part
 from solvers.compiled.simd import largest8, least8, load8
 from solvers.compiled.state import CALLS, LAST_EVENT, T_END, T, acts, rate_tolerance
 from solvers.compiled.sums import combine, iterate_power_law, replace_values
-from solvers.exponential.contact.first_step import NEW, SPLIT
+from solvers.exponential.contact.first_step import NEW
 from solvers.exponential.contact.many_stops import add_end_response, pair_response, uses_blocks, weighting_of
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
 from solvers.exponential.contact.node_response import (
@@ -70,7 +70,6 @@ from solvers.exponential.contact.node_response import (
     law_slopes_at_nodes,
     motion_of,
     node_forces,
-    note_oscillation,
     oscillation_of,
     own_accelerance,
     respond_all,
@@ -265,11 +264,9 @@ def _find_unresolved(run, node_set, level, u):
         ripple = ripple_of(run, u, alias)
         if scratch.control[NEW]:
             ripple += _ripple_begun(run, u, alias)
-        if node_set == 0 and _MEAN_OF_RIPPLE * stiffness * ripple > scratch.force_tolerance[s]:
-            if not scratch.control[SPLIT]:
-                note_oscillation(run, level)
-                scratch.control[SPLIT] = 1
-            ripple = min(ripple, oscillation_of(run, u, alias))
+        counts = _MEAN_OF_RIPPLE * stiffness * ripple > max(unresolved, _LITTLE * scratch.force_tolerance[s])
+        if counts and node_set == 0:
+            ripple = min(ripple, oscillation_of(run, level, u, alias))
         damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # nothing damps motion across a radius
         if rubs(problem, s):
             damped, stiffness = False, max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
@@ -311,7 +308,7 @@ def step_error(run, node_set, level):
     """Largest error of an indentation rate over the step just solved, in units of its tolerance rtol × speed."""
     problem, scratch = run.problem, run.scratch
     h, worst = run.tables.contact_step[level], 0.0
-    scratch.control[SPLIT] = 0
+    scratch.is_split[0] = 0
     if scratch.control[NEW]:
         _note_ringing(run, h)
     for u in range(problem.gap.size):

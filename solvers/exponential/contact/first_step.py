@@ -28,10 +28,9 @@ from solvers.exponential.contact.peaks import pressed_speed, state_peaks
 from solvers.exponential.flight import energy_norms
 from solvers.exponential.tables import EXPONENT, STIFFNESS
 
-LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN, BALANCED, SPLIT = range(8)
+LEVEL, NODE_SET, NEW, STOP, NEXT_LEVEL, BEGUN, BALANCED = range(7)
 """Places in Scratch.control: level and node set of the last step; kind of the next one, see below; stop that entered
-last; level of the next step; 1 once the run has begun; 1 if it keeps the energy balance;
-1 if `note_oscillation` has been called for the step tried."""
+last; level of the next step; 1 once the run has begun; 1 if it keeps the energy balance."""
 UNKNOWN = -1.0  # in Scratch.noise, of an element whose segment has just begun: its margins may have another unit
 ENTRY, SEGMENT = 1, 2  # values of NEW: first step of a contact, or of a segment of its law; 0: any other step
 _LEAST_SPEED = 1e-60  # m/s: lower bound of a reference speed, and of the speed of an impact

@@ -24,7 +24,7 @@ from solvers.compiled.kernels import (
     surface_tolerance,
     table_value,
 )
-from solvers.compiled.simd import WIDTH, largest8, load8, size8, splat8, store8
+from solvers.compiled.simd import largest8, load8, size8, splat8, store8
 from solvers.compiled.state import CALLS, PEAK_FORCE, T, acts, rate_tolerance
 from solvers.compiled.sums import above, add_response, combine
 from solvers.exponential.circles.contact import radial_forces
@@ -39,7 +39,7 @@ from solvers.exponential.contact.many_stops import (
     respond_through_blocks,
     uses_blocks,
 )
-from solvers.exponential.contact.nodes import POWERS, S
+from solvers.exponential.contact.nodes import DERIVATIVES, S
 from solvers.exponential.flight import SWING, join, split, take_off_following
 
 SHORT = STAGES
@@ -76,7 +76,8 @@ class Scratch(NamedTuple):
     x_new: Annotated[Any, "X8"]  # state at the end of the step tried
     terms: Annotated[Any, "14, 2*N8"]  # derivatives of the state
     swing: Annotated[Any, "2*N"]  # state at the start of a step without what follows the sampled signals
-    oscillation: Annotated[Any, "2*N"]  # the same without what is a polynomial of t on the step, see `note_oscillation`
+    oscillation: Annotated[Any, "2*N"]  # the same without what follows the forces of the step tried
+    is_split: Annotated[Any, "int 1"]  # 1 if ``oscillation`` is that of the step tried
     signal_terms: Annotated[Any, "tables, 6"]  # value and derivatives of every sampled signal
     values: Annotated[Any, "14"]  # coefficients of a polynomial
     norms: Annotated[Any, "N"]  # energy norms of the blocks, √(v² + k p²), √J
@@ -115,7 +116,7 @@ class Scratch(NamedTuple):
     duration: Annotated[Any, "E"]  # s: estimate for the last contact of a stop, as if nothing else acted on the body
     energy_sums: Annotated[Any, "2+L, numbers"]  # see `energy.flight_balance` and `contact_balance`
     energy: Annotated[Any, "3"]  # J, see `energy.check`
-    control: Annotated[Any, "int 8"]  # integers of the step control, places named in `first_step`
+    control: Annotated[Any, "int 7"]  # integers of the step control, places named in `first_step`
     start_motion: Annotated[Any, "E, 2"]  # δ and δ̇ at the start of the step
     node_time: Annotated[Any, "S"]  # s, of the nodes of the step tried
     slid: Annotated[Any, "G, 4, S"]  # ξ, ξ̇ and F_t at the nodes, then scratch; see `circles.friction`
@@ -410,47 +411,38 @@ def ripple_of(run, r, alias):
     return _sum_of_swings(run.tables.ripple_weight[r], alias, swing_of(run), run.problem.k.size)
 
 
-@inlined
-def _take_off_polynomial(tables, u, force, h, x):
-    """Take the response to the force on row u that is a polynomial off the state x, (2, N8).
-
-        p' = v + b_p F,   v' = -k p - c v + b_v F,   F = Σ F_m (t/h)^m in ``force``,
-
-    is solved for the coefficients of p and v from the last one down; those at t = 0 count.
-    """
-    rows = tables.push_rows[u]
-    for i in range(0, x.shape[1], WIDTH):
-        to_p, to_v = load8(rows[0], i), load8(rows[1], i)
-        c, compliance, p, v = load8(tables.block_k_c[1], i), load8(tables.compliance, i), splat8(0.0), splat8(0.0)
-        for j in range(S):
-            value, slope = splat8(force[S - 1 - j]), splat8((S - j) / h)
-            speed = slope * p - to_p * value
-            p = (to_v * value - c * speed - slope * v) * compliance
-            v = speed
-        store8(x[0], i, load8(x[0], i) - p)
-        store8(x[1], i, load8(x[1], i) - v)
+@reordered
+def _take_off_following(x, rows, derivatives, per_h, out):
+    """Write x less what follows a force with the ``derivatives`` F h^i/i! into ``out``; see `tables.following`."""
+    f0, f1, f2, f3 = derivatives[0], derivatives[1], derivatives[2], derivatives[3]
+    f1, f2, f3 = f1 * per_h, f2 * per_h**2, f3 * per_h**3
+    for i in range(out.size):
+        out[i] = x[i] - (f0 * rows[0, i] + f1 * rows[1, i] + f2 * rows[2, i] + f3 * rows[3, i])
 
 
-@inner
-def note_oscillation(run, level):
+@merged
+def _note_oscillation(run, level):
     """Write what oscillates on a step with smooth nodes into ``scratch.oscillation``.
 
-    The blocks' response to forces that are polynomials is a polynomial of the same degree, which the nodes hold exactly,
-    and an oscillation: what the state at the start has more than that polynomial.
+    The blocks respond to forces that are polynomials by a polynomial of the same degree, which the nodes hold exactly,
+    and by an oscillation: what the state at the start has more than that polynomial. Four terms of it are taken off; a
+    block that oscillates between the nodes follows the others so little that they may count as oscillation.
     """
-    problem, scratch = run.problem, run.scratch
-    x = scratch.split_state[SWING]
-    split(problem, swing_of(run), x)
+    problem, tables, scratch = run.problem, run.tables, run.scratch
+    x, per_h = swing_of(run), 1.0 / tables.contact_step[level]
     for u in range(problem.gap.size):
         if acts(problem, run.state, u):
-            combine(POWERS, scratch.force[u], S, None, scratch.trial)
-            _take_off_polynomial(run.tables, u, scratch.trial, run.tables.contact_step[level], x)
-    join(problem, x, scratch.oscillation)
+            combine(DERIVATIVES, scratch.force[u], S, None, scratch.trial)
+            _take_off_following(x, tables.force_following[u], scratch.trial, per_h, scratch.oscillation)
+            x = scratch.oscillation
+    scratch.is_split[0] = 1
 
 
 @inner
-def oscillation_of(run, r, alias):
-    """`ripple_of` by what `note_oscillation` has written."""
+def oscillation_of(run, level, r, alias):
+    """`ripple_of` by what oscillates on the step tried, without what follows its forces."""
+    if not run.scratch.is_split[0]:
+        _note_oscillation(run, level)
     return _sum_of_swings(run.tables.ripple_weight[r], alias, run.scratch.oscillation, run.problem.k.size)
 
 

@@ -49,13 +49,14 @@ def gauss(count: int) -> Any:
     return np.array([0.5 * (1.0 + x), 0.5 * w])
 
 
-def _powers(points: Any) -> Any:
-    """(i, m) coefficient of x^m in the polynomial that is 1 at point i and 0 at the others."""
-    others = [np.delete(points, i) for i in range(len(points))]
-    return np.array([np.poly(rest)[::-1] / np.prod(x - rest) for x, rest in zip(points, others, strict=True)])
+def _derivatives(points: Any) -> Any:
+    """(i, m) derivative m at 0 of the polynomial that is 1 at point i and 0 at the others."""
+    others, factorial = [np.delete(points, i) for i in range(len(points))], np.cumprod([1, *range(1, len(points))])
+    found = [np.poly(rest)[::-1] / np.prod(x - rest) for x, rest in zip(points, others, strict=True)]
+    return np.array(found) * factorial
 
 
-POWERS = _powers(gauss(int(S))[0])  # of t/h in a force, from its values at the smooth nodes
+DERIVATIVES = _derivatives(gauss(int(S))[0])  # of a force by t/h at the start, from its values at the smooth nodes
 
 
 def so_far(points: Any) -> Any:
