@@ -784,3 +784,17 @@ def test_a_stick_just_before_the_force_falls_to_zero(v_t):
     assert first.contacts.t_out.shape == second.contacts.t_out.shape == (1,)
     np.testing.assert_allclose(first.q_dot[-1], second.q_dot[-1], rtol=1e-7)
     assert len(first.transitions.t) <= len(second.transitions.t) + 4
+
+
+@pytest.mark.parametrize(
+    ("law", "rtol"), [(KelvinVoigt(1e4, 20.0), 1e-5), (Hertz(1e6), 1e-6)], ids=["dashpot", "hertz"]
+)
+def test_a_slip_that_creeps_to_rest_goes_on(law, rtol):
+    """ξ̇ ~ e^{-0.38t} keeps its sign; by what iterations leave of it the slider stuck and slipped thousands of times."""
+    wall = Contact([0.0, 1.0], law, map="oblique", tangent=[1.0, 0.0], friction=Friction(0.02, 1e4))
+    loads = [([1.0, 0.0], fb.Harmonic(1.0, 0.0)), ([0.0, -10.0], fb.Harmonic(1.0, 0.0))]
+    system = System(np.eye(2), np.diag([3.0, 6.0]), np.diag([1.0, 100.0]), [wall], loads)
+    run = integrate(system, [0.0, 0.0], [0.3, 0.0], 150.0, method=Exponential(rtol))
+    normal = 10.0 - 100.0 * abs(run.q[-1, 1])
+    np.testing.assert_allclose(run.q[-1, 0], 1.0 - 0.02 * normal, rtol=10.0 * rtol)
+    assert len(run.transitions.t) <= 4

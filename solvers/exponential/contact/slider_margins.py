@@ -54,7 +54,7 @@ from solvers.exponential.circles.friction import (
 )
 from solvers.exponential.contact.crossings import REST, ROUNDING
 from solvers.exponential.contact.first_step import NEW
-from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, rate_ripple_of, ripple_of
+from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, RTOL, rate_ripple_of, ripple_of
 from solvers.exponential.contact.nodes import AT_BEGIN, AT_END, LOCAL_SLOPES, SLOPE_AT_BEGIN, SLOPE_AT_END, S
 from solvers.exponential.contact.peaks import BELOW_PEAK, local_maximum, motion_around
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR
@@ -67,6 +67,7 @@ _SLOPE_ROUNDING = 1e-8  # of a margin, in units of its largest, that contains th
 _TINY = 1e-300  # m, keeps N/δ finite
 _DIFFERENCE_STEP = 1e-6  # relative step in δ and δ̇ for differences of the slopes of N
 _LEFT_OUT, _CLEAR_OF_ZERO = 4.0, 0.05  # see `_ends_by_polynomial`
+_LEFT_BY_ITERATION = 0.05  # of rtol, in units of the reference speed: what the forces of a step leave open of a rate
 _ON_BEND = 1e-9  # δ̇, in units of the reference speed, that a landing on a bend at δ̇ = 0 may leave
 
 
@@ -295,6 +296,7 @@ def _add_rounding(run, s, slopes, ripple, faster):
     slider, slips = slider_of(problem, s), _slips(slider_of(problem, s))
     xi, xi_rate = xi_tolerances(problem, s, state.now[T], state.x)
     rest, own_by_way = REST * scratch.reference_speed[s], slider[STIFFNESS] if slider[CODE] == STICK else 0.0
+    left = _LEFT_BY_ITERATION * scratch.accuracy[RTOL] * scratch.reference_speed[s]
     delta, rate = surface_tolerance(problem, s, state.x), max(rate_tolerance(problem, s, state.x), rest)
     for j in range(problem.border_count[s]):
         by_delta, by_rate, by_way, by_speed = own_by_delta, own_by_rate, own_by_way, 1.0 if slips else 0.0
@@ -302,7 +304,7 @@ def _add_rounding(run, s, slopes, ripple, faster):
             by_delta, by_rate, by_way, by_speed = normal_by_delta, normal_by_rate, 0.0, 0.0
         if j == SLIDES or slips:
             scratch.ends[ENDS * j + DELTA_RIPPLED] += (by_delta + by_way) * ripple + by_speed * faster
-        noise = by_delta * delta + by_rate * rate + by_way * xi + by_speed * max(xi_rate, rest)
+        noise = by_delta * delta + by_rate * rate + by_way * xi + by_speed * max(xi_rate, rest, left)
         differenced = j == SLIDES and slips and _rate_dependent(problem, s)
         share = _SLOPE_ROUNDING if differenced else ROUNDING
         scratch.noise[s, j] = max(share * scratch.largest[s, j], 2.0 * noise)
