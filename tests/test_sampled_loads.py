@@ -287,6 +287,17 @@ STOPS = {"polynomial": Polynomial([2e4, 0.0, 1e9]), "Kelvin-Voigt": KelvinVoigt(
 METHODS = [Exponential(1e-3), Exponential(1e-8), DormandPrince(1e-4)]
 
 
+def test_a_load_that_lifts_coupled_modes_off_a_stop_they_rest_on_begins_no_contact():
+    """A dashpot couples two modes at rest at δ = 0; δ̈ = -w·load is negative, and so is δ from then on."""
+    rng = np.random.default_rng(1)
+    for _ in range(40):
+        row, load, across = rng.uniform(0.3, 1.0, (3, 2))
+        contact, table = Contact(row, KelvinVoigt(1e5, 10.0)), Table(1e-3, np.array([[3.0, 1.0, 0.0], [3.0, 1.0, 0.0]]))
+        damping = np.diag([0.8, 5.0]) + 20.0 * np.outer(across, across)
+        system = System(np.eye(2), damping, np.diag([1600.0, 90000.0]), [contact], [(load, table)])
+        assert not len(integrate(system, REST, REST, 1e-3).contacts)
+
+
 def pressed(stop, load):
     """Two modes at rest on a preloaded stop, under a load, and their place."""
     contact = Contact([1.0, 0.6], stop, -1e-4)

@@ -20,6 +20,7 @@ def _polynomial(problem, s, terms, values):
         values[i] = dot(problem.read[row], terms[i], 2 * problem.k.size) / factorial
         factorial *= i + 1.0
     values[0] -= problem.gap[row]
+    values[1] = dot(problem.read_rate[row], terms[0], 2 * problem.k.size)  # loads of coupled blocks leave rounding
 
 
 @inner
