@@ -341,3 +341,11 @@ def test_a_fast_mode_at_rest_as_an_element_begins_to_push(omega, stiffness, spee
     )
     assert len(run.contacts) == len(by_stages.contacts) == 4
     assert np.abs(run.end - by_stages.end)[[0, 2]].max() < 3e-9 * np.abs(by_stages.end[[0, 2]]).max()
+
+
+@pytest.mark.parametrize("load", [5.0, -5.0])
+def test_a_preloaded_yielding_stop_holds_a_mass_off_the_stop_that_a_load_presses_it_on(load):
+    """100 N of preload against 5 N: the mass at rest leaves the other stop at once, which logs no contact."""
+    yielding, other = Contact([1.0], WaltonBraun(1e4, 4e4), gap=-1e-2), Contact([1.0], Hertz(1e6))
+    system = System([[1.0]], [[0.0]], [[100.0]], [other, yielding], [([1.0], Harmonic(load, 0.0))])
+    assert integrate(system, [0.0], [0.0], 1e-3, method=Exponential()).contacts.stop.tolist() == [1]

@@ -56,7 +56,7 @@ from solvers.compiled.state import (
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import guess_radial_forces
 from solvers.exponential.circles.friction import guess_rubbing_forces
-from solvers.exponential.contact.borders import UNRESOLVED, border_behind
+from solvers.exponential.contact.borders import UNRESOLVED, border_behind, margins_of
 from solvers.exponential.contact.collocation import end_state, solve_forces, step_error
 from solvers.exponential.contact.crossings import leaves_segment
 from solvers.exponential.contact.first_step import (
@@ -104,11 +104,26 @@ NEITHER, MOVES_OUT, RESTS = range(3)  # what `_leave_or_rest` finds
 _ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # ratio of the errors of two steps whose lengths differ by √2, one level
 
 
+@inlined
+def _begins_beyond_a_border(run):
+    """Whether a law with memory passes a border before the first step, such as that of a preloaded yielding stop."""
+    beyond = False
+    for s in range(run.problem.law.size):
+        count = 0 if rubs(run.problem, s) else run.problem.border_count[s]
+        if count > 0:
+            margins_of(run, s, run.state.now[T], run.state.x, run.scratch.ends[:count])
+        for j in range(count):
+            beyond |= run.scratch.ends[j] < 0.0
+    return beyond
+
+
 @part(PRESSED, types.boolean)
 def _switch_pressed(run):
     """Switch every stop at rest on its surface that other stops' forces press into it; whether there was any."""
     problem, state = run.problem, run.state
     switched = False
+    if state.now[T] == 0.0 and _begins_beyond_a_border(run):
+        return False  # forces are those of segments that end at once
     for s in range(problem.law.size):
         if state.segment[s] > 0 or abs(indentation(problem, s, state.x)) > surface_tolerance(problem, s, state.x):
             continue
