@@ -16,6 +16,7 @@ from contacts import Hertz, KelvinVoigt, Polynomial
 from solvers import RK4, Contact, DormandPrince, Exponential, System, integrate, integrate_many
 from solvers.exponential.flight import cell_of
 from solvers.exponential.phi_functions import signal_responses
+from solvers.exponential.responses import propagate
 from solvers.integration import prepared_once
 from solvers.problem import forcing_of, on_one_grid
 
@@ -66,6 +67,23 @@ def test_responses_of_short_steps_do_not_depend_on_long_ones_beside_them(k, c):
         assert rate == pytest.approx(short ** (order + 1) / math.factorial(order + 1), rel=2e-6)
     for row, step in zip(found[1:], (1.0, short), strict=True):
         np.testing.assert_allclose(row, responses(k, c, [step])[0], rtol=1e-13)
+
+
+@pytest.mark.parametrize("c", [0.0, 4e4, 3e6])
+@pytest.mark.parametrize("h", [1e-4, 0.03])
+def test_what_follows_a_load_does_so_to_rounding(c, h):
+    """Under t^i/i!, x = Σ F_j t^(i-j)/(i-j)! with F_0 = -A⁻¹g and F_j = A⁻¹F_(j-1): E F_i and the response make it."""
+    k = 1e12
+    (alpha, beta), found = propagate(k, c, h), responses(k, c, [h])[0]
+    follows = [np.array([1.0 / k, 0.0])]
+    for _ in range(5):
+        place, rate = follows[-1]
+        follows.append(np.array([-(rate + c * place) / k, place]))
+    for i, (place, rate) in enumerate(follows):
+        moved = found[i] + [alpha * place + beta * rate, alpha * rate - beta * (k * place + c * rate)]
+        parts = [follows[j] * h ** (i - j) / math.factorial(i - j) for j in range(i + 1)]
+        largest = max(np.hypot(1e6 * p, v) for p, v in [*parts, found[i]])
+        assert np.abs((moved - sum(parts)) * [1e6, 1.0]).max() < 1e-14 * largest  # 3e-16 measured; by doubling 2e-12
 
 
 # --- damping that is rounding -------------------------------------------------------------------------------------

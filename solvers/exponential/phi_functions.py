@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 
 from solvers.compiled.kernels import Problem
+from solvers.exponential.responses import fill_propagators
+
+_LONG = 8.0  # |λ| h of a block's slower rate from which on its responses are recurrences
 
 
 def signal_responses(problem: Problem, h: Any) -> Any:
@@ -39,7 +42,7 @@ def derivatives_of_ends(h: float) -> Any:
 
 @lru_cache(maxsize=16)
 def _polynomial_responses(stiffnesses: bytes, dampings: bytes, load: bytes, steps: bytes) -> Any:
-    """The same from the arrays' bytes: φ-functions by Taylor series and doubling."""
+    """The same from the arrays' bytes: φ-functions by Taylor series and doubling, or those of `_long_responses`."""
     h, stiffness, damping = (np.frombuffer(part) for part in (steps, stiffnesses, dampings))
     size = len(stiffness)
     rows = np.frombuffer(load).reshape(-1, 2, size)
@@ -48,14 +51,39 @@ def _polynomial_responses(stiffnesses: bytes, dampings: bytes, load: bytes, step
     A = np.zeros((size, 2, 2))
     speed = np.where(stiffness > 0.0, np.sqrt(stiffness), 1.0)  # unit of rates, for fewer halvings, less rounding
     A[:, 0, 1], A[:, 1, 0], A[:, 1, 1] = speed, -stiffness / speed, -damping
+    half = 0.5 * damping
+    slower = stiffness / np.maximum(speed, half + np.sqrt(np.maximum(half * half - stiffness, 0.0)))
+    long = h[:, None] * slower >= _LONG
     vectors = np.stack((rows[:, 0], rows[:, 1] / speed), axis=2)  # (L, N, 2)
-    phi = _phi(h[:, None, None, None] * A)
+    phi = _phi(np.where(long, 0.0, h[:, None])[:, :, None, None] * A)
     for k in range(6):
         change = np.einsum("hnab,lnb->hlan", phi[k + 1], vectors) * (h ** (k + 1))[:, None, None, None]
         out[:, :, k] = change.reshape(len(h), loads, 2 * size)
     out[..., size:] *= speed
+    by_block = out.reshape(len(h), loads, 6, 2, size)
+    np.copyto(by_block, _long_responses(stiffness, damping, rows, h), where=long[:, None, None, None])
     out.setflags(write=False)
     return out
+
+
+def _long_responses(k: Any, c: Any, rows: Any, h: Any) -> Any:
+    """(len(h), L, 6, 2, N) R_0 = A⁻¹(E - I) g, R_i = A⁻¹(R_{i-1} - g hⁱ/i!), with the tables' E; zero for k = 0.
+
+    A block that follows a signal rests on E times its state and these cancelling: with one E, to rounding of the state.
+    """
+    E, out = np.empty((len(h), 2, 1, 1, len(k))), np.empty((len(h), len(rows), 6, 2, len(k)))
+    fill_propagators(k, c, (0, len(k)), h, E.reshape(len(h), 2, -1))
+    response = (E[:, 0] - 1.0) * _solved(k, c, rows) + E[:, 1] * rows
+    for i in range(6):
+        out[:, :, i] = response
+        response = _solved(k, c, response - rows * (h ** (i + 1) / math.factorial(i + 1))[:, None, None, None])
+    return out
+
+
+def _solved(k: Any, c: Any, x: Any) -> Any:
+    """A⁻¹ x of places and rates (..., 2, N); 0 where k = 0."""
+    stiff = np.where(k > 0.0, k, np.inf)
+    return np.stack((-(x[..., 1, :] + c * x[..., 0, :]) / stiff, np.where(k > 0.0, x[..., 0, :], 0.0)), axis=-2)
 
 
 def _phi(Z: Any) -> list[Any]:
