@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
-from drawn_slow import Table, draw_slow
+from drawn_slow import Table, draw_slow, draw_stiff
 from drawn_starts import on_a_border
 from scipy.optimize import brentq
 
@@ -18,6 +19,7 @@ from solvers import Contact, System
 
 # First seeds of the kinds; what one below stands for has stayed.
 SAMPLED_FROM, RESTING_FROM, SLOW_FROM = 100_000, 200_000_000, 300_000_000
+FOLLOWING_FROM, STRUCK_FROM = 800_000_000, 900_000_000  # behind those of `random_scenes.COINCIDING_FROM`
 
 
 @law(exponent=1.5)
@@ -282,9 +284,10 @@ def draw(seed: int) -> tuple[Scene, float]:
     kind = (draw_structure, draw_structure, draw_parts, draw_pair)[rng.integers(4)]
     kind = draw_resting if seed >= RESTING_FROM else draw_sampled if seed >= SAMPLED_FROM else kind
     kind = draw_slow if seed >= SLOW_FROM else kind
+    kind = partial(draw_stiff, moved=seed < STRUCK_FROM) if seed >= FOLLOWING_FROM else kind
     rtol = float(rng.choice([1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-8, 1e-9, 1e-10, 1e-11]))
     scene = kind(rng)
-    if kind not in (draw_resting, draw_slow):  # which lie on their surfaces by themselves
+    if seed < RESTING_FROM:  # others lie on their surfaces by themselves
         scene = on_a_border(seed, scene)
     laws = ", ".join(_told(c) for c in scene.system.contacts)
     scene.words = f"rtol {rtol:g} {scene.words}; stops {laws}"

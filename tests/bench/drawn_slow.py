@@ -2,8 +2,8 @@
 
 With short pulses in flight or in contact, soft and stiff modes up to 1e5, loads that nearly cancel a preload, little or
 no damping, jumps at both ends of a record, several cells, rigid modes that drift, loads that begin late, contacts much
-longer than a period, and units from 1e-9 to 1e3 m and 1e-6 to 1e6 kg. Gaps are placed on the path of the structure
-without stops.
+longer than a period, and units from 1e-9 to 1e3 m and 1e-6 to 1e6 kg. Slow modes beside fast ones that follow a moving
+support, or rest until a stop pushes. Gaps are placed on the path of the structure without stops.
 """
 
 from __future__ import annotations
@@ -200,3 +200,66 @@ def draw_slow(rng: np.random.Generator) -> Any:
         contacts.append(Contact(row, draw_law(rng, mass / (row @ row), speed, min(time, duration)), gap))
         words += f" {kind}"
     return Scene(System(M, C, K, contacts, loads), q0, q_dot0, duration, words)
+
+
+def _motion(rng: np.random.Generator, size: float, low: float, dt: float, duration: float) -> tuple[list[Any], str]:
+    """Displacement of a support in cells dt, with speed and acceleration where these are known."""
+    kind, band = rng.integers(6), low * 10.0 ** rng.uniform(-0.5, 0.7)
+    if kind == 0:
+        signal, words = draw_table(rng, size, dt, duration)
+        return [signal], words
+    length, at = rng.uniform(0.1, 0.9) * duration, rng.uniform(0.0, 0.8) * duration
+    drawn: list[Any] = [
+        fb.Harmonic(size, band),
+        fb.Pulse(size, length, at),
+        fb.Step(size, length, at),
+        fb.SineSweep(size, 0.3 * band, band, 2.0 * duration),
+        fb.BandNoise(size, (0.0, band), seed=int(rng.integers(1 << 30))),
+    ]
+    of_order = [drawn[kind - 1].derivative(i) for i in range(5)]
+    if kind > 1:  # as they are on their grid: cells may be coarse
+        t = dt * np.arange(math.ceil(duration / dt) + 1)
+        rows = np.stack([one(t) for one in of_order], axis=1)
+        of_order = [Table(dt, rows[:, i : i + 3]) for i in range(3)]
+    return of_order[:3], type(drawn[kind - 1]).__name__
+
+
+def draw_stiff(rng: np.random.Generator, moved: bool) -> Any:
+    """One to three slow modes, one or two 300 to 1e5 times as fast; damped or not, coupled or not; one to three stops.
+
+    The fast ones follow one or two supports that are ``moved``, or rest until a stop pushes them.
+    """
+    from drawn import Scene, draw_law, draw_signal
+
+    n, low, speed = int(rng.integers(2, 6)), 10.0 ** rng.uniform(0.0, 2.0), 10.0 ** rng.uniform(-2.0, 0.5)
+    fast = np.arange(n) >= n - min(n - 1, int(rng.integers(1, 3)))
+    omega = low * 10.0 ** np.where(fast, rng.uniform(2.5, 5.0, n), rng.uniform(0.0, 0.7, n))
+    zeta = rng.choice([0.0, 1e-3, 0.02, 0.3], n)
+    duration = min(rng.uniform(2.0, 12.0) / low, 0.6 * MOST_RADIANS / omega.max())
+    row = rng.standard_normal(n) * math.sqrt(low) * 10.0 ** rng.uniform(-1.0, 0.3) * int(rng.random() < 0.25)
+    C, loads = np.diag(2.0 * zeta * omega) + np.outer(row, row), []
+    q0, q_dot0 = speed / low * rng.standard_normal(n) * ~fast, speed * rng.standard_normal(n) * ~fast
+    words = f"n={n} ω=[{omega.min():.3g}..{omega.max():.3g}] ζ={zeta} T={duration:.3g}" + " coupled" * int(row.any())
+    dt = min(10.0 ** rng.uniform(-3.0, 0.0) / low, duration)
+    for _ in range(rng.integers(1, 3) if moved else 0):
+        signals, kind = _motion(rng, speed / low, low, dt * float(rng.choice([1.0, 1.0, 0.5])), duration)
+        shape, follows = rng.standard_normal(n), int(rng.random() < 0.7)
+        rows = shape * fast * omega**2, shape * fast * 2.0 * zeta * omega, -shape * ~fast
+        loads += zip(rows, signals, strict=False)
+        begin, soon = np.asarray(signals[0](np.array([0.0, 1e-6 / low])))
+        q0, q_dot0 = q0 + follows * shape * fast * begin, q_dot0 + follows * shape * fast * (soon - begin) * 1e6 * low
+        words += f" {kind}" + " at once" * (1 - follows)
+    if not moved and rng.random() < 0.6:
+        signal, kind = draw_signal(rng, speed * low * 10.0 ** rng.uniform(-1.0, 0.3), low)
+        loads, words = [(rng.standard_normal(n), signal)], f"{words} {kind}"
+    system, contacts = System(np.eye(n), C, np.diag(omega**2), [], loads), []
+    _, q, q_dot = _path(system, q0, q_dot0, duration)
+    for _ in range(rng.integers(1, 4)):
+        row = rng.standard_normal(n) * np.where(fast, 10.0 ** rng.uniform(-1.5, 0.5), 1.0)
+        gap, rate, kind = _placed(rng, -q @ row, -q_dot @ row)
+        part = row[~fast] if rng.random() < 0.5 else row
+        time = duration * 10.0 ** rng.uniform(-3.0, -0.5)
+        contacts.append(Contact(row, draw_law(rng, 1.0 / (part @ part), rate, time), gap))
+        words += f" {kind}"
+    kept = np.eye(2 * n)[:n][fast]  # a move of a fast place would be one of 1e5 times as much of its rate
+    return Scene(System(np.eye(n), C, system.K, contacts, loads), q0, q_dot0, duration, words, kept=kept)
