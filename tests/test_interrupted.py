@@ -9,14 +9,14 @@ from threading import Timer
 
 import numpy as np
 import pytest
-from problems import paper_scene
+from problems import ROD, paper_scene
 
 import fembeam as fb
 import solvers
-from contacts import Hertz
+from contacts import Hertz, Jenkins, KelvinVoigt, Polynomial
 from fembeam.model import branch as of_branch
 from fembeam.scene_file import study_tables
-from fembeam.study import ensemble, stationary, vary
+from fembeam.study import backbone, ensemble, fold, peak, speed_accuracy, stationary, vary
 from fembeam.study.execution import executors
 from fembeam.study.execution.checkpoint import Checkpoint
 from fembeam.support import written_whole
@@ -167,6 +167,72 @@ def test_a_stationary_response_goes_on_as_if_it_had_not_been_interrupted(base, s
     assert (found.duration, found.discarded, found.settling) == (whole.duration, whole.discarded, whole.settling)
     with pytest.raises(ValueError, match="belongs to another study: stationary"):
         stationary(model, checkpoint=path, **asked | {"segment": 500})
+
+
+def pushed(force=1.0, **parts):
+    """A rod with one mode, pushed at its tip."""
+    load = fb.PointForce(0.5, fb.Harmonic(force, 200.0))
+    return fb.Scene(ROD, [fb.Clamped(0.0)], forces=[load], damping=fb.ModalDamping(0.02), **parts).reduce(modes=1)
+
+
+DAMPED = pushed(elements=[fb.Element(0.5, Jenkins(2e3, 1.0), name="damper")])
+SOFT = pushed(1.0, elements=[fb.Element(0.5, Polynomial([0.0, 0.0, 2e7]))])
+STRUCK = pushed(stops=[fb.Stop(0.5, KelvinVoigt(1e5, 5.0), gap=1e-4)])
+FOLDED = SOFT.branch("omega", (180.0, 230.0), step=0.2).run()
+METHODS = [solvers.Exponential(1e-4), solvers.RK4(1e-5)]
+CURVES = {
+    "peak": partial(peak, DAMPED, over="elements[damper].law.limit", values=[1.4, 1.8], span=(195.0, 235.0)),
+    "backbone": partial(backbone, DAMPED, [0.01, 0.1, 0.8], span=(160.0, 280.0)),
+    "fold": partial(fold, FOLDED, "forces[0].signal.amplitude", span=(0.9, 1.1)),
+    "speed_accuracy": partial(speed_accuracy, STRUCK, METHODS, 2, duration=0.05, rounds=1),
+}
+OTHERS = {"peak": {"span": (180.0, 250.0)}, "backbone": {"span": (150.0, 280.0)}, "fold": {"span": (0.9, 1.2)},
+          "speed_accuracy": {"duration": 0.06}}  # fmt: skip
+
+
+def all_of(found):
+    """What was found, to the last bit, without what a clock tells."""
+    if isinstance(found, fb.study.SpeedAccuracy):
+        return found.floor, [(one.errors, one.totals, one.law_calls, one.steps) for one in found.points]
+    points = getattr(found, "tops", None) or getattr(found, "resonances", None)
+    orbits = found.orbits if points is None else [one.orbit for one in points]
+    return found.plain(), [(one.found.whole, one.found.monodromy, one.found.doubt, one.parameter) for one in orbits]
+
+
+@pytest.mark.parametrize("name", CURVES)
+@pytest.mark.parametrize("every", [1, 3])
+def test_a_curve_goes_on_as_if_it_had_not_been_interrupted(name, every, tmp_path, monkeypatch):
+    """To the last bit, each result computed once; what was asked differently is refused."""
+    call, path, add, written = CURVES[name], tmp_path / "kept.npz", Checkpoint.add, []
+    whole = call()
+
+    def stopped(self, *given):
+        add(self, *given)
+        written.append(given[0])
+        if len(written) % every == 0:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(Checkpoint, "add", stopped)
+    for _ in range(100):
+        try:
+            found = call(checkpoint=path)
+            break
+        except KeyboardInterrupt:
+            continue
+    assert len({*written}) == len(written)
+    np.testing.assert_equal(all_of(found), all_of(whole))
+    with pytest.raises(ValueError, match=f"belongs to another study: .*{next(iter(OTHERS[name]))}"):
+        call(checkpoint=path, **OTHERS[name])
+
+
+@pytest.mark.parametrize(("name", "calls"), [("peak", 300), ("backbone", 240), ("fold", 60), ("speed_accuracy", 3)])
+def test_a_curve_stopped_within_a_run_keeps_what_was_found(name, calls, interrupt, tmp_path):
+    call, path = CURVES[name], tmp_path / "kept.npz"
+    interrupt(calls)
+    with pytest.raises(KeyboardInterrupt):
+        call(checkpoint=path)
+    assert path.exists()
+    np.testing.assert_equal(all_of(call(checkpoint=path)), all_of(call()))
 
 
 def test_a_file_that_has_its_name_stays_when_ctrl_c_comes_then(tmp_path, monkeypatch):

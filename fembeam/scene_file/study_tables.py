@@ -171,12 +171,13 @@ class SpeedAccuracyTable:
             require_positive("duration", self.duration, where, "give s")
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.SpeedAccuracy:
-        """The study."""
+        """The study, with its checkpoint ``speed_accuracy.npz`` in the folder."""
         methods: list[Any] = [solvers.Exponential(rtol) for rtol in self.rtols]
         methods += [solvers.DormandPrince(rtol) for rtol in self.rtols] + [solvers.RK4(step) for step in self.steps]
         models = [file.scene.reduce(modes=n, **_mesh_of(file)) for n in sorted(set(self.modes))]
+        kept = folder / "speed_accuracy.npz"
         return studies.speed_accuracy(
-            models, methods, self.starts, self.duration, rounds=self.rounds, progress=progress
+            models, methods, self.starts, self.duration, rounds=self.rounds, progress=progress, checkpoint=kept
         )
 
 
@@ -653,8 +654,8 @@ class PeakTable:
         _check_place(scene, self.z)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.Peak:
-        """The study."""
-        return studies.peak(file.model(), **vars(self), progress=progress)
+        """The study, with its checkpoint ``peak.npz`` in the folder."""
+        return studies.peak(file.model(), **vars(self), checkpoint=folder / "peak.npz", progress=progress)
 
 
 @dataclass(frozen=True)
@@ -689,10 +690,11 @@ class FoldTable:
         _check_place(scene, self.z)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.Fold:
-        """The study, its branch saved as ``fold.npz`` in the folder."""
+        """The study, its branch saved as ``fold.npz`` in the folder, its checkpoint is ``fold_curve.npz``."""
         along = BranchTable(self.span, self.parameter, self.period)
         branch = along.followed(file.model(), folder / "fold.npz", progress)
-        return studies.fold(branch, self.over, self.values, self.number, self.z, progress)
+        kept = folder / "fold_curve.npz"
+        return studies.fold(branch, self.over, self.values, self.number, self.z, progress, kept)
 
 
 @dataclass(frozen=True)
@@ -718,8 +720,8 @@ class BackboneTable:
         _check_place(scene, self.z)
 
     def run(self, file: SceneFile, folder: Path, progress: bool = False) -> studies.Backbone:
-        """The study."""
-        return studies.backbone(file.model(), **vars(self), progress=progress)
+        """The study, with its checkpoint ``backbone.npz`` in the folder."""
+        return studies.backbone(file.model(), **vars(self), checkpoint=folder / "backbone.npz", progress=progress)
 
 
 Draw = Mapping[str, str | float]  # a distribution of `scipy.stats` by its kind, with its numbers

@@ -11,6 +11,7 @@ tone in a period, which is lost in it.
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -23,9 +24,10 @@ from fembeam.model import Model, Orbit, observed
 from fembeam.model.branch import Family
 from fembeam.plot.axis_names import parameter_unit
 from fembeam.scene import Scene, called, path_of, turns_at
+from fembeam.study.execution.checkpoint import Checkpoint, study_identity
 from fembeam.study.measure import require_model
 from fembeam.study.peak import check_peak
-from fembeam.study.response_curve import ResponseCurve, Seen
+from fembeam.study.response_curve import ResponseCurve, Seen, arrays_of, restored
 from fembeam.study.result import Result, column
 from fembeam.support import Part, counting, require
 from solvers.problem import counted
@@ -110,6 +112,7 @@ def backbone(
     parameter: str = "omega",
     z: Any = None,
     progress: bool = False,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> Backbone:
     """Frequency and damping of one resonance over amplitude: phase resonance is followed over the level of a tone.
 
@@ -121,6 +124,8 @@ def backbone(
     span : (lowest, highest) ω, rad/s, with one resonance inside it.
     level, parameter : paths of the tone's amplitude and of its frequency.
     z : m, or (place, direction), of the displacement; None: the first stop or element, else the tip.
+    progress : show a bar (on terminals and in notebooks only).
+    checkpoint : file written whole after each level; what it holds is not computed again, also with more levels above.
 
     Returns
     -------
@@ -128,7 +133,8 @@ def backbone(
 
     Raises
     ------
-    ValueError : loads of more than one frequency, levels that do not ascend, an empty span; no phase resonance in it.
+    ValueError : loads of more than one frequency, levels that do not ascend, an empty span; no phase resonance in it;
+        the checkpoint of another study.
     solvers.OrbitError : no periodic motion to begin with.
 
     Notes
@@ -160,7 +166,10 @@ def backbone(
     place = observed(model) if z is None else z
     model.phi(place)  # a place that does not exist is refused
     family = Family(model, path_of(model.scene, level), 1)
-    search = _Search(family, path_of(model.scene, parameter), (float(span[0]), float(span[1])), place)
+    along, ends = path_of(model.scene, parameter), (float(span[0]), float(span[1]))
+    asked = {"level": family.name, "parameter": along, "span": ends, "z": place}
+    kept = Checkpoint(checkpoint, lambda: study_identity(model, study="backbone", **asked))
+    search = _Search(family, along, ends, place, kept)
     with counting(progress, given, unit=" levels") as bar:
         found = [search.at(float(value)) for value in bar]
     unit = parameter_unit(search.levels.name, model.scene)
@@ -182,19 +191,31 @@ class _Search:
     parameter: str
     span: tuple[float, float]
     z: Any
+    kept: Checkpoint
+    passed: list[float] = field(default_factory=list)
     last: Resonance | None = None
 
     def at(self, level: float) -> Resonance:
-        """At one level; from the last one if there is one, else along the whole span."""
-        curve = ResponseCurve(Family(self.levels.at(level), self.parameter, 1), self.z)
+        """At one level, the next above those passed, on which it depends; computed unless it is kept."""
+        self.passed.append(level)
+        key, along = repr(self.passed), Family(self.levels.at(level), self.parameter, 1)
+        if key in self.kept.values:
+            self.last = restored(Resonance, self.kept.values[key], along, "omega")
+        else:
+            self.last = self._found(level, along)
+            self.kept.add(key, arrays_of(self.last))
+        return self.last
+
+    def _found(self, level: float, along: Family) -> Resonance:
+        """From the last one if there is one, else along the whole span."""
+        curve = ResponseCurve(along, self.z)
         one = None if self.last is None else self.followed(curve, self.last)
         one = one or self.searched(curve, level)
         f = tone(one.orbit.model)
         Q = first_harmonic(one.orbit, one.at)
         energy, size = -math.pi * float((f @ Q).imag), float(np.linalg.norm(Q))
         zeta = energy / (2.0 * math.pi * (one.at * size) ** 2)
-        self.last = Resonance(level, one.at, zeta, one.amplitude, energy, bool(one.orbit.stable), one.orbit)
-        return self.last
+        return Resonance(level, one.at, zeta, one.amplitude, energy, bool(one.orbit.stable), one.orbit)
 
     def followed(self, curve: ResponseCurve, last: Resonance) -> Seen | None:
         """By secants from the last level; None where they lead away."""

@@ -8,7 +8,9 @@ other side the motion no longer jumps.
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
+from itertools import count
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,6 +21,7 @@ from fembeam.model import Branch, Orbit, observed
 from fembeam.model.branch import Family
 from fembeam.plot.axis_names import axis_name, parameter_unit
 from fembeam.scene import called, path_of, turns_at, value_of
+from fembeam.study.execution.checkpoint import Checkpoint, study_identity
 from fembeam.study.result import Result, with_units
 from fembeam.support import Part, by_rows, counting, is_finite, is_whole, require
 from solvers.branches import fold_curve
@@ -87,7 +90,13 @@ class Fold(Result):
 
 
 def fold(
-    branch: Branch, over: str, span: tuple[float, float], number: int = 0, z: Any = None, progress: bool = False
+    branch: Branch,
+    over: str,
+    span: tuple[float, float],
+    number: int = 0,
+    z: Any = None,
+    progress: bool = False,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> Fold:
     """Follow a fold of a branch along a second number of its scene, both ways.
 
@@ -101,6 +110,7 @@ def fold(
     number : which of the folds of the branch, from 0.
     z : m, or (place, direction), of the displacement u; None: the first stop or element, else the tip.
     progress : show a bar of the folds found (on terminals and in notebooks only).
+    checkpoint : file written whole after each fold; what it holds is not computed again.
 
     Returns
     -------
@@ -108,7 +118,7 @@ def fold(
 
     Raises
     ------
-    ValueError : no such fold, an unknown path, a span without the present value.
+    ValueError : no such fold, an unknown path, a span without the present value, the checkpoint of another study.
     solvers.OrbitError : there is no fold to rounding.
 
     Notes
@@ -147,9 +157,15 @@ def fold(
     model.phi(z)  # a place that does not exist is refused
     families = _Families(Family(model, path, branch.family.period), name)
     low, high = branch.found.walks[0].span
-    ends = float(span[0]), float(span[1])
+    ends, start = (float(span[0]), float(span[1])), known[number].found
+    asked = {"parameter": name, "over": path, "span": ends, "width": high - low}
+    begun = start.parameter, start.phase, start.period, start.whole, start.method
+    kept = Checkpoint(checkpoint, lambda: study_identity(model, study="fold", **asked, fold=begun))
+    answers = [kept.values[str(i)] for i in range(len(kept.values))]
+    keys = map(str, count(len(answers)))
     with counting(progress, unit=" folds") as bar:
-        found = fold_curve(families, known[number].found, present, ends, high - low, seen=bar.update)
+        found = fold_curve(families, start, present, ends, high - low, seen=bar.update, known=answers,
+                           keep=lambda one: kept.add(next(keys), one))  # fmt: skip
     orbits = tuple(
         Orbit(families.at(value).at(one.parameter), one, branch.family.period)
         for value, one in zip(found.values.tolist(), found.orbits, strict=True)

@@ -11,6 +11,7 @@ peaks.
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -25,8 +26,9 @@ from fembeam.model.branch import Family
 from fembeam.model.sensitivity import of_amplitude
 from fembeam.plot.axis_names import axis_name, parameter_unit
 from fembeam.scene import Scene, called, path_of, turns_at, with_value
+from fembeam.study.execution.checkpoint import Checkpoint, study_identity
 from fembeam.study.measure import require_model
-from fembeam.study.response_curve import ResponseCurve, Seen
+from fembeam.study.response_curve import ResponseCurve, Seen, arrays_of, restored
 from fembeam.study.result import Result, column, with_units
 from fembeam.support import Part, counting, is_finite, numbers, require
 
@@ -120,6 +122,7 @@ def peak(
     span: tuple[float, float] = (0.0, 0.0),
     z: Any = None,
     progress: bool = False,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> Peak:
     """The largest amplitude along one number of the scene, over another one: height, place, and where it is least.
 
@@ -132,6 +135,8 @@ def peak(
     values : (k,) of p, ascending, two or more.
     span : (lowest, highest) ω, with the peak inside it for every value.
     z : m, or (place, direction), of the displacement u; None: the first stop or element, else the tip.
+    progress : show a bar (on terminals and in notebooks only).
+    checkpoint : file written whole after each peak; what it holds is not computed again, also of other values.
 
     Returns
     -------
@@ -139,7 +144,8 @@ def peak(
 
     Raises
     ------
-    ValueError : unknown paths, values that do not ascend, an empty span, a peak at an end of the span.
+    ValueError : unknown paths, values that do not ascend, an empty span, a peak at an end of the span, the checkpoint
+        of another study.
     solvers.OrbitError : no periodic motion to begin with.
 
     Notes
@@ -165,7 +171,7 @@ def peak(
     """
     require_model(model, "peak")
     p = check_peak(model.scene, parameter, over, values, span)
-    search = _Search(model, path_of(model.scene, parameter), path_of(model.scene, over), z, span)
+    search = _Search(model, path_of(model.scene, parameter), path_of(model.scene, over), z, span, checkpoint)
     with counting(progress, p, unit=" values") as bar:
         tops = [search.top(float(value)) for value in bar]
     titles = axis_name(search.over, model.scene), axis_name(search.parameter, model.scene)
@@ -194,15 +200,28 @@ def check_peak(
 class _Search:
     """Where peaks are looked for."""
 
-    def __init__(self, model: Model, parameter: str, over: str, z: Any, span: tuple[float, float]) -> None:
+    def __init__(
+        self, model: Model, parameter: str, over: str, z: Any, span: tuple[float, float], checkpoint: Any
+    ) -> None:
         self.parameter, self.over, self.span = parameter, over, span
         self.z = observed(model) if z is None else z
         model.phi(self.z)  # a place that does not exist is refused
         self.models = Family(model, over, 1)
+        asked = {"parameter": parameter, "over": over, "span": tuple(map(float, span)), "z": self.z}
+        self.kept = Checkpoint(checkpoint, lambda: study_identity(model, study="peak", **asked))
 
     def top(self, value: float) -> Top:
-        """The peak at one value of p."""
-        curve = ResponseCurve(Family(self.models.at(value), self.parameter, 1), self.z)
+        """The peak at one value of p, computed unless it is kept."""
+        along = Family(self.models.at(value), self.parameter, 1)
+        if repr(value) in self.kept.values:
+            return restored(Top, self.kept.values[repr(value)], along, "at")
+        found = self._searched(value, along)
+        self.kept.add(repr(value), arrays_of(found))
+        return found
+
+    def _searched(self, value: float, along: Family) -> Top:
+        """The peak along one response curve."""
+        curve = ResponseCurve(along, self.z)
         low, high = curve.around_largest(*self.span)
         if low == high:
             raise ValueError(

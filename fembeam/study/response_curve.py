@@ -2,19 +2,37 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 import solvers
 from fembeam.model import Orbit
 from fembeam.model.branch import Family
+from fembeam.study.execution.checkpoint import Values
+from solvers.branches import recorded_orbit, restarted_orbit
 
 STEPS, CHANGE = 16, 0.3  # of a sweep: fewest, and the change of the amplitude in one
+Found = TypeVar("Found")
 SAME = 0.8  # of the change in a step: as large in half of it, it is a jump
 ARC = 0.2  # largest step of a branch, see `Model.branch`
+
+
+def arrays_of(found: Any) -> Values:
+    """A point found on a curve, numbers and its ``orbit``, as a checkpoint keeps it."""
+    text = json.dumps(recorded_orbit(found.orbit.found))
+    return {name: np.array(text if name == "orbit" else value) for name, value in vars(found).items()}
+
+
+def restored(kind: type[Found], arrays: Values, family: Family, at: str) -> Found:
+    """The point that a checkpoint kept; ``at`` is the name of its place along the family."""
+    numbers = {name: value.item() for name, value in arrays.items()}
+    system, period = family(numbers[at])
+    orbit = Orbit(family.at(numbers[at]), restarted_orbit(system, period, json.loads(numbers["orbit"])), family.period)
+    return kind(**numbers | {"orbit": orbit})
 
 
 @dataclass(frozen=True)

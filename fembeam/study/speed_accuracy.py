@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import MISSING, dataclass, field, fields
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 import solvers
 from fembeam import plot
 from fembeam.model import Model, Run, places
+from fembeam.study.execution.checkpoint import Checkpoint, digested, study_identity
 from fembeam.study.measure import require_model
 from fembeam.study.result import Result
 from fembeam.support import Part, counting, require, require_positive
@@ -162,6 +164,7 @@ def speed_accuracy(
     agreement: float = 1e-6,
     rounds: int = 5,
     progress: bool = False,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> SpeedAccuracy:
     """Error against time for methods and models, all timed by turns in one process.
 
@@ -181,6 +184,8 @@ def speed_accuracy(
         horizons, where runs differ, as much as their scatter.
     rounds : how often each run is timed; the fastest counts. Slow settings run fewer, very slow ones fewer starts.
     progress : show a bar (on terminals and in notebooks only).
+    checkpoint : file written whole after each run of a reference; what it holds is not computed again. Times are taken
+        anew, as only those of one process can be compared.
 
     Returns
     -------
@@ -188,7 +193,8 @@ def speed_accuracy(
 
     Raises
     ------
-    NoReferenceError when the references differ by more than ``agreement``. ValueError for bad input, before computing.
+    NoReferenceError when the references differ by more than ``agreement``. ValueError for bad input, before computing,
+    and for the checkpoint of another study.
 
     Examples
     --------
@@ -214,7 +220,8 @@ def speed_accuracy(
     require_positive("duration", duration, "speed_accuracy", "give s")
     states = _starts(models[0], starts, duration)
     ask = _Question(duration, dt, quantity)
-    truths, floor, unit = _references(models, states, ask, agreement)
+    kept = Checkpoint(checkpoint, lambda: _identity(models, states, ask))
+    truths, floor, unit = _references(models, states, ask, agreement, kept)
     trials = [_Trial(each, method) for each in models for method in methods]
     _measure(trials, states, ask, rounds, progress)
     sizes = [len(each.omega) for each in models]
@@ -334,12 +341,27 @@ def _padded(state: Vector, modes: int) -> Vector:
     return np.concatenate((q, rest, q_dot, rest))
 
 
-def _references(models: list[Model], states: Vector, ask: _Question, agreement: float) -> tuple[dict, dict, float]:
+def _identity(models: list[Model], states: Vector, ask: _Question) -> dict[str, str]:
+    """What the references depend on, as texts that can be compared."""
+    told = digested([(m.scene, m.modes, m.omega) for m in models], "models", repr([m.modes for m in models]))
+    return study_identity(models[-1], study="speed_accuracy", starts=states, **vars(ask)) | {"models": told}
+
+
+def _references(
+    models: list[Model], states: Vector, ask: _Question, agreement: float, kept: Checkpoint
+) -> tuple[dict, dict, float]:
     """{modes: values per start}, {modes: disagreement}, and the quantity's size."""
+
+    def value(model: Model, start: int, method: Any) -> Vector:
+        key = f"{len(model.omega)} modes, {method!r}, start {start}"
+        if key not in kept.values:
+            kept.add(key, {"value": ask.value(ask.run(model, states[start], method))})
+        return kept.values[key]["value"]
+
     pairs = {}
     for model in models:
         two = solvers.Exponential(1e-12, ledger=False), solvers.DormandPrince(1e-12)
-        pairs[len(model.omega)] = [[ask.value(ask.run(model, state, m)) for state in states] for m in two]
+        pairs[len(model.omega)] = [[value(model, start, m) for start in range(len(states))] for m in two]
     sizes = [np.linalg.norm(value) for value in pairs[len(models[-1].omega)][0]]
     unit = float(np.sqrt(np.mean(np.square(sizes)))) or 1.0
     floor = {n: float(_distances(pair[0], pair[1], unit).max()) for n, pair in pairs.items()}

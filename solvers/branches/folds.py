@@ -11,7 +11,7 @@ a cusp. See Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -30,6 +30,7 @@ SHARP = 1e-9  # arc length to which a cusp is located
 SAME = 1e-6  # distance from its first point at which a curve has come back to it
 ROUND = "closed: came back to its first fold"
 POINTS = 400  # at most, in one direction
+Record = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +68,8 @@ class _Equations:
     method: Any
     fractions: tuple[float, ...]
     widths: tuple[float, float]
+    known: list[Record] = field(default_factory=list)
+    keep: Callable[[Record], Any] = lambda record: None
     shape: tuple[int, ...] = ()
     last: tuple[Any, tuple[PeriodicProblem, PeriodicProblem]] | None = None
     lift: Array = field(default_factory=lambda: np.eye(0))  # states -> units of the motion
@@ -114,7 +117,30 @@ class _Equations:
         return float(v[-1]), change, (_unit(w[:size]), _unit(v[:size]))
 
     def solved(self, guess: Array, row: Array, borders: tuple[Array, Array], along: Array) -> _Point:
-        """The fold near a guess, on the plane through it at right angles to ``row``; raises OrbitError."""
+        """The fold near a guess, on the plane through it at right angles to ``row``; raises OrbitError.
+
+        The same calls have had the answers that are known, in the same order.
+        """
+        if self.known:
+            return self._again(self.known.pop(0))
+        none = {"y": np.nan * guess, "tangent": np.nan * guess, "borders": np.nan * np.array(borders)}
+        try:
+            one = self._searched(guess, row, borders, along)
+        except NO_ORBIT as error:
+            self.keep(none | {"refused": np.array(str(error))})
+            raise
+        self.keep({name: np.array(getattr(one, name)) for name in none} | {"refused": np.array("")})
+        return one
+
+    def _again(self, record: Record) -> _Point:
+        """An answer that is known: its period is integrated again, which gives the same bits."""
+        if refused := str(record["refused"]):
+            raise OrbitError(refused)
+        chain, problem, *_ = self.at(record["y"])
+        return _Point(record["y"], chain, problem, record["tangent"], tuple(record["borders"]))
+
+    def _searched(self, guess: Array, row: Array, borders: tuple[Array, Array], along: Array) -> _Point:
+        """By Newton's method."""
         y = guess
         for _ in range(MOST):
             chain, problem, residual, jacobian = self.at(y)
@@ -137,6 +163,8 @@ def fold_curve(
     width: float,
     step: float = LONGEST,
     seen: Callable[[], Any] = lambda: None,
+    known: Sequence[Record] = (),
+    keep: Callable[[Record], Any] = lambda record: None,
 ) -> FoldCurve:
     """Follow a fold of a branch along a second parameter, both ways.
 
@@ -148,6 +176,8 @@ def fold_curve(
     width : of the first parameter, to measure the curve with, such as the span of the branch.
     step : largest one, in units of both widths and of the motion.
     seen : called after each point.
+    keep : called with each answer to an equation on the way, arrays of the same shapes. known : those of an earlier
+        call in their order, from which the curve goes on to the same bits.
 
     Returns
     -------
@@ -186,7 +216,7 @@ def fold_curve(
     if not low <= second <= high or not low < high:
         raise ValueError(f"span must be two values, ascending, about the present one, {second!r}, got {span!r}")
     fraction = fold.phase / fold.period
-    equations = _Equations(make, fold.method, (fraction,), (width, high - low))
+    equations = _Equations(make, fold.method, (fraction,), (width, high - low), list(known), keep)
     y = equations.measured_by(fold.whole[None], (fold.parameter, second))
     u, _, v = np.linalg.svd(equations.at(y)[3][:, :-2])
     up = np.append(np.zeros(len(y) - 1), 1.0)

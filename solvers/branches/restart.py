@@ -15,7 +15,7 @@ from solvers.branches.continuation import Branch
 from solvers.branches.point import Point
 from solvers.branches.walk import BranchStatus, Walk
 from solvers.exponential.method import Exponential
-from solvers.orbits import Chain, Orbit, PeriodicProblem, orbit_of
+from solvers.orbits import Chain, Orbit, PeriodicProblem, constant, orbit_of
 from solvers.problem import System
 
 Make = Callable[[float], tuple[System, float]]
@@ -70,6 +70,17 @@ def _shots_of(orbit: Orbit) -> dict[str, Any]:
     """When its shots began, and their states."""
     assert orbit.shots is not None
     return {"fractions": list(orbit.shots[0]), "x": orbit.shots[1].tolist()}
+
+
+def recorded_orbit(orbit: Orbit) -> dict[str, Any]:
+    """An orbit by `Exponential` as numbers, lists and text."""
+    return _of_orbit(orbit) | {"doubt": orbit.doubt, "method": asdict(orbit.method), "shots": _shots_of(orbit)}
+
+
+def restarted_orbit(system: System, period: float, record: dict[str, Any]) -> Orbit:
+    """An orbit of a system restored from what `recorded_orbit` made of it."""
+    again = _orbit(record | {"parameter": 0.0}, constant(system, period, Exponential(**record["method"])))
+    return replace(again, parameter=record["parameter"], doubt=record["doubt"])
 
 
 def restarted(make_system: Make, walks: list[dict[str, Any]]) -> Branch:

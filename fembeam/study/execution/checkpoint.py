@@ -107,6 +107,11 @@ def model_identity(model: Model) -> dict[str, str]:
     }
 
 
+def study_identity(model: Model, **asked: Any) -> dict[str, str]:
+    """The same of a model and of what a study was asked, by name."""
+    return model_identity(model) | {name: digested(value, name) for name, value in asked.items()}
+
+
 def scene_identity(scene: Scene | Callable[..., Scene]) -> dict[str, str]:
     """All that a scene, or a function that makes scenes, consists of, and fembeam's version, as `identity` has them."""
     from fembeam import __version__
