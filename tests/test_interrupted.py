@@ -3,6 +3,7 @@
 import os
 import signal
 import time
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from threading import Timer
@@ -233,6 +234,36 @@ def test_a_curve_stopped_within_a_run_keeps_what_was_found(name, calls, interrup
         call(checkpoint=path)
     assert path.exists()
     np.testing.assert_equal(all_of(call(checkpoint=path)), all_of(call()))
+
+
+def test_two_that_keep_values_in_one_file_keep_all(tmp_path):
+    """The last to write left its own alone; another study's file that has come meanwhile is not overwritten."""
+    path = tmp_path / "kept.npz"
+    a, b = Checkpoint(path), Checkpoint(path)
+    for key in range(4):
+        (a, b)[key % 2].add(str(key), {"x": np.array(float(key))})
+    kept = Checkpoint(path).values
+    assert {key: float(one["x"]) for key, one in kept.items()} == {str(key): float(key) for key in range(4)}
+    other = Checkpoint(tmp_path / "other.npz", lambda: {"study": "another"})
+    os.replace(path, other.path)
+    with pytest.raises(ValueError, match="belongs to another study: study"):
+        other.add("4", {"x": np.array(4.0)})
+    assert len(Checkpoint(other.path).values) == 4
+
+
+def kept_by(path, first):
+    kept = Checkpoint(path)
+    for key in range(first, first + 20):
+        kept.add(str(key), {"x": np.array(float(key))})
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs locks of files")
+def test_processes_that_write_one_checkpoint_at_the_same_time_keep_all(tmp_path):
+    path = tmp_path / "kept.npz"
+    with ProcessPoolExecutor(3) as pool:
+        list(pool.map(partial(kept_by, path), (0, 20, 40)))
+    assert {*Checkpoint(path).values} == {*map(str, range(60))}
+    assert [one.name for one in tmp_path.iterdir()] == ["kept.npz"]
 
 
 def test_a_file_that_has_its_name_stays_when_ctrl_c_comes_then(tmp_path, monkeypatch):

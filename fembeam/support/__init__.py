@@ -32,7 +32,7 @@ from fembeam.support.checks import (
     tuples,
     vector,
 )
-from fembeam.support.files import DRAFT, file_path, read_with, write_rows, written_beside, written_whole
+from fembeam.support.files import DRAFT, file_path, one_at_a_time, read_with, write_rows, written_beside, written_whole
 from fembeam.support.notes import note, warn
 from fembeam.support.printed import Part, Printed, html_table
 from fembeam.support.progress import bar, counting, titled

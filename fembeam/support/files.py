@@ -7,7 +7,7 @@ import io
 import os
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from errno import ENOENT
 from pathlib import Path
 from typing import Any
@@ -66,6 +66,23 @@ def written_whole(target: Path) -> Iterator[Any]:
         if isinstance(error, OSError) and error.errno and error.filename is None:  # a full disk names no file
             raise OSError(error.errno, error.strerror, str(target)) from error
         raise
+
+
+@contextmanager
+def one_at_a_time(folder: Path) -> Iterator[None]:
+    """Wait until no other process is here for this folder; where there are no such locks, as on Windows, do not."""
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    with ExitStack() as at_end:
+        with suppress(OSError):  # some network disks have none
+            handle = os.open(folder, os.O_RDONLY)
+            at_end.callback(os.close, handle)
+            fcntl.flock(handle, fcntl.LOCK_EX)
+            at_end.callback(fcntl.flock, handle, fcntl.LOCK_UN)  # a process forked meanwhile has the handle too
+        yield
 
 
 @contextmanager

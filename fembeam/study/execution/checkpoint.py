@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from functools import partial
 from pathlib import Path
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from fembeam.model import Model
 from fembeam.scene import Scene
 from fembeam.study.realisations import renewed
-from fembeam.support import changes, require, written_whole
+from fembeam.support import changes, one_at_a_time, require, written_whole
 from fembeam.support.fingerprint import fingerprint
 
 FORMAT = 2
@@ -26,6 +26,8 @@ Values = dict[str, NDArray[Any]]
 
 class Checkpoint:
     """Values by seed, kept in memory and, with a path, in a file.
+
+    Several processes may keep values of one study in one file: each adds to it what the others have kept.
 
     Parameters
     ----------
@@ -40,19 +42,35 @@ class Checkpoint:
         self.path = None if path is None else Path(path)
         self.about = {} if path is None else about()
         self.values: dict[str, Values] = {}
-        if self.path is not None and self.path.exists():
-            self.values = self._read(self.path)
-        elif self.path is not None and not self.path.parent.is_dir():
+        self.seen: tuple[int, ...] = ()
+        if self.path is None:
+            return
+        if not self.path.parent.is_dir():
             raise ValueError(f"checkpoint: the folder {self.path.parent} does not exist; make it first")
+        self._take(self.path)
 
     def add(self, key: str, values: Values) -> None:
         """Keep the values of one more seed."""
         self.values[key] = values
         if self.path is None:
             return
+        with one_at_a_time(self.path.parent):
+            self._take(self.path)
+            self._write(self.path, values)
+            self.seen = _state_of(self.path)
+
+    def _take(self, path: Path) -> None:
+        """Take over what the file holds, if it is not as this one has seen it last."""
+        state = _state_of(path)
+        if state not in ((), self.seen):
+            self.values = self._read(path) | self.values
+        self.seen = state
+
+    def _write(self, path: Path, values: Iterable[str]) -> None:
+        """All values, whose names are given."""
         about = {"format": FORMAT, "about": self.about, "seeds": list(self.values), "values": list(values)}
         stacked = {f"value {name}": np.stack([v[name] for v in self.values.values()]) for name in values}
-        with written_whole(self.path) as file:
+        with written_whole(path) as file:
             np.savez(file, header=json.dumps(about), **stacked)  # type: ignore[arg-type]
 
     def _read(self, path: Path) -> dict[str, Values]:
@@ -82,6 +100,15 @@ class Checkpoint:
             said = [one for one, seen in pairs if seen] or [one for one, _ in pairs]
             raise ValueError(f"checkpoint {path} belongs to another study: {'; '.join(said)}; set it back, "
                              "delete the file to begin anew, or choose another place")  # fmt: skip
+
+
+def _state_of(path: Path) -> tuple[int, ...]:
+    """What changes when a file is written; empty when there is none."""
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        return ()
+    return found.st_ino, found.st_mtime_ns, found.st_size
 
 
 def identity(model: Model, quantity: Callable[..., Any]) -> dict[str, str]:
