@@ -111,13 +111,32 @@ def test_a_killed_branch_goes_on_from_its_file_as_if_it_had_not_been(tmp_path, m
 
     monkeypatch.setattr(of_branch.Branch, "save", saved)
     DRIVEN.branch("omega", (145.0, 155.0)).run(checkpoint=path)
-    assert len(kept) == len(whole.orbits) + 1
+    assert len(kept) == len(whole.orbits) + 2
     for content in kept[:: len(kept) // 3]:
         path.write_bytes(content)
         resumed = DRIVEN.resume(path).run()
         np.testing.assert_array_equal(resumed.parameter, whole.parameter)
         np.testing.assert_array_equal([one.state for one in resumed.orbits], [one.state for one in whole.orbits])
         assert [one.mark for one in resumed.orbits] == [one.mark for one in whole.orbits]
+
+
+@pytest.mark.parametrize(
+    ("path", "message"),
+    [
+        (3, "path must be text or a pathlib.Path, got 3 in Branch.run"),
+        ("nowhere/branch.npz", "no such folder to write branch.npz to; make it first: 'nowhere'"),
+        (".", "a folder is there; give the name of a file: '.'"),
+    ],
+)
+def test_a_branch_that_cannot_be_kept_is_refused_before_it_is_computed(path, message):
+    """All of it was computed, and then lost."""
+    branch = DRIVEN.branch("omega", (145.0, 155.0))
+    with pytest.raises((ValueError, OSError), match=message):
+        branch.run(checkpoint=path)
+    assert len(branch.orbits) == 1
+    if path == 3:
+        with pytest.raises(ValueError, match=r"got 3 in Model\.resume"):
+            DRIVEN.resume(path)
 
 
 def test_a_branch_that_fails_is_kept(tmp_path, monkeypatch):
@@ -234,6 +253,21 @@ def test_a_curve_stopped_within_a_run_keeps_what_was_found(name, calls, interrup
         call(checkpoint=path)
     assert path.exists()
     np.testing.assert_equal(all_of(call(checkpoint=path)), all_of(call()))
+
+
+def test_what_is_no_checkpoint_need_not_be_deleted(tmp_path):
+    """The advice for a folder, and for a run that was saved, was to delete it."""
+    with pytest.raises(ValueError, match=r"checkpoint must be the path of a file, got .* in study"):
+        CURVES["peak"](checkpoint=tmp_path)
+    with pytest.raises(ValueError, match="checkpoint must be the path of a file, got '' in study"):
+        CURVES["peak"](checkpoint="")
+    run = MODEL.simulate(0.01, 1e-3).save(tmp_path / "run.npz")
+    with pytest.raises(ValueError, match=r"run.npz is not a checkpoint, .*; delete it to begin anew, or choose"):
+        CURVES["peak"](checkpoint=run)
+    kept = tmp_path / "kept.npz"
+    Checkpoint(kept).add("0", {"x": np.array(0.0)})
+    with pytest.raises(ValueError, match=r"kept.npz is not a saved run, .* it holds header, value x; give a file"):
+        fb.load(kept)
 
 
 def test_two_that_keep_values_in_one_file_keep_all(tmp_path):

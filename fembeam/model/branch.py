@@ -122,8 +122,11 @@ class Branch(Printed):
     def run(self, progress: bool = False, checkpoint: str | Path | None = None) -> Branch:
         """Compute all of it; after Ctrl-C the orbits found are kept, and another call continues.
 
-        With checkpoint that file is written as by `save`, every `EVERY` seconds and at the end, whatever ends it.
+        With checkpoint that file is written as by `save`, at once if there is none, every `EVERY` seconds, and at the
+        end, whatever ends it.
         """
+        if checkpoint is not None and not file_path(checkpoint, "Branch.run").is_file():
+            self.save(checkpoint)  # what cannot be written is refused before it is computed
         try:
             with counting(progress, self.found, unit=" orbits") as bar:
                 saved = monotonic()
@@ -270,7 +273,7 @@ def _checked_span(span: Any) -> tuple[float, float]:
 
 def resumed(model: Model, path: str | Path) -> Branch:
     """A saved branch of this model, to be continued."""
-    record = _record_of(path)
+    record = _record_of(file_path(path, "Model.resume"))
     differing = [
         changes(record["scene"], repr(model.scene)),
         changes(repr(tuple(record["modes"])), repr(tuple(model.modes)), "modes"),
@@ -295,7 +298,7 @@ def _digest(model: Model) -> str:
     return ""
 
 
-def _record_of(path: str | Path) -> dict[str, Any]:
+def _record_of(path: Path) -> dict[str, Any]:
     """What a saved branch knows; ValueError for another file, or a damaged one."""
     advice = "give what Branch.save wrote"
     try:

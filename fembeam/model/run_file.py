@@ -236,6 +236,8 @@ def _known(
     headers: dict[str, tuple[tuple[int, ...], Any]], read: Callable[[str], Any]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """The words, and what a run is read from: types and shapes are checked before any array is read, others never."""
+    if "about" not in headers:
+        raise ValueError(f"it holds {', '.join(sorted(headers)) or 'nothing'}; give a file of Run.save")
     if headers["about"][1].itemsize > MOST_WORDS:
         raise ValueError("its words are too long")
     about = json.loads(str(read("about")))

@@ -8,7 +8,7 @@ import os
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from errno import ENOENT
+from errno import EISDIR, ENOENT
 from pathlib import Path
 from typing import Any
 
@@ -48,9 +48,11 @@ def file_path(given: Any, where: str) -> Path:
 
 @contextmanager
 def written_whole(target: Path) -> Iterator[Any]:
-    """A binary file that appears under its name only once it is complete; FileNotFoundError without its folder."""
+    """A binary file that appears under its name only once complete; OSError without its folder, or for a folder."""
     if not target.parent.is_dir():
         raise FileNotFoundError(ENOENT, f"no such folder to write {target.name} to; make it first", str(target.parent))
+    if target.is_dir():
+        raise IsADirectoryError(EISDIR, "a folder is there; give the name of a file", str(target))
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=DRAFT)
     try:
         with os.fdopen(handle, "w+b") as file:

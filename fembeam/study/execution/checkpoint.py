@@ -37,7 +37,7 @@ class Checkpoint:
     """
 
     def __init__(self, path: str | os.PathLike[str] | None, about: Callable[[], dict[str, str]] = dict) -> None:
-        right = isinstance(path, (str, os.PathLike, type(None)))
+        right = path is None or (isinstance(path, (str, os.PathLike)) and path != "" and not Path(path).is_dir())
         require(right, "checkpoint must be the path of a file", path, "study", 'e.g. "kept.npz"')
         self.path = None if path is None else Path(path)
         self.about = {} if path is None else about()
@@ -84,7 +84,8 @@ class Checkpoint:
             seeds = {key: {name: c[i] for name, c in columns.items()} for i, key in enumerate(header["seeds"])}
             known = header["format"], header["about"]
         except Exception as error:
-            raise ValueError(f"{path} is not a checkpoint, or is damaged: {error}; delete it to begin anew") from error
+            raise ValueError(f"{path} is not a checkpoint, or is damaged: {error}; delete it to begin anew, or choose "
+                             "another place") from error  # fmt: skip
         if known[0] != FORMAT:
             raise ValueError(f"checkpoint {path} has format {known[0]}, this version reads {FORMAT}; delete it")
         self._compare(path, known[1])
@@ -170,7 +171,7 @@ def _deciding(text: str | None) -> str | None:
 def _difference(name: str, theirs: str | None, ours: str | None) -> tuple[str, bool]:
     """What differs, and whether its text shows it."""
     readable = [None if text is None else text.partition(" #")[0] for text in (theirs, ours)]
-    said = changes(readable[0] or "not there", readable[1] or "not there", name)
+    said = changes(readable[0] or "nothing", readable[1] or "nothing", name)
     unseen = f"{name} {_short(readable[1])} has other code, or reads other values, than there"
     return said or unseen, bool(said)
 
