@@ -20,7 +20,7 @@ from fembeam.scene_file import study_tables
 from fembeam.study import backbone, ensemble, fold, peak, speed_accuracy, stationary, vary
 from fembeam.study.execution import executors
 from fembeam.study.execution.checkpoint import Checkpoint
-from fembeam.support import written_whole
+from fembeam.support import written_beside, written_whole
 from solvers.exponential.method import Engine as Engine
 
 SCENE = paper_scene(fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1), 0.02, Hertz(2.1e8), masses=())
@@ -312,6 +312,23 @@ def test_a_file_that_has_its_name_stays_when_ctrl_c_comes_then(tmp_path, monkeyp
     with pytest.raises(KeyboardInterrupt), written_whole(tmp_path / "kept.npz") as file:
         file.write(b"all")
     assert [(one.name, one.read_bytes()) for one in tmp_path.iterdir()] == [("kept.npz", b"all")]
+
+
+@pytest.mark.parametrize("writing", [written_whole, written_beside])
+def test_what_cannot_be_written_is_named(writing, tmp_path):
+    """A full disk was said of no file where others' code writes, a folder that is read only of the draft."""
+    path = tmp_path / "kept.vtu"
+    with pytest.raises(OSError, match=r"No space left on device: '.*kept\.vtu'"), writing(path):
+        raise OSError(28, "No space left on device")
+    with pytest.raises(PermissionError, match=r"Permission denied: '.*kept\.vtu'"), writing(path):
+        raise PermissionError(13, "Permission denied", str(tmp_path / ".kept.vtu.a1b2.part"))
+    assert not [*tmp_path.iterdir()]
+
+
+def test_a_checkpoint_that_cannot_be_written_is_refused_before_it_is_computed(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    with pytest.raises(ValueError, match=r"checkpoint: the folder .* cannot be written to; choose another place"):
+        CURVES["peak"](checkpoint=tmp_path / "kept.npz")
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")

@@ -53,19 +53,29 @@ def written_whole(target: Path) -> Iterator[Any]:
         raise FileNotFoundError(ENOENT, f"no such folder to write {target.name} to; make it first", str(target.parent))
     if target.is_dir():
         raise IsADirectoryError(EISDIR, "a folder is there; give the name of a file", str(target))
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=DRAFT)
+    with _named(target):
+        handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=DRAFT)
+        try:
+            with os.fdopen(handle, "w+b") as file:
+                yield file
+                file.flush()
+                os.fsync(handle)  # else a loss of power may leave the new name with nothing in it
+            mask = os.umask(0)  # mkstemp makes private files; results are for the user's group too
+            os.umask(mask)
+            os.chmod(name, 0o666 & ~mask)
+            os.replace(name, target)
+        except BaseException:
+            Path(name).unlink(missing_ok=True)  # Ctrl-C comes after the file has its name, too
+            raise
+
+
+@contextmanager
+def _named(target: Path) -> Iterator[None]:
+    """Errors name the file to be written: a full disk names none, a folder that is read only the draft."""
     try:
-        with os.fdopen(handle, "w+b") as file:
-            yield file
-            file.flush()
-            os.fsync(handle)  # else a loss of power may leave the new name with nothing in it
-        mask = os.umask(0)  # mkstemp makes private files; results are for the user's group too
-        os.umask(mask)
-        os.chmod(name, 0o666 & ~mask)
-        os.replace(name, target)
-    except BaseException as error:
-        Path(name).unlink(missing_ok=True)  # Ctrl-C comes after the file has its name, too
-        if isinstance(error, OSError) and error.errno and error.filename is None:  # a full disk names no file
+        yield
+    except OSError as error:
+        if error.errno and (error.filename is None or f".{target.name}." in str(error.filename)):
             raise OSError(error.errno, error.strerror, str(target)) from error
         raise
 
@@ -90,7 +100,7 @@ def one_at_a_time(folder: Path) -> Iterator[None]:
 @contextmanager
 def written_beside(target: Path) -> Iterator[str]:
     """Where others' code writes a file, alone or with more: they get their names once complete, the target last."""
-    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
+    with _named(target), tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
         yield os.path.join(folder, target.name)
         for name in sorted(os.listdir(folder), key=target.name.__eq__):
             os.replace(os.path.join(folder, name), target.with_name(name))

@@ -47,6 +47,8 @@ class Checkpoint:
             return
         if not self.path.parent.is_dir():
             raise ValueError(f"checkpoint: the folder {self.path.parent} does not exist; make it first")
+        if not (self.path.exists() or os.access(self.path.parent, os.W_OK)):
+            raise ValueError(f"checkpoint: the folder {self.path.parent} cannot be written to; choose another place")
         self._take(self.path)
 
     def add(self, key: str, values: Values) -> None:
