@@ -17,7 +17,7 @@ import solvers
 from contacts import Hertz, Jenkins, KelvinVoigt, Polynomial
 from fembeam.model import branch as of_branch
 from fembeam.scene_file import study_tables
-from fembeam.study import backbone, ensemble, fold, peak, speed_accuracy, stationary, vary
+from fembeam.study import backbone, bifurcation, ensemble, fold, peak, speed_accuracy, stationary, vary
 from fembeam.study.execution import executors
 from fembeam.study.execution.checkpoint import Checkpoint
 from fembeam.support import written_beside, written_whole
@@ -203,17 +203,20 @@ METHODS = [solvers.Exponential(1e-4), solvers.RK4(1e-5)]
 CURVES = {
     "peak": partial(peak, DAMPED, over="elements[damper].law.limit", values=[1.4, 1.8], span=(195.0, 235.0)),
     "backbone": partial(backbone, DAMPED, [0.01, 0.1, 0.8], span=(160.0, 280.0)),
+    "bifurcation": partial(bifurcation, STRUCK, "omega", [180.0, 200.0, 230.0], settle=10, keep=4),
     "fold": partial(fold, FOLDED, "forces[0].signal.amplitude", span=(0.9, 1.1)),
     "speed_accuracy": partial(speed_accuracy, STRUCK, METHODS, 2, duration=0.05, rounds=1),
 }
 OTHERS = {"peak": {"span": (180.0, 250.0)}, "backbone": {"span": (150.0, 280.0)}, "fold": {"span": (0.9, 1.2)},
-          "speed_accuracy": {"duration": 0.06}}  # fmt: skip
+          "speed_accuracy": {"duration": 0.06}, "bifurcation": {"settle": 12}}  # fmt: skip
 
 
 def all_of(found):
     """What was found, to the last bit, without what a clock tells."""
     if isinstance(found, fb.study.SpeedAccuracy):
         return found.floor, [(one.errors, one.totals, one.law_calls, one.steps) for one in found.points]
+    if isinstance(found, fb.study.Bifurcation):
+        return found.strobes, found.peaks
     points = getattr(found, "tops", None) or getattr(found, "resonances", None)
     orbits = found.orbits if points is None else [one.orbit for one in points]
     return found.plain(), [(one.found.whole, one.found.monodromy, one.found.doubt, one.parameter) for one in orbits]
@@ -245,7 +248,10 @@ def test_a_curve_goes_on_as_if_it_had_not_been_interrupted(name, every, tmp_path
         call(checkpoint=path, **OTHERS[name])
 
 
-@pytest.mark.parametrize(("name", "calls"), [("peak", 300), ("backbone", 240), ("fold", 60), ("speed_accuracy", 3)])
+CALLS = {"peak": 300, "backbone": 240, "bifurcation": 2, "fold": 60, "speed_accuracy": 3}  # of the compiled loop
+
+
+@pytest.mark.parametrize(("name", "calls"), CALLS.items())
 def test_a_curve_stopped_within_a_run_keeps_what_was_found(name, calls, interrupt, tmp_path):
     call, path = CURVES[name], tmp_path / "kept.npz"
     interrupt(calls)

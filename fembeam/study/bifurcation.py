@@ -5,6 +5,7 @@ Slow, and without the unstable motions, but independent of shooting and continua
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from fembeam.model.branch import Family
 from fembeam.plot.axis_names import axis_name, parameter_unit
 from fembeam.plot.units import motion_for
 from fembeam.scene import Place, path_of, turns_at
+from fembeam.study.execution.checkpoint import Checkpoint, Values, study_identity
 from fembeam.study.execution.executors import spread
 from fembeam.study.measure import require_model, samples_per_period
 from fembeam.study.result import Result
@@ -85,6 +87,7 @@ def bifurcation(
     keep: int = 24,
     start: ArrayLike | None = None,
     executor: Executor | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
 ) -> Bifurcation:
     """Simulate a model at each value of a parameter and keep what it settles to.
 
@@ -95,10 +98,12 @@ def bifurcation(
     settle, keep : periods of the load left out and kept.
     start : (2n,) for all of them; None is rest.
     executor : any `concurrent.futures.Executor` to spread the values over.
+    checkpoint : file written whole after each value; what it holds is not computed again, also of other values.
 
     Returns
     -------
-    Bifurcation. Raises ValueError for bad input, solvers.SolverError when a run fails.
+    Bifurcation. Raises ValueError for bad input or the checkpoint of another study, solvers.SolverError when a run
+    fails.
 
     Examples
     --------
@@ -123,13 +128,16 @@ def bifurcation(
     require(state.shape == model.rest().shape, f"start must have shape {model.rest().shape}, [q, q_dot]", state.shape,
             "bifurcation", "use model.state(displacement, velocity)")  # fmt: skip
     task = partial(_settled, Family(model, path, 1), place, settle, keep, state)
-    results = spread(task, list(values), executor, "bifurcation")
-    strobes, peaks = (np.array([result[i] for result in results]) for i in (0, 1))
+    asked = {"parameter": path, "z": place, "settle": settle, "keep": keep, "start": state}
+    kept = Checkpoint(checkpoint, lambda: study_identity(model, study="bifurcation", **asked))
+    missing = [value for value in values.tolist() if repr(value) not in kept.values]
+    spread(task, missing, executor, "bifurcation", lambda i, found: kept.add(repr(missing[i]), found))
+    strobes, peaks = (np.array([kept.values[repr(v)][name] for v in values.tolist()]) for name in ("states", "peaks"))
     told = axis_name(path, model.scene), parameter_unit(path, model.scene)
     return Bifurcation(path, place, values, strobes, peaks, *told)
 
 
-def _settled(family: Family, z: Any, settle: int, keep: int, start: Vector, value: float) -> tuple[Vector, Vector]:
+def _settled(family: Family, z: Any, settle: int, keep: int, start: Vector, value: float) -> Values:
     """States and peaks of the periods kept."""
     model = family.at(value)
     T, n = load_period(model.scene), len(model.omega)
@@ -142,4 +150,5 @@ def _settled(family: Family, z: Any, settle: int, keep: int, start: Vector, valu
     seen = Run.of(model, run)
     u, v = seen.displacement(z), seen.velocity(z)
     periods = [slice(i, i + looks + 1) for i in range(0, keep * looks, looks)]
-    return states, np.array([np.abs(extremes_of(run.t[one], u[one], v[one])).max() for one in periods])
+    peaks = np.array([np.abs(extremes_of(run.t[one], u[one], v[one])).max() for one in periods])
+    return {"states": states, "peaks": peaks}
