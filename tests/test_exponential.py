@@ -325,12 +325,27 @@ def test_ledger_closes_as_well_as_the_motion(dt):
 # --- cost and input -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("n", "steps", "calls"), [(1, 147, 2472), (2, 294, 4656), (10, 563, 6784), (30, 904, 12896)])
+@pytest.mark.parametrize(("n", "steps", "calls"), [(1, 147, 2472), (2, 294, 4656), (10, 563, 6784), (30, 798, 12896), (100, 968, 16504)])
 def test_cost_of_the_papers_scene_does_not_creep(n, steps, calls):
     """Ten periods at 1e-8; ceilings 30 % above what was measured."""
     cost = at_rest(paper(n), 10 * PERIOD, Exponential(1e-8)).cost
     assert cost.steps + cost.rejections <= 1.3 * (steps + 5)
     assert cost.law_calls <= 1.3 * calls
+
+
+@pytest.mark.parametrize("law", [Hertz(1e8), WaltonBraun(1e6, 1.5e6)])
+def test_modes_that_follow_the_forces_of_contacts_cost_few_steps(law):
+    """A beam between two stops: 60 modes took 8 times the steps of ten while what follows a force counted as ripple."""
+    beam = fb.Beam(0.398, fb.Section(2.1e11, 7800.0, 8.567e-5, 1.2316e-9))
+    stops, force = [fb.Stop(z, law, 2e-5) for z in (0.2, 0.36)], fb.PointForce(0.3, fb.Harmonic(30.0, 120.0))
+    scene = fb.Scene(beam, [fb.Clamped(0.0)], stops=stops, forces=[force], damping=fb.ModalDamping(0.01))
+    tried = []
+    for modes in (10, 60):
+        run, fine = (at_rest(scene.reduce(modes).system, 0.02, Exponential(rtol)) for rtol in (1e-8, 1e-12))
+        tried.append(run.cost.steps + run.cost.rejections)
+        assert len(run.contacts) >= 4
+        assert final_difference(run, fine) < 1e-8
+    assert tried[1] < 4.0 * tried[0]
 
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])

@@ -13,10 +13,10 @@ Error estimate: let A₁ be the larger of the last two Jacobi coefficients of th
 two before them. The part of the force that the polynomial leaves out is estimated by A₁ max((A₁/A₂)^{S/2}, A₁/F_max).
 Its effect on the indentation rate of every stop, in contact or not, is compared with rtol × the reference speed of that
 stop. The stop's own dashpot damps this error up to the end of the step, less if the stop is being left. Added are the
-oscillation of modes too fast for the nodes, in the first step of a contact or segment also what the force sets
-swinging, which the state does not show yet, and the part of the sampled signals that their polynomials leave out, for
-which all nodes of their tables are compared; this part is also compared with the motion of the blocks that a signal
-drives, which need not move a stop. A kink of the law between an end of the step and the nearest node does not
+oscillation of modes too fast for the nodes, without what follows the forces of a step with smooth nodes; in the first
+step of a contact or segment also what the force sets swinging, which the state does not show yet; and the part of the
+sampled signals that their polynomials leave out, for which all nodes of their tables are compared; this part is also
+compared with the motion of the blocks that a signal drives, which need not move a stop. A kink of the law between an end of the step and the nearest node does not
 show in the coefficients; there the law is compared with the polynomial.
 
 In this error, what a light element takes from a heavy structure is lost. So, where the slope of a law with memory
