@@ -325,7 +325,9 @@ def test_ledger_closes_as_well_as_the_motion(dt):
 # --- cost and input -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("n", "steps", "calls"), [(1, 147, 2472), (2, 294, 4656), (10, 563, 6784), (30, 798, 12896), (100, 968, 16504)])
+@pytest.mark.parametrize(
+    ("n", "steps", "calls"), [(1, 147, 2472), (2, 294, 4656), (10, 563, 6784), (30, 798, 12896), (100, 968, 16504)]
+)
 def test_cost_of_the_papers_scene_does_not_creep(n, steps, calls):
     """Ten periods at 1e-8; ceilings 30 % above what was measured."""
     cost = at_rest(paper(n), 10 * PERIOD, Exponential(1e-8)).cost

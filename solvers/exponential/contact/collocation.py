@@ -16,8 +16,8 @@ stop. The stop's own dashpot damps this error up to the end of the step, less if
 oscillation of modes too fast for the nodes, without what follows the forces of a step with smooth nodes; in the first
 step of a contact or segment also what the force sets swinging, which the state does not show yet; and the part of the
 sampled signals that their polynomials leave out, for which all nodes of their tables are compared; this part is also
-compared with the motion of the blocks that a signal drives, which need not move a stop. A kink of the law between an end of the step and the nearest node does not
-show in the coefficients; there the law is compared with the polynomial.
+compared with the motion of the blocks that a signal drives, which need not move a stop. A kink of the law between an
+end of the step and the nearest node does not show in the coefficients; there the law is compared with the polynomial.
 
 In this error, what a light element takes from a heavy structure is lost. So, where the slope of a law with memory
 changes on the step, the part left out must also be below 10 rtol of the largest force, or below the rounding of the
@@ -277,29 +277,29 @@ def _find_unresolved(run, node_set, level, u):
 
 @inner
 def _note_ringing(run, h):
-    """Write into ``norms`` what the forces set swinging in the blocks, m/s, as a contact or segment begins.
+    """Write into ``scratch.ringing`` how fast the forces set the blocks swinging as a contact or segment begins.
 
     A force that begins with the slope Ḟ leaves a block swinging about what follows it with |push| Ḟ/k. This shows in
     the state at the end of the step only, and the nodes of a long one may tell it as a part of a smooth force.
     """
-    problem, norms = run.problem, run.scratch.norms
+    problem, begun = run.problem, run.scratch.ringing
     n = problem.k.size
     for b in range(n):
-        norms[b] = 0.0
+        begun[b] = 0.0
     for u in range(problem.gap.size):
         if acts(problem, run.state, u):
             force, ringing = load8(run.scratch.force[u], 0), run.tables.ringing[u]
             slope = (largest8(force) - least8(force)) / h
             for b in range(n):
-                norms[b] += ringing[b] * slope
+                begun[b] += ringing[b] * slope
 
 
 @inner
 def _ripple_begun(run, u, alias):
     """Error of row u's displacement between the nodes, m, by what the forces have set swinging."""
-    weight, norms, n, error = run.tables.ripple_weight[u], run.scratch.norms, run.problem.k.size, 0.0
+    weight, begun, n, error = run.tables.ripple_weight[u], run.scratch.ringing, run.problem.k.size, 0.0
     for b in range(n):
-        error += weight[b] * alias[n + b] * norms[b]
+        error += weight[b] * alias[n + b] * begun[b]
     return error
 
 

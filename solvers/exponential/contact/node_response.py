@@ -81,6 +81,7 @@ class Scratch(NamedTuple):
     signal_terms: Annotated[Any, "tables, 6"]  # value and derivatives of every sampled signal
     values: Annotated[Any, "14"]  # coefficients of a polynomial
     norms: Annotated[Any, "N"]  # energy norms of the blocks, √(v² + k p²), √J
+    ringing: Annotated[Any, "N"]  # rate, √J, at which the blocks swing by the forces of a contact or segment just begun
     driven_speed: Annotated[Any, "tables"]  # √J: energy norm that its largest value drives in a cell of a table
     signal_bounds: Annotated[Any, "L, 4"]  # of the sampled signals and their three derivatives on some cells
     per_row: Annotated[Any, "R"]  # bounds of |δ̈| in m/s², errors of δ in m, or of δ̇ in m/s
