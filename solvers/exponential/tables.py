@@ -31,6 +31,7 @@ STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # places in `Tables.power_law`
 RATE, FORCE = 1.0, 2.0  # kinds of bends in `Tables.bend`, named by their event function; 0 for a law without one
 TAYLOR_REACH = 0.02  # |λ| h up to which a Taylor step of order 6 is exact to rounding
 _MOST_RADIANS = 2000.0  # |λ| h of the largest contact step
+OBSERVED_RADIANS = 200.0  # |λ| h up to which contact steps have tables of the energy
 _CONTACT_REACH = 1e-6  # |λ| h of the smallest one, at most
 _SLOWEST = 1e-9  # rate in units of the fastest, below which blocks do not lengthen the steps in the tables
 _SHORT = 1e-9  # s, of the smallest contact step, at most: a stop may be far stiffer than the structure
@@ -57,6 +58,7 @@ class Tables(NamedTuple):
     derived: Annotated[float, "number"]  # 1 where bounds have parts in the derivatives of signals
     load_rows: Annotated[Any, "L, 2, N8"]  # state rate of p and v per unit of a signal
     block_k_c: Annotated[Any, "2, N8"]  # k in 1/s², c in 1/s
+    observed: Annotated[float, "number"]  # contact step from which on energy and samples within it cost little
     force_following: Annotated[Any, "R, 4, 2*N"]  # the same of forces on the rows, of all blocks with k > 0
     stop_rows: Annotated[Any, "R, 4, N8"]  # the first two rows give δ + gap from p and v, the others δ̇
     acceleration_weight: Annotated[Any, "R, N8"]  # |δ̈| <= Σ weight × energy norm
@@ -190,6 +192,7 @@ def build(
         derived=float(response.any() or cell_error_signal[:, :, 2:].any()),
         load_rows=_in_eights(problem.load.reshape(-1, 2, size)),
         block_k_c=_in_eights(np.array([problem.k, problem.c])),
+        observed=float(np.count_nonzero(contact_h * (omega + damping)[: size - tones].max() > OBSERVED_RADIANS)),
         force_following=following(problem, problem.push, 0.0, 4),
         stop_rows=_in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
         acceleration_weight=_in_eights(_acceleration_weight(problem)),

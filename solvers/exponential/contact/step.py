@@ -395,6 +395,16 @@ def _end_before(run, level, tried):
     return min(max(level + 1, level_of(run.tables, _SHORTLY_BEFORE * tried.time)), level + _CROSSING_KNOWN)
 
 
+@inlined
+def _observed(run, level):
+    """The level, or the longest one that may hold a sample, or keep the energy balance, without many panels."""
+    state, first = run.state, int(run.tables.observed)
+    if level >= first:
+        return level
+    end, due = state.now[T] + run.tables.contact_step[level], min(state.due[state.count[SAMPLED]], state.now[T_END])
+    return first if run.energy_tables.active > 0.0 or due < end else level
+
+
 @part(CONTACT, types.int64)
 def advance_contact(run):
     """One accepted step in contact, a landing on what is near, else by collocation; returns a status code."""
@@ -424,6 +434,7 @@ def advance_contact(run):
         longest = min(longest, allowed)
     # `longest` may be 0, beside a surface that is left or entered at rest
     level = level_of(tables, longest) if longest < tables.contact_step[wanted] else wanted
+    level = _observed(run, level)
     copy(scratch.side, scratch.side_at_begin, scratch.side.size)
     if tables.follows > 0.0:
         note_swing(run)

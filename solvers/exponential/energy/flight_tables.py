@@ -30,14 +30,13 @@ from solvers.exponential.energy.quadratic_forms import Forms, carried, entries_o
 from solvers.exponential.flight import SERIES_TERMS
 from solvers.exponential.phi_functions import derivatives_of_ends, signal_responses
 from solvers.exponential.responses import fill_propagators
-from solvers.exponential.tables import Tables
+from solvers.exponential.tables import OBSERVED_RADIANS, Tables
 
 _OCTAVE = 4  # flight steps per factor of two
 _BRIEF = 0.04  # |λ| h up to which twelve terms of a Taylor series are exact
 _MOST_NUMBERS = 10_000_000  # in ``rows``: above, with many drivers, flight is integrated by series
 _MOST_PER_BLOCK = 1000  # numbers of a summed form per block: above, with many tones, forms of each block are cheaper
 _SERIES = np.array([gauss(S)[0] ** i / math.factorial(i) for i in range(SERIES_TERMS)])  # see `flight_balance`
-_REACH = 200.0  # radians of the fastest block up to which contact steps have tables
 
 
 class EnergyTables(NamedTuple):
@@ -256,7 +255,7 @@ def _contact_part(energy_tables: EnergyTables, problem: Problem, tables: Tables)
     """Add the tables of contact steps, one for all stops with the same exponents κ and λ."""
     own = int(tables.own_blocks)
     fastest = float((np.sqrt(problem.k) + problem.c)[:own].max())
-    h = tables.contact_step[int(np.searchsorted(-tables.contact_step * fastest, -_REACH)) :]
+    h = tables.contact_step[int(np.searchsorted(-tables.contact_step * fastest, -OBSERVED_RADIANS)) :]
     node_sets = list(zip(tables.time_exponent.tolist(), tables.weight_exponent.tolist(), strict=True))
     kinds = list(dict.fromkeys(node_sets))
     places = tables.nodes[[node_sets.index(kind) for kind in kinds]]
