@@ -395,16 +395,6 @@ def _end_before(run, level, tried):
     return min(max(level + 1, level_of(run.tables, _SHORTLY_BEFORE * tried.time)), level + _CROSSING_KNOWN)
 
 
-@inlined
-def _observed(run, level):
-    """The level, or the longest one that may hold a sample, or keep the energy balance, without many panels."""
-    state, first = run.state, int(run.tables.observed)
-    if level >= first:
-        return level
-    end, due = state.now[T] + run.tables.contact_step[level], min(state.due[state.count[SAMPLED]], state.now[T_END])
-    return first if run.energy_tables.active > 0.0 or due < end else level
-
-
 @part(CONTACT, types.int64)
 def advance_contact(run):
     """One accepted step in contact, a landing on what is near, else by collocation; returns a status code."""
@@ -434,7 +424,6 @@ def advance_contact(run):
         longest = min(longest, allowed)
     # `longest` may be 0, beside a surface that is left or entered at rest
     level = level_of(tables, longest) if longest < tables.contact_step[wanted] else wanted
-    level = _observed(run, level)
     copy(scratch.side, scratch.side_at_begin, scratch.side.size)
     if tables.follows > 0.0:
         note_swing(run)
@@ -543,7 +532,10 @@ def _levels_longer(error):
 
 @merged
 def _adapt(run, level, node_set, wanted, error):
-    """Set the level of the next step from the error of this one, which is at most 1."""
+    """Set the level of the next step from the error of this one, which is at most 1.
+
+    With an energy balance it is one for which this has tables: panels in longer steps take more time than steps do.
+    """
     scratch = run.scratch
     control = scratch.control
     if control[NEW] == ENTRY:  # the next contact of this stop begins with the step that proved right in this one
@@ -551,6 +543,7 @@ def _adapt(run, level, node_set, wanted, error):
         if level != control[NEXT_LEVEL]:
             scratch.first_step_share[s] = run.tables.contact_step[level] / scratch.duration[s]
         scratch.first_step_share[s] *= 2.0 ** (0.5 * min(max(levels, -1.0), 0.5))
-    suggested = min(max(level - _levels_longer(error), 0), run.tables.contact_step.size - 1)
+    longest = int(run.tables.observed) if run.energy_tables.active > 0.0 else 0
+    suggested = min(max(level - _levels_longer(error), longest), run.tables.contact_step.size - 1)
     control[NEXT_LEVEL] = suggested if level == wanted else min(suggested, wanted)
     control[LEVEL], control[NODE_SET], control[NEW] = level, node_set, 0
