@@ -307,6 +307,17 @@ def test_the_ledger_leaves_the_motion_alone(law, signal):
         assert np.all(np.isnan(without.energy.input))
 
 
+def test_steps_with_a_ledger_are_those_it_has_tables_for():
+    """Longer than 200 rad of the fastest mode a step is integrated in panels: 1.8 s for 0.05 s with 120 modes."""
+    omega, duration = 1e6, 0.05
+    system = System.modal([10.0, omega], 0.01, [Contact([1.0, 0.5], Jenkins(2e4, 1e3), 0.0, always=True)])
+    start = [1e-3, 0.0], [0.5, 0.0]
+    ends, run = integrate(system, *start, duration), integrate(system, *start, duration, 1e-3)
+    assert ends.cost.steps < 100 < omega * duration / 200.0 < run.cost.steps
+    assert np.abs(ends.q - run.q[-1]).max() < 1e-11
+    assert unaccounted(run) < 1e-9
+
+
 def test_outputs_of_another_spacing_give_the_same_ledger():
     """Where samples coincide; every other one of twice as many."""
     system = blocks([fb.Harmonic(2.0, 13.0), Nodes()])
