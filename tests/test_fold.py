@@ -175,7 +175,7 @@ def test_the_branch_of_a_fold_is_kept(tmp_path, file_of, monkeypatch):
         file.studies["fold"].run(file, tmp_path)
     monkeypatch.setattr("fembeam.study.fold", lambda branch, *_: branch)
     orbits = file.model().resume(tmp_path / "fold.npz").orbits
-    monkeypatch.setattr("fembeam.model.model.Model.branch", failing)  # not computed again
+    monkeypatch.setattr("solvers.branches.walk.Walk.extend", failing)  # not computed again
     kept = file.studies["fold"].run(file, tmp_path)
     np.testing.assert_array_equal(kept.parameter, [one.parameter for one in orbits])
 

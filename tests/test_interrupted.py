@@ -21,6 +21,7 @@ from fembeam.study import backbone, bifurcation, ensemble, fold, peak, speed_acc
 from fembeam.study.execution import executors
 from fembeam.study.execution.checkpoint import Checkpoint
 from fembeam.support import written_beside, written_whole
+from solvers.branches.walk import Walk
 from solvers.exponential.method import Engine as Engine
 
 SCENE = paper_scene(fb.BandNoise(2.5e-4, (0.0, 1226.6), seed=1), 0.02, Hertz(2.1e8), masses=())
@@ -114,10 +115,52 @@ def test_a_killed_branch_goes_on_from_its_file_as_if_it_had_not_been(tmp_path, m
     assert len(kept) == len(whole.orbits) + 2
     for content in kept[:: len(kept) // 3]:
         path.write_bytes(content)
-        resumed = DRIVEN.resume(path).run()
-        np.testing.assert_array_equal(resumed.parameter, whole.parameter)
-        np.testing.assert_array_equal([one.state for one in resumed.orbits], [one.state for one in whole.orbits])
-        assert [one.mark for one in resumed.orbits] == [one.mark for one in whole.orbits]
+        known, again = DRIVEN.resume(path), DRIVEN.branch("omega", (145.0, 155.0))
+        steps = count_of_steps(monkeypatch, partial(again.run, checkpoint=path))
+        assert steps + len(known.orbits) <= len(whole.orbits)
+        for resumed in (known.run(), again):
+            np.testing.assert_array_equal(resumed.parameter, whole.parameter)
+            np.testing.assert_array_equal([one.state for one in resumed.orbits], [one.state for one in whole.orbits])
+            assert [one.mark for one in resumed.orbits] == [one.mark for one in whole.orbits]
+
+
+def count_of_steps(monkeypatch, call):
+    """How many steps branches take in a call."""
+    extend, steps = Walk.extend, []
+    with monkeypatch.context() as patched:
+        patched.setattr(Walk, "extend", lambda walk: (steps.append(walk), extend(walk)))
+        call()
+    return len(steps)
+
+
+OTHER_BRANCHES = {
+    "parameter is 'base.omega' there and 'base.amplitude' here; span": {"parameter": "amplitude", "span": (1e-4, 1e-3)},
+    r"span\[1\] is 155.0 there and 160.0 here; set it back": {"span": (145.0, 160.0)},
+    "step is 0.2 there and 0.1 here": {"step": 0.1},
+    "shots is 1 there and 2 here": {"shots": 2},
+    "rtol is 1e-11 there and 1e-10 here": {"method": solvers.Exponential(1e-10)},
+    "its first orbit, at 150 there and 149 here, is another one": {"at": 149.0},
+    "directions is 2 there and 1 here": {"at": 145.0},
+}
+
+
+def test_a_checkpoint_of_another_branch_is_refused_and_stays(tmp_path):
+    """It was overwritten, another scene's too, and an unfinished one's by a script that was run again."""
+    path, asked = tmp_path / "branch.npz", {"parameter": "omega", "span": (145.0, 155.0), "step": 0.2}
+    DRIVEN.branch(**asked).run(checkpoint=path)
+    content = path.read_bytes()
+    for message, change in OTHER_BRANCHES.items():
+        with pytest.raises(ValueError, match=rf"branch\.npz belongs to another branch: .*{message}"):
+            DRIVEN.branch(**asked | change).run(checkpoint=path)
+    stiffer = replace(SCENE, **DRIVE, stops=[fb.Stop(0.24445, law=Hertz(3e8))]).reduce(modes=2)
+    with pytest.raises(ValueError, match="belongs to another scene: stops"):
+        stiffer.branch(**asked).run(checkpoint=path)
+    with pytest.raises(ValueError, match="belongs to another scene: modes"):
+        replace(SCENE, **DRIVE).reduce(modes=1).branch(**asked).run(checkpoint=path)
+    assert path.read_bytes() == content
+    run = DRIVEN.simulate(0.01, 1e-3).save(tmp_path / "run.npz")
+    with pytest.raises(ValueError, match=r"run.npz holds no branch, .* or choose another place"):
+        DRIVEN.branch(**asked).run(checkpoint=run)
 
 
 @pytest.mark.parametrize(
@@ -220,6 +263,15 @@ def all_of(found):
     points = getattr(found, "tops", None) or getattr(found, "resonances", None)
     orbits = found.orbits if points is None else [one.orbit for one in points]
     return found.plain(), [(one.found.whole, one.found.monodromy, one.found.doubt, one.parameter) for one in orbits]
+
+
+def test_two_orbits_of_one_frequency_have_each_its_own_branch(tmp_path):
+    path, upper = tmp_path / "branch.npz", FOLDED.orbits[5]
+    begun = {"span": (205.0, 210.0), "at": upper.parameter, "step": 0.5}
+    SOFT.branch(**begun).run(checkpoint=path)
+    with pytest.raises(ValueError, match=r"its first orbit, at 207\.\d+ there and 207\.\d+ here, is another one"):
+        SOFT.branch(**begun, start=upper).run(checkpoint=path)
+    SOFT.branch(**begun, start=SOFT.branch(**begun).orbits[0].state).run(checkpoint=path)  # the same to rounding
 
 
 @pytest.mark.parametrize("name", CURVES)

@@ -42,6 +42,7 @@ RECORDED = {"name", "period", "scene", "digest", "modes", "omega", "walks"}  # o
 SAME = 1e-9  # relative: frequencies of one model, made again
 ALIKE = 0.8  # cosine between shapes of a mode, from which on its sign is known
 EVERY = 10.0  # s between two times a branch under way is saved
+CLOSE = 1e-6  # arclength between two orbits found from the same start
 SHORTEST = 2.0**-8  # share of a step in which signs are followed
 
 
@@ -122,10 +123,11 @@ class Branch(Printed):
     def run(self, progress: bool = False, checkpoint: str | Path | None = None) -> Branch:
         """Compute all of it; after Ctrl-C the orbits found are kept, and another call continues.
 
-        With checkpoint that file is written as by `save`, at once if there is none, every `EVERY` seconds, and at the
-        end, whatever ends it.
+        With checkpoint it goes on from that file if there is one; ValueError if it is of another branch or scene. It is
+        written as by `save` at once, every `EVERY` seconds, and at the end, whatever ends it.
         """
-        if checkpoint is not None and not file_path(checkpoint, "Branch.run").is_file():
+        if checkpoint is not None:
+            self._take(file_path(checkpoint, "Branch.run"))
             self.save(checkpoint)  # what cannot be written is refused before it is computed
         try:
             with counting(progress, self.found, unit=" orbits") as bar:
@@ -140,6 +142,27 @@ class Branch(Printed):
                 self.save(checkpoint)
         note("%r", self)
         return self
+
+    def _take(self, path: Path) -> None:
+        """Go on from a file, if there is one that knows more of this branch; ValueError for one of another."""
+        if not path.is_file():
+            return
+        kept, mine = _record_for(self.family.model, path, "Branch.run"), self._record()
+        said = changes(repr(_asked(kept)), repr(_asked(mine)))
+        if not said and not self._begins_at(_first(kept)):
+            there, here = (_first(one)["parameter"] for one in (kept, mine))
+            said = f"its first orbit, at {there:.9g} there and {here:.9g} here, is another one"
+        if said:
+            raise ValueError(f"{path} belongs to another branch: {said}; set it back, delete the file to begin anew, "
+                             "or choose another place")  # fmt: skip
+        if _known(kept) > _known(mine):
+            self.found.walks[:] = restarted(self.family, kept["walks"]).walks
+
+    def _begins_at(self, first: dict[str, Any]) -> bool:
+        """Whether a first point of as many shots is this branch's, to what Newton's method leaves."""
+        mine = self.found.walks[0].first
+        off = np.append(np.ravel(first["x"]), first["parameter"]) - mine.unknowns
+        return mine.length(off) < CLOSE
 
     @property
     def orbits(self) -> list[Orbit]:
@@ -232,14 +255,17 @@ class Branch(Printed):
 
     def save(self, path: str | Path) -> None:
         """Write all that is known as .npz, enough to go on as if it had not been saved; whole or not at all."""
+        with written_whole(file_path(path, "Branch.save")) as file:
+            np.savez_compressed(file, branch=np.array(json.dumps(self._record())))
+
+    def _record(self) -> dict[str, Any]:
+        """All that is known as numbers, lists and text."""
         model = self.family.model
-        record = {
+        return {
             **{"name": self.family.name, "period": self.family.period},
             **{"scene": repr(model.scene), "digest": _digest(model)},
             **{"modes": list(model.modes), "omega": model.omega.tolist(), "walks": recorded(self.found)},
         }
-        with written_whole(file_path(path, "Branch.save")) as file:
-            np.savez_compressed(file, branch=np.array(json.dumps(record)))
 
 
 def follow(
@@ -273,7 +299,14 @@ def _checked_span(span: Any) -> tuple[float, float]:
 
 def resumed(model: Model, path: str | Path) -> Branch:
     """A saved branch of this model, to be continued."""
-    record = _record_of(file_path(path, "Model.resume"))
+    record = _record_for(model, file_path(path, "Model.resume"), "Model.resume")
+    family = Family(model, record["name"], record["period"])
+    return Branch(family, restarted(family, record["walks"]))
+
+
+def _record_for(model: Model, path: Path, where: str) -> dict[str, Any]:
+    """What a saved branch of this model knows; ValueError for one of another scene."""
+    record = _record_of(path, where)
     differing = [
         changes(record["scene"], repr(model.scene)),
         changes(repr(tuple(record["modes"])), repr(tuple(model.modes)), "modes"),
@@ -287,8 +320,26 @@ def resumed(model: Model, path: str | Path) -> Branch:
     if said := "; ".join(filter(None, differing)):
         raise ValueError(f"{path} belongs to another scene: {said}; set it back, delete the file to begin anew, "
                          "or choose another place")  # fmt: skip
-    family = Family(model, record["name"], record["period"])
-    return Branch(family, restarted(family, record["walks"]))
+    return record
+
+
+def _asked(record: dict[str, Any]) -> dict[str, Any]:
+    """What a branch was asked for, besides its first orbit."""
+    walk = record["walks"][0]
+    shots = len(walk["problems"][_first(record)["problem"]]["fractions"])
+    asked = {"parameter": record["name"], "period": record["period"], "span": list(walk["span"])}
+    return asked | {"step": walk["largest"], "shots": shots, "directions": len(record["walks"])} | walk["method"]
+
+
+def _first(record: dict[str, Any]) -> dict[str, Any]:
+    """The point a branch began at."""
+    walk = record["walks"][0]
+    return dict(walk["points"][walk["first"]])
+
+
+def _known(record: dict[str, Any]) -> int:
+    """How many orbits it knows in both directions."""
+    return sum(len(walk["orbits"]) for walk in record["walks"])
 
 
 def _digest(model: Model) -> str:
@@ -298,16 +349,16 @@ def _digest(model: Model) -> str:
     return ""
 
 
-def _record_of(path: Path) -> dict[str, Any]:
+def _record_of(path: Path, where: str) -> dict[str, Any]:
     """What a saved branch knows; ValueError for another file, or a damaged one."""
-    advice = "give what Branch.save wrote"
+    advice = "give what Branch.save wrote" + (", or choose another place" if where == "Branch.run" else "")
     try:
         with np.load(path, allow_pickle=False) as file:
-            require("branch" in file, f"{path} holds no branch", sorted(file), "Model.resume", advice)
+            require("branch" in file, f"{path} holds no branch", sorted(file), where, advice)
             record = json.loads(str(file["branch"]))
         missing = sorted(RECORDED - set(record))
         require(not missing, f"{path} must hold all of a branch, {missing} are missing", sorted(record),
-                "Model.resume", advice)  # fmt: skip
+                where, advice)  # fmt: skip
     except Exception as error:  # a byte of the archive's own lists has many ways to be wrong
         said = str(error)
         if said.startswith(str(path)) or getattr(error, "filename", None) is not None:

@@ -49,7 +49,6 @@ from fembeam.study.trial import Trial
 from fembeam.study.variation import points_of
 from fembeam.support import (
     Part,
-    changes,
     interrupts,
     is_numbered,
     is_pair,
@@ -456,31 +455,9 @@ class BranchTable:
         return FoundBranch(self.followed(file.model(), folder / "branch.npz", progress))
 
     def followed(self, model: Model, kept: Path, progress: bool) -> Branch:
-        """The branch, saved in a file; from there if it exists.
-
-        Raises
-        ------
-        ValueError : that branch belongs to another table, scene or number of modes.
-        """
-        if kept.exists():
-            branch = model.resume(kept)
-            self._check(branch, model, kept)
-        else:
-            branch = model.branch(self.parameter, self.span, self.period, at=self.at, step=self.step)
+        """The branch, saved in a file; goes on from there if it exists, ValueError if it is another one's."""
+        branch = model.branch(self.parameter, self.span, self.period, at=self.at, step=self.step)
         return branch.run(progress, kept)
-
-    def _check(self, branch: Branch, model: Model, path: Path) -> None:
-        """A saved branch answers this table."""
-        walk = branch.found.walks[0]
-        begun = walk.first.chain.parameter
-        theirs = {"parameter": branch.family.name, "period": branch.family.period, "span": tuple(map(float, walk.span)),
-                  "step": walk.largest, "at": begun}  # fmt: skip
-        mine = {"parameter": path_of(model.scene, self.parameter), "period": self.period,
-                "span": tuple(map(float, self.span)), "step": self.step,
-                "at": begun if self.at is None else float(self.at)}  # fmt: skip
-        if said := changes(repr(theirs), repr(mine)):
-            raise ValueError(f"{path} belongs to another branch: {said}; set it back, delete the file to begin anew, "
-                             "or choose another folder")  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
