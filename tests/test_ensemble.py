@@ -228,6 +228,7 @@ def slowly(path):
 def test_killed_and_resumed_is_bit_identical(tmp_path, alone, monkeypatch):
     path = tmp_path / "kept.npz"
     monkeypatch.setenv("HANG_AFTER", str(calls() + 3))
+    monkeypatch.setattr("fembeam.study.execution.checkpoint.EVERY", -1.0)
     victim = multiprocessing.get_context("fork").Process(target=slowly, args=(path,))
     victim.start()
     try:

@@ -1,5 +1,6 @@
 """Ctrl-C while a result is made of several runs: none of them is taken for a whole one, and what was found is kept."""
 
+import json
 import os
 import signal
 import time
@@ -18,6 +19,7 @@ from contacts import Hertz, Jenkins, KelvinVoigt, Polynomial
 from fembeam.model import branch as of_branch
 from fembeam.scene_file import study_tables
 from fembeam.study import backbone, bifurcation, ensemble, fold, peak, speed_accuracy, stationary, vary
+from fembeam.study.execution import checkpoint as of_checkpoint
 from fembeam.study.execution import executors
 from fembeam.study.execution.checkpoint import Checkpoint
 from fembeam.support import written_beside, written_whole
@@ -328,8 +330,34 @@ def test_what_is_no_checkpoint_need_not_be_deleted(tmp_path):
         fb.load(kept)
 
 
-def test_two_that_keep_values_in_one_file_keep_all(tmp_path):
+@pytest.mark.parametrize("every", [-1.0, 1e9])
+def test_values_that_come_fast_are_written_seldom_and_all_of_them_at_the_end(every, interrupt, tmp_path, monkeypatch):
+    """Each of 73 answers of a fold was written to the disk at once, which took as long as to find them."""
+    monkeypatch.setattr(of_checkpoint, "EVERY", every)
+    path, add, put, added, written = tmp_path / "kept.npz", Checkpoint.add, Checkpoint._put, [], []
+    monkeypatch.setattr(Checkpoint, "add", lambda *given: (added.append(given), add(*given)))
+    monkeypatch.setattr(Checkpoint, "_put", lambda *given: (written.append(given), put(*given)))
+    interrupt(60)
+    with pytest.raises(KeyboardInterrupt):
+        CURVES["fold"](checkpoint=path)
+    assert len(added) > 2
+    assert len(written) == (2 if every > 0.0 else len(added))
+    with np.load(path) as found:
+        assert len(json.loads(str(found["header"]))["seeds"]) == len(added)
+
+
+def test_values_are_kept_as_they_were(tmp_path):
+    path, sums = tmp_path / "kept.npz", np.zeros(3)
+    with Checkpoint(path) as kept:
+        for _ in range(2):
+            kept.add("so far", {"sums": sums})
+            sums += 1.0  # of a part that is not done
+    assert Checkpoint(path).values["so far"]["sums"].tolist() == [1.0, 1.0, 1.0]
+
+
+def test_two_that_keep_values_in_one_file_keep_all(tmp_path, monkeypatch):
     """The last to write left its own alone; another study's file that has come meanwhile is not overwritten."""
+    monkeypatch.setattr(of_checkpoint, "EVERY", -1.0)
     path = tmp_path / "kept.npz"
     a, b = Checkpoint(path), Checkpoint(path)
     for key in range(4):
@@ -344,6 +372,7 @@ def test_two_that_keep_values_in_one_file_keep_all(tmp_path):
 
 
 def kept_by(path, first):
+    of_checkpoint.EVERY = -1.0
     kept = Checkpoint(path)
     for key in range(first, first + 20):
         kept.add(str(key), {"x": np.array(float(key))})

@@ -125,7 +125,7 @@ def backbone(
     level, parameter : paths of the tone's amplitude and of its frequency.
     z : m, or (place, direction), of the displacement; None: the first stop or element, else the tip.
     progress : show a bar (on terminals and in notebooks only).
-    checkpoint : file written whole after each level; what it holds is not computed again, also with more levels above.
+    checkpoint : file that keeps each level; what it holds is not computed again, also with more levels above.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def backbone(
     asked = {"level": family.name, "parameter": along, "span": ends, "z": place}
     kept = Checkpoint(checkpoint, lambda: study_identity(model, study="backbone", **asked))
     search = _Search(family, along, ends, place, kept)
-    with counting(progress, given, unit=" levels") as bar:
+    with kept, counting(progress, given, unit=" levels") as bar:
         found = [search.at(float(value)) for value in bar]
     unit = parameter_unit(search.levels.name, model.scene)
     return Backbone(called(model.scene, level), tuple(found), place, unit)

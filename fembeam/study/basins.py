@@ -154,7 +154,7 @@ def basins(
         without contacts falls to `NEAR` in 7/(ζω T).
     longest : orbits of at most so many periods are looked for; longer or chaotic motion counts as not settled.
     threads : how many work at the same time.
-    checkpoint : file written whole after each row of the grid; what it holds is not computed again.
+    checkpoint : file that keeps each row of the grid; what it holds is not computed again.
     progress : show a bar (only on a terminal).
 
     Returns
@@ -190,7 +190,8 @@ def basins(
     known = _found(model, _coarse(starts), longest, T)
     missing = [row for row in range(rows) if str(row) not in kept.values]
     task = partial(_settled, model, starts, known, settle, T, threads)
-    spread(task, missing, None, titled(progress, "basins"), lambda i, v: kept.add(str(missing[i]), {"state": v}))
+    with kept:
+        spread(task, missing, None, titled(progress, "basins"), lambda i, v: kept.add(str(missing[i]), {"state": v}))
     states = np.array([kept.values[str(row)]["state"] for row in range(rows)])
     label, known = _labelled(model, states.reshape(-1, states.shape[-1]), known, longest, T)
     return _sorted(across, up, origin, label.reshape(rows, columns), known)

@@ -98,7 +98,7 @@ def bifurcation(
     settle, keep : periods of the load left out and kept.
     start : (2n,) for all of them; None is rest.
     executor : any `concurrent.futures.Executor` to spread the values over.
-    checkpoint : file written whole after each value; what it holds is not computed again, also of other values.
+    checkpoint : file that keeps each value; what it holds is not computed again, also of other values.
 
     Returns
     -------
@@ -131,7 +131,8 @@ def bifurcation(
     asked = {"parameter": path, "z": place, "settle": settle, "keep": keep, "start": state}
     kept = Checkpoint(checkpoint, lambda: study_identity(model, study="bifurcation", **asked))
     missing = [value for value in values.tolist() if repr(value) not in kept.values]
-    spread(task, missing, executor, "bifurcation", lambda i, found: kept.add(repr(missing[i]), found))
+    with kept:
+        spread(task, missing, executor, "bifurcation", lambda i, found: kept.add(repr(missing[i]), found))
     strobes, peaks = (np.array([kept.values[repr(v)][name] for v in values.tolist()]) for name in ("states", "peaks"))
     told = axis_name(path, model.scene), parameter_unit(path, model.scene)
     return Bifurcation(path, place, values, strobes, peaks, *told)

@@ -159,7 +159,7 @@ def ensemble(
         ``partial(fb.study.characteristics, duration=100.0, dt=1e-3)`` or
         ``lambda model: model.simulate(50.0).contacts.peak_force.max()``.
     executor : any `concurrent.futures.Executor`; processes need a quantity that can be pickled (no lambda).
-    checkpoint : file written whole after each realisation; when it exists, what it holds is not computed again. It is
+    checkpoint : file that keeps each realisation; when it exists, what it holds is not computed again. It is
         refused when scene, modes, fembeam's version, or the code of the quantity, of a law or of anything they read
         (functions, closures, globals, arguments) has changed. Files and the environment that these read are not seen.
     until : stop when the relative standard error of every mean that there is lies below it; asked after 8, 16, 32, …
@@ -196,7 +196,8 @@ def ensemble(
     failed: dict[str, Failure] = {}
     for count in _rounds(len(chosen), until):
         missing = [seed for seed in chosen[:count] if seed_key(seed) not in {*kept.values, *failed}]
-        _compute(partial(_value, model, quantity), missing, kept, failed, executor, progress)
+        with kept:
+            _compute(partial(_value, model, quantity), missing, kept, failed, executor, progress)
         found = replace(_collected(chosen[:count], kept, failed, until), units=_units_of(quantity, model))
         note("%r, %d of them computed now", found, len(missing))
         if found.enough:

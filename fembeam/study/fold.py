@@ -110,7 +110,7 @@ def fold(
     number : which of the folds of the branch, from 0.
     z : m, or (place, direction), of the displacement u; None: the first stop or element, else the tip.
     progress : show a bar of the folds found (on terminals and in notebooks only).
-    checkpoint : file written whole after each fold; what it holds is not computed again.
+    checkpoint : file that keeps each fold; what it holds is not computed again.
 
     Returns
     -------
@@ -163,7 +163,7 @@ def fold(
     kept = Checkpoint(checkpoint, lambda: study_identity(model, study="fold", **asked, fold=begun))
     answers = [kept.values[str(i)] for i in range(len(kept.values))]
     keys = map(str, count(len(answers)))
-    with counting(progress, unit=" folds") as bar:
+    with kept, counting(progress, unit=" folds") as bar:
         found = fold_curve(families, start, present, ends, high - low, seen=bar.update, known=answers,
                            keep=lambda one: kept.add(next(keys), one))  # fmt: skip
     orbits = tuple(

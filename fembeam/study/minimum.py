@@ -152,7 +152,7 @@ def minimise(
         ``derivative(change)``, see `fembeam.study.gradients`. Noise, functions that make scenes, and other methods
         than `Exponential` have none.
     executor : any `concurrent.futures.Executor`, for the first look over the box; the search is one after the other.
-    checkpoint : file written whole after each point; what it holds is not computed again.
+    checkpoint : file that keeps each point; what it holds is not computed again.
 
     Returns
     -------
@@ -199,8 +199,9 @@ def minimise(
         gradients = has_gradients(trial, insist=gradients is True)
     kept = Checkpoint(checkpoint, partial(identity_of, trial))
     search = _Search(trial, box, np.array([bound for _, bound in limits]), kept)
-    search.look(first, executor, titled(progress, WHERE))
-    converged = search.descend(tolerance, most, gradients)
+    with kept:
+        search.look(first, executor, titled(progress, WHERE))
+        converged = search.descend(tolerance, most, gradients)
     return _found(search, tolerance, converged)
 
 

@@ -207,7 +207,7 @@ def mode_count(
     solver : one of `solvers`; None: `Exponential(1e-8)` without energy balance.
     executor : any `concurrent.futures.Executor`; counts are spread over it.
     elements : of the mesh of all counts; None: for each as few as make its frequencies right to 1e-6.
-    checkpoint : file written whole after each count; what it holds is not computed again, also of other counts. It is
+    checkpoint : file that keeps each count; what it holds is not computed again, also of other counts. It is
         refused when scene, quantity or runs differ.
     progress : show a bar (on terminals and in notebooks only).
 
@@ -260,7 +260,8 @@ def mode_count(
         for a in arguments
     ]
     finished = Checkpoint(checkpoint, partial(identity_of, scene, plan, kept))
-    found = measured(items, executor, titled(progress, f"modes for {label(kept)}"), finished)
+    with finished:
+        found = measured(items, executor, titled(progress, f"modes for {label(kept)}"), finished)
     exact, *loose = found[arguments.index(finest)]
     rows = _rows(arguments, [first for first, *_ in found], exact)
     study = ModeCount(label(kept), rows, _change(loose[0], exact) if loose else None, unit_of(kept, scene))

@@ -136,7 +136,7 @@ def peak(
     span : (lowest, highest) ω, with the peak inside it for every value.
     z : m, or (place, direction), of the displacement u; None: the first stop or element, else the tip.
     progress : show a bar (on terminals and in notebooks only).
-    checkpoint : file written whole after each peak; what it holds is not computed again, also of other values.
+    checkpoint : file that keeps each peak; what it holds is not computed again, also of other values.
 
     Returns
     -------
@@ -172,12 +172,13 @@ def peak(
     require_model(model, "peak")
     p = check_peak(model.scene, parameter, over, values, span)
     search = _Search(model, path_of(model.scene, parameter), path_of(model.scene, over), z, span, checkpoint)
-    with counting(progress, p, unit=" values") as bar:
+    with search.kept, counting(progress, p, unit=" values") as bar:
         tops = [search.top(float(value)) for value in bar]
+        least = _least(search, tops)
     titles = axis_name(search.over, model.scene), axis_name(search.parameter, model.scene)
     names = called(model.scene, parameter), called(model.scene, over)
     units = parameter_unit(search.over, model.scene), parameter_unit(search.parameter, model.scene)
-    return Peak(*names, tuple(tops), _least(search, tops), search.z, titles, units)
+    return Peak(*names, tuple(tops), least, search.z, titles, units)
 
 
 def check_peak(

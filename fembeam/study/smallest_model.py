@@ -173,7 +173,7 @@ def smallest_model(
     ----------
     scene, quantity, duration, dt, discard, seeds, residual, start, executor, elements, progress : as for `mode_count`.
     tolerance : relative, in (0, 1); of the norm if the quantity is an array.
-    most : modes that an answer may have, 1 to 64. checkpoint : as for `mode_count`, written after each model.
+    most : modes that an answer may have, 1 to 64. checkpoint : as for `mode_count`, of each model.
 
     Returns
     -------
@@ -206,9 +206,11 @@ def smallest_model(
     plan.check(scene, kept)
     finished = Checkpoint(checkpoint, partial(identity_of, scene, plan, kept))
     told = titled(progress, f"smallest model for {label(kept)}")
-    return Search(
+    search = Search(
         scene, kept, plan, float(tolerance), int(most), kinds_of(scene, residual), executor, elements, finished, told
-    ).answer()
+    )
+    with finished:
+        return search.answer()
 
 
 def check_goal(tolerance: float, most: int) -> None:

@@ -184,7 +184,7 @@ def speed_accuracy(
         horizons, where runs differ, as much as their scatter.
     rounds : how often each run is timed; the fastest counts. Slow settings run fewer, very slow ones fewer starts.
     progress : show a bar (on terminals and in notebooks only).
-    checkpoint : file written whole after each run of a reference; what it holds is not computed again. Times are taken
+    checkpoint : file that keeps each run of a reference; what it holds is not computed again. Times are taken
         anew, as only those of one process can be compared.
 
     Returns
@@ -221,7 +221,8 @@ def speed_accuracy(
     states = _starts(models[0], starts, duration)
     ask = _Question(duration, dt, quantity)
     kept = Checkpoint(checkpoint, lambda: _identity(models, states, ask))
-    truths, floor, unit = _references(models, states, ask, agreement, kept)
+    with kept:
+        truths, floor, unit = _references(models, states, ask, agreement, kept)
     trials = [_Trial(each, method) for each in models for method in methods]
     _measure(trials, states, ask, rounds, progress)
     sizes = [len(each.omega) for each in models]

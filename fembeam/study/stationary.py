@@ -209,7 +209,7 @@ def stationary(
     start : (2n,) as for `Model.simulate`.
     solver : None is ``solvers.Exponential(1e-8, ledger=False)``.
     progress : show a bar (on terminals and in notebooks only).
-    checkpoint : file written whole after each segment; the same call goes on from there and gives the same bits, with
+    checkpoint : file that keeps each segment; the same call goes on from there and gives the same bits, with
         another `until` too. It is refused when anything else has changed, as of `ensemble`. Of a record, which is one
         segment, it holds the end only.
 
@@ -256,7 +256,7 @@ def stationary(
     settled, enough = _resumed(kept, plan, sums), None if until is None else False
     if until is not None and plan.taken >= FEWEST_BATCHES:  # as it was asked before the end of an earlier call
         enough = _enough(sums.response(plan, settled, enough), of, until)
-    with bar(duration, progress) as report:
+    with kept, bar(duration, progress) as report:
         for whole in plan.pieces() if not enough else ():
             piece: Segment | None = whole
             seen = {name: _looked(name, look, whole.run) for name, look in watched.items()}

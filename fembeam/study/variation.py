@@ -169,7 +169,7 @@ def vary(
         inverse distribution functions map: ``scipy.stats.qmc.Sobol(2, seed=1).random(64)``.
     seed : of the samples drawn.
     executor : any `concurrent.futures.Executor`; points are spread over it.
-    checkpoint : file written whole after each point; what it holds is not computed again, also of a grid with
+    checkpoint : file that keeps each point; what it holds is not computed again, also of a grid with
         other values of the same parameters. It is refused when scene, quantity or anything else differs.
     progress : show a bar (on terminals and in notebooks only).
     reduction : arguments of `Scene.reduce`, such as ``modes=3``. Where only signals, gaps and laws are varied the modes
@@ -202,7 +202,8 @@ def vary(
     names, points, axes = points_of(parameters, samples, seed)
     trial = Trial.of(scene, names, quantity, plan, reduction).prepared(points)
     kept = Checkpoint(checkpoint, partial(identity_of, trial))
-    failures = computed(trial, points, kept, executor, titled(progress, WHERE))
+    with kept:
+        failures = computed(trial, points, kept, executor, titled(progress, WHERE))
     if failures:
         i, reason = failures[0]
         message = f"{len(failures)} of {len(points)} points failed; {trial.words(points[i])}: {reason}"

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from functools import partial
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -21,13 +23,15 @@ from fembeam.support import changes, one_at_a_time, require, written_whole
 from fembeam.support.fingerprint import fingerprint
 
 FORMAT = 2
+EVERY = 5.0  # s between two times a file is written
 Values = dict[str, NDArray[Any]]
 
 
 class Checkpoint:
     """Values by seed, kept in memory and, with a path, in a file.
 
-    Several processes may keep values of one study in one file: each adds to it what the others have kept.
+    It is written with the first value, then every `EVERY` seconds at most, and at the end of ``with``, whatever ends
+    that. Several processes may keep values of one study in one file: each adds to it what the others have kept.
 
     Parameters
     ----------
@@ -43,6 +47,7 @@ class Checkpoint:
         self.about = {} if path is None else about()
         self.values: dict[str, Values] = {}
         self.seen: tuple[int, ...] = ()
+        self.written, self.complete = -math.inf, True
         if self.path is None:
             return
         if not self.path.parent.is_dir():
@@ -52,14 +57,27 @@ class Checkpoint:
         self._take(self.path)
 
     def add(self, key: str, values: Values) -> None:
-        """Keep the values of one more seed."""
-        self.values[key] = values
-        if self.path is None:
-            return
+        """Keep the values of one more seed, as they are now."""
+        self.values[key] = {name: np.array(value) for name, value in values.items()}
+        self.complete = self.path is None
+        if not self.complete and monotonic() - self.written > EVERY:
+            self._write()
+
+    def __enter__(self) -> Checkpoint:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if not self.complete:
+            self._write()
+
+    def _write(self) -> None:
+        """Write all that is known, and what other processes have written."""
+        assert self.path is not None
         with one_at_a_time(self.path.parent):
             self._take(self.path)
-            self._write(self.path, values)
+            self._put(self.path)
             self.seen = _state_of(self.path)
+        self.written, self.complete = monotonic(), True
 
     def _take(self, path: Path) -> None:
         """Take over what the file holds, if it is not as this one has seen it last."""
@@ -68,8 +86,9 @@ class Checkpoint:
             self.values = self._read(path) | self.values
         self.seen = state
 
-    def _write(self, path: Path, values: Iterable[str]) -> None:
-        """All values, whose names are given."""
+    def _put(self, path: Path) -> None:
+        """Write all values, which have the same names."""
+        values = next(iter(self.values.values()))
         about = {"format": FORMAT, "about": self.about, "seeds": list(self.values), "values": list(values)}
         stacked = {f"value {name}": np.stack([v[name] for v in self.values.values()]) for name in values}
         with written_whole(path) as file:
