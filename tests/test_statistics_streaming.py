@@ -418,6 +418,20 @@ def test_errors_are_those_between_seeds():
     assert abs(math.log(claimed / between)) < 4 * 0.35
 
 
+def test_a_period_of_few_correlation_times_makes_the_response_less_than_gaussian():
+    """Kurtosis 3 - 1.5 Σa⁴/(Σa²)² of a sum of lines of fixed size, 3 - 1.5/(ζω period) of a mode's response."""
+    omega, zeta, times, found = 100.0, 0.05, 20.0, []
+    for seed in range(3000):
+        noise = fb.BandNoise(1.0, (0.0, 4.0 * omega), seed, period=times / (zeta * omega))
+        a = noise.amplitude / (omega**2 - noise.omega**2 + 2j * zeta * omega * noise.omega)
+        x = np.fft.irfft(np.append(0.0, a), 4 * a.size)  # over one period, to a factor
+        found.append((x**4).mean() / (x**2).mean() ** 2)
+    mean, error = np.mean(found), np.std(found) / math.sqrt(len(found))
+    assert mean == pytest.approx(3.0 - 1.5 * (np.abs(a) ** 4).sum() / (np.abs(a) ** 2).sum() ** 2, abs=4.0 * error)
+    assert mean == pytest.approx(3.0 - 1.5 / times, abs=4.0 * error)
+    assert mean < 3.0 - 4.0 * error
+
+
 def test_a_batch_is_a_realisation_of_its_own():
     model = cantilever(1, base=fb.BandNoise(1e-4, (0.0, 1500.0)))
     for seconds, batches in ((80.0, 16), (20.0, 4), (10.0, 2)):

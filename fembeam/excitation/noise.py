@@ -20,7 +20,7 @@ from fembeam.excitation.noise_lines import NoiseLines
 from fembeam.excitation.psd import Psd, RollOff, Table, checked_table
 from fembeam.support import is_finite, is_whole, number
 
-AUTOMATIC_LINES = 4096  # kurtosis 3 - 1.5/4096: Gaussian to far below any sampling error
+AUTOMATIC_LINES = 4096  # kurtosis 3 - 1.5/4096: itself Gaussian to far below any sampling error
 FEWEST_LINES = 8  # below this a sum of cosines is visibly not Gaussian (kurtosis under 2.8)
 MOST_LINES = 10**8  # whose amplitudes and phases take 1.6 GB
 
@@ -57,6 +57,10 @@ class BandNoise(NoiseLines):
     -----
     A sum of n lines of equal amplitude has kurtosis 3 - 1.5/n. `std` belongs to y also when this object is
     one of its derivatives; `rms` is that of the signal itself. Another `period` is another realisation.
+
+    Few of the lines drive a mode of little damping. Its response has kurtosis 3 - 1.5/(ζω period), and passes 3 and 4
+    standard deviations 2 and 10 % less often than a Gaussian one where ζω period = 100, 10 and 45 % where it is 20: a
+    longer period mends it.
 
     References
     ----------

@@ -232,6 +232,10 @@ def stationary(
     that cannot be continued are run as one segment of eight batches, a sum of tones in batches of about 50 correlation
     times. A response that switches between two regimes less often than that needs an `ensemble`.
 
+    A realisation of noise repeats after its period, automatic or that of the segment, and is no more Gaussian than
+    that many lines: see `BandNoise`. Where levels beyond 3 standard deviations matter, such as for rare contacts, and
+    where many runs are averaged, give the noise a period of some hundred correlation times.
+
     A structure that only elements damp will do. Correlation times are then those with their dashpots, or with dashpots
     that lose as much in a cycle as sliders do at the rms of a pilot run: a mode whose sliders stick at this level is
     refused.
