@@ -31,6 +31,7 @@ STIFFNESS, EXPONENT, FACTOR, DAMPING = range(4)  # places in `Tables.power_law`
 RATE, FORCE = 1.0, 2.0  # kinds of bends in `Tables.bend`, named by their event function; 0 for a law without one
 TAYLOR_REACH = 0.02  # |λ| h up to which a Taylor step of order 6 is exact to rounding
 _MOST_RADIANS = 2000.0  # |λ| h of the largest contact step
+_AT_ENDS = 2.1  # √Σ L_i², L_i the polynomials through the smooth nodes at an end of the step
 OBSERVED_RADIANS = 200.0  # |λ| h up to which contact steps have tables of the energy
 _CONTACT_REACH = 1e-6  # |λ| h of the smallest one, at most
 _SLOWEST = 1e-9  # rate in units of the fastest, below which blocks do not lengthen the steps in the tables
@@ -97,7 +98,10 @@ class Tables(NamedTuple):
     block_end_response: Annotated[Any, "weightings, j, 2, own, S"]  # the same at the end
     alias: Annotated[Any, "kinds, j, 2*N"]  # error of δ between the nodes <= Σ ripple_weight (alias |p| + alias |v|)
     ringing: Annotated[Any, "R, N"]  # rate at which a block swings once a force begins, per unit of its slope: |push|/k
+    reactions: Annotated[Any, "R, j, 2"]  # see `reactions`
     ripple_weight: Annotated[Any, "R, N"]  # amplitude of δ per unit of an oscillating block's rate
+    rate_ripple_weight: Annotated[Any, "R, N"]  # amplitude of δ̇ per unit of that rate
+    aliased: Annotated[Any, "kinds, j"]  # 0 if the nodes resolve all blocks
     signal_rows: Annotated[Any, "L, 2*N"]  # a load's tones from the state
     power_rows: Annotated[Any, "L, 2*N"]  # input power = signal × power row
     loss_rows: Annotated[Any, "r, 2*N"]  # damping power = Σ (row·z)², less those of rows beyond the blocks
@@ -147,7 +151,8 @@ def uncut_parameters(contacts: Sequence[Any]) -> Any:
 
 # tables with columns for the tones' blocks
 TONE_TABLES = (
-    *("flight_propagator", "contact_propagator", "free", "node_propagator", "alias", "ripple_weight"),
+    *("flight_propagator", "contact_propagator", "free", "node_propagator", "alias", "aliased"),
+    *("ripple_weight", "rate_ripple_weight"),
     *("block_k_c", "stop_rows", "acceleration_weight", "rate_weight"),
     *("signal_rows", "power_rows", "loss_rows", "steady_rate", "cell", "cell_error"),
 )
@@ -179,6 +184,9 @@ def build(
     cell_error, cell_error_signal = cell_errors(problem, dt_cell, response)
     ready = {**node_sets._asdict(), **blocks._asdict(), **laws}  # `alias` is that of the blocks
     signal_rows, power_rows, loss_rows = energy_rows
+    own, ripple_weight = size - tones, _ripple_weight(problem.read, omega)
+    ringing = np.hypot(problem.push[:, size:], omega * problem.push[:, :size])
+    ringing /= np.where(omega > 0.0, problem.k, np.inf)
     return Tables(
         **{name: ready[name] for name in Tables._fields if name in ready},
         flight_step=h,
@@ -192,7 +200,7 @@ def build(
         derived=float(response.any() or cell_error_signal[:, :, 2:].any()),
         load_rows=_in_eights(problem.load.reshape(-1, 2, size)),
         block_k_c=_in_eights(np.array([problem.k, problem.c])),
-        observed=float(np.count_nonzero(contact_h * (omega + damping)[: size - tones].max() > OBSERVED_RADIANS)),
+        observed=float(np.count_nonzero(contact_h * (omega + damping)[:own].max() > OBSERVED_RADIANS)),
         force_following=following(problem, problem.push, 0.0, 4),
         stop_rows=_in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
         acceleration_weight=_in_eights(_acceleration_weight(problem)),
@@ -201,12 +209,14 @@ def build(
         load_acceleration=problem.read_rate @ problem.load.T,
         load_norm=_load_norm(problem),
         fastest=fastest,
-        own_blocks=float(size - tones),
+        own_blocks=float(own),
         accelerance=-problem.read_rate @ problem.push.T,
         contact_step=contact_h,
-        ringing=np.hypot(problem.push[:, size:], omega * problem.push[:, :size])
-        / np.where(omega > 0.0, problem.k, np.inf),
-        ripple_weight=_ripple_weight(problem.read, omega),
+        ringing=ringing,
+        reactions=reactions(problem, contact_h, blocks.alias[node_sets.kind[0]], ripple_weight * ringing, own),
+        ripple_weight=ripple_weight,
+        rate_ripple_weight=ripple_weight * omega,
+        aliased=blocks.alias.max(axis=2),
         signal_rows=signal_rows,
         power_rows=power_rows,
         loss_rows=loss_rows,
@@ -231,6 +241,7 @@ def fill_tones(tables: Tables, problem: Problem, tones: int, series: tuple[tuple
     tables.acceleration_weight[:, own:size], tables.rate_weight[:, own:] = p * omega + v * k, p + v * omega
     tables.block_k_c[0, own:size] = k
     tables.ripple_weight[:, own:] = _ripple_weight(problem.read, np.sqrt(problem.k))[:, own:]
+    tables.rate_ripple_weight[:, own:] = tables.ripple_weight[:, own:] * np.sqrt(k)
     for i, rows in enumerate((problem.read, problem.read_rate)):
         tables.stop_rows[:, 2 * i : 2 * i + 2, own:size] = rows.reshape(-1, 2, size)[:, :, own:]
     if problem.table_dt.size:
@@ -238,6 +249,7 @@ def fill_tones(tables: Tables, problem: Problem, tones: int, series: tuple[tuple
         tables.cell_error[:, own:size] = np.minimum(*_cell_weights(problem, problem.table_dt[0]))[:, own:]
     blocks = Blocks(*(getattr(tables, name) for name in Blocks._fields))
     filled(blocks, problem, (own, size), tables.flight_step, tables.contact_step, node_sets_of(series))
+    tables.aliased[:] = tables.alias.max(axis=2)
 
 
 def doublings(speeds: Any, tones: Any) -> int:
@@ -273,6 +285,23 @@ def _ripple_weight(read: Any, omega: Any) -> Any:
     """(R, N): amplitude of δ per unit of an oscillating block's rate."""
     p, v = np.abs(read[:, : omega.size]), np.abs(read[:, omega.size :])
     return np.ascontiguousarray(p / np.where(omega > 0.0, omega, np.inf) + v)
+
+
+def reactions(problem: Problem, h: Any, alias: Any, swing: Any, own: int) -> Any:
+    """(R, J, 2) most that a block is moved by the force that it makes between the nodes, per unit of its oscillation.
+
+    An oscillation of rate v moves a row by w v, of which the nodes miss ``alias`` (J, 2N; its second half). So much has
+    the force there, times its slope F_δ by δ, or ω F_δ̇. The block follows the polynomial of the force at both ends of
+    the step, where it has 2.1 times that, in the mean over all phases: the root of the sum of the squares of Lagrange's
+    polynomials. ``swing`` (R, N) is w × rate of the block per newton and second. Damping leaves e^{-ch/2} of it. Given
+    are the largest of the first ``own`` blocks, per unit of F_δ and of F_δ̇.
+    """
+    omega, found = np.sqrt(problem.k[:own]), np.zeros((len(swing), len(h), 2))
+    left = _AT_ENDS * alias[:, len(problem.k) :][:, :own] * np.exp(-0.5 * h[:, None] * problem.c[:own])
+    for out, row in zip(found, swing[:, :own], strict=True):
+        moved = left * (omega * row)
+        out[:, 0], out[:, 1] = moved.max(axis=1), (moved * omega).max(axis=1)
+    return found
 
 
 def _acceleration_weight(problem: Problem) -> Any:

@@ -55,6 +55,7 @@ from solvers.exponential.contact.node_response import (
     motion_of,
     rate_ripple_of,
     ripple_of,
+    swing_of,
 )
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import maximum_and_place, motion_around, polynomial
@@ -151,8 +152,8 @@ def _margins_on_step(run, s, node_set, level):
     deltas[END], rates[END] = indentation_and_rate(problem, s, scratch.x_new)
     deltas[DELTA_ROUNDED] += direction * rounding
     rates[RATE_ROUNDED] += direction * max(rate_tolerance(problem, s, state.x), REST * scratch.reference_speed[s])
-    deltas[DELTA_RIPPLED] += direction * ripple_of(run, row, alias)
-    rates[RATE_RIPPLED] += direction * rate_ripple_of(run, row, alias)
+    deltas[DELTA_RIPPLED] += direction * ripple_of(run, swing_of(run), row, alias)
+    rates[RATE_RIPPLED] += direction * rate_ripple_of(run, swing_of(run), row, alias)
     margins(problem, state, s, ENDS, deltas, rates, scratch.ends)
     _margins_at_nodes(run, s, node_set, tables.contact_step[level])
     for j in range(problem.border_count[s]):

@@ -13,11 +13,13 @@ Error estimate: let A₁ be the larger of the last two Jacobi coefficients of th
 two before them. The part of the force that the polynomial leaves out is estimated by A₁ max((A₁/A₂)^{S/2}, A₁/F_max).
 Its effect on the indentation rate of every stop, in contact or not, is compared with rtol × the reference speed of that
 stop. The stop's own dashpot damps this error up to the end of the step, less if the stop is being left. Added are the
-oscillation of modes too fast for the nodes, without what follows the forces of a step with smooth nodes; in the first
-step of a contact or segment also what the force sets swinging, which the state does not show yet; and the part of the
-sampled signals that their polynomials leave out, for which all nodes of their tables are compared; this part is also
-compared with the motion of the blocks that a signal drives, which need not move a stop. A kink of the law between an
-end of the step and the nearest node does not show in the coefficients; there the law is compared with the polynomial.
+force by the oscillation of modes too fast for the nodes, without what follows the forces of a step with smooth nodes;
+in the first step of a contact or segment also by what the force sets swinging, which the state does not show yet; and
+the part of the sampled signals that their polynomials leave out, for which all nodes of their tables are compared; this
+part is also compared with the motion of the blocks that a signal drives, which need not move a stop. A kink of the law
+between an end of the step and the nearest node does not show in the coefficients; there the law is compared with the
+polynomial. A mode that the force it makes between the nodes would move by as much as it swings shortens the step, too,
+see `tables.reactions`.
 
 In this error, what a light element takes from a heavy structure is lost. So, where the slope of a law with memory
 changes on the step, the part left out must also be below 10 rtol of the largest force, or below the rounding of the
@@ -66,14 +68,15 @@ from solvers.exponential.contact.node_response import (
     STRAIGHT,
     error_of_work,
     force_of,
+    force_ripple_of,
     largest_size,
     law_slopes_at_nodes,
     motion_of,
     node_forces,
-    oscillation_of,
+    note_oscillation,
     own_accelerance,
     respond_all,
-    ripple_of,
+    swing_of,
     unresolved_part,
     unresolved_signal,
 )
@@ -260,19 +263,49 @@ def _find_unresolved(run, node_set, level, u):
         if unresolved > _TOO_MUCH * scratch.force_tolerance[s]:
             rounding = _force_rounding(run, s)
             unresolved = max(unresolved - rounding, _LITTLE * scratch.force_tolerance[s])
-        alias = tables.alias[tables.kind[node_set], level]
-        ripple = ripple_of(run, u, alias)
-        if scratch.control[NEW]:
-            ripple += _ripple_begun(run, u, alias)
-        counts = _MEAN_OF_RIPPLE * stiffness * ripple > max(unresolved, _LITTLE * scratch.force_tolerance[s])
-        if counts and node_set == 0:
-            ripple = min(ripple, oscillation_of(run, level, u, alias))
         damped = scratch.viscous[s] > 0.0 and not is_circle(problem, s)  # nothing damps motion across a radius
         if rubs(problem, s):
             damped, stiffness = False, max(stiffness, slider_of(problem, s)[FRICTION_STIFFNESS])
+        ripple, gain = _ripple_of_force(run, node_set, level, u, unresolved, stiffness)
         span = h * _undamped_part(run, node_set, h, s) if damped else h
-        scratch.unresolved[u] = span * (unresolved + _MEAN_OF_RIPPLE * stiffness * ripple)
+        scratch.unresolved[u] = span * (unresolved + _MEAN_OF_RIPPLE * ripple)
+        error = max(error, gain**S)  # a limit: steps grow as if errors fell like a high power of their length
     return error
+
+
+@inlined
+def _damping_of(run, s):
+    """Largest slope of the force of element s by its rate at the nodes, N s/m."""
+    law = run.tables.power_law[s]
+    if law[EXPONENT] > 0.0:
+        deep = max(largest8(load8(motion_of(run, s)[0], 0)), 0.0)
+        deep *= math.sqrt(deep) if law[EXPONENT] == 1.5 else 1.0
+        return abs(law[FACTOR]) / run.state.entry_rate[s] * law[STIFFNESS] * deep + abs(law[DAMPING])
+    if run.problem.knots[s, 0] == 0.0:  # else `_largest_force` has them
+        law_slopes_at_nodes(run, s)
+    return largest_size(run.scratch.slope[s, 1])
+
+
+@merged
+def _ripple_of_force(run, node_set, level, u, unresolved, stiffness):
+    """Error of the force on row u between the nodes, N, by blocks too fast for them; then their gain.
+
+    The gain is the largest part of its oscillation by which a block is moved by the force that it makes, see
+    `tables.reactions`. One moved by as much as it oscillates swings ever more from step to step, from rounding on.
+    """
+    tables, scratch, s, kind = run.tables, run.scratch, element_of(run.problem, u), run.tables.kind[node_set]
+    if tables.aliased[kind, level] == 0.0:
+        return 0.0, 0.0
+    alias, damping = tables.alias[kind, level], _damping_of(run, s)
+    ripple = force_ripple_of(run, swing_of(run), u, alias, stiffness, damping)
+    if scratch.control[NEW]:
+        ripple += _ripple_begun(run, u, alias, stiffness, damping)
+    if node_set > 0:
+        return ripple, 0.0
+    if _MEAN_OF_RIPPLE * ripple > max(unresolved, _LITTLE * scratch.force_tolerance[s]):
+        note_oscillation(run, level)
+        ripple = min(ripple, force_ripple_of(run, scratch.oscillation, u, alias, stiffness, damping))
+    return ripple, stiffness * tables.reactions[u, level, 0] + damping * tables.reactions[u, level, 1]
 
 
 @inner
@@ -295,11 +328,13 @@ def _note_ringing(run, h):
 
 
 @inner
-def _ripple_begun(run, u, alias):
-    """Error of row u's displacement between the nodes, m, by what the forces have set swinging."""
-    weight, begun, n, error = run.tables.ripple_weight[u], run.scratch.ringing, run.problem.k.size, 0.0
+def _ripple_begun(run, u, alias, stiffness, damping):
+    """Error of the force on row u between the nodes, N, by what the forces have set swinging."""
+    weight, rate_weight, n = run.tables.ripple_weight[u], run.tables.rate_ripple_weight[u], run.problem.k.size
+    error = 0.0
     for b in range(n):
-        error += weight[b] * alias[n + b] * begun[b]
+        slope = stiffness * weight[b] + damping * rate_weight[b]
+        error += slope * alias[n + b] * run.scratch.ringing[b]
     return error
 
 

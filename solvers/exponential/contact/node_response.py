@@ -387,9 +387,9 @@ def law_slopes_at_nodes(run, s):
 @inlined
 def ripple_of_stop(run, s, alias):
     """Error of a stop's indentation between the nodes by fast blocks, m; see `ripple_of`."""
-    row = row_of(run.problem, s)
-    ripple = ripple_of(run, row, alias)
-    return ripple + ripple_of(run, row + 1, alias) if is_circle(run.problem, s) else ripple
+    row, x = row_of(run.problem, s), swing_of(run)
+    ripple = ripple_of(run, x, row, alias)
+    return ripple + ripple_of(run, x, row + 1, alias) if is_circle(run.problem, s) else ripple
 
 
 @inner
@@ -407,29 +407,52 @@ def swing_of(run):
 
 
 @inner
-def ripple_of(run, r, alias):
-    """Bound, m, of the error of row r's displacement between the nodes, by blocks too fast for the nodes."""
-    return _sum_of_swings(run.tables.ripple_weight[r], alias, swing_of(run), run.problem.k.size)
+def ripple_of(run, x, r, alias):
+    """Bound, m, of the error of row r's displacement between the nodes, by fast blocks that oscillate by x, (2N,)."""
+    return _sum_of_swings(run.tables.ripple_weight[r], alias, x, run.problem.k.size)
+
+
+@inner
+def rate_ripple_of(run, x, r, alias):
+    """The same of its rate, m/s."""
+    return _sum_of_swings(run.tables.rate_ripple_weight[r], alias, x, run.problem.k.size)
+
+
+@reordered
+def force_ripple_of(run, x, r, alias, stiffness, damping):
+    """The same of a force, N, with these slopes by the displacement and its rate."""
+    weight, rate_weight, n, error = (
+        run.tables.ripple_weight[r],
+        run.tables.rate_ripple_weight[r],
+        run.problem.k.size,
+        0.0,
+    )
+    for b in range(n):
+        slope = stiffness * weight[b] + damping * rate_weight[b]
+        error += slope * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
+    return error
 
 
 @reordered
 def _take_off_following(x, rows, derivatives, per_h, out):
-    """Write x less what follows a force with the ``derivatives`` F h^i/i! into ``out``; see `tables.following`."""
+    """Write x less what follows a force with the ``derivatives`` F⁽ⁱ⁾ hⁱ into ``out``; see `tables.following`."""
     f0, f1, f2, f3 = derivatives[0], derivatives[1], derivatives[2], derivatives[3]
     f1, f2, f3 = f1 * per_h, f2 * per_h**2, f3 * per_h**3
     for i in range(out.size):
         out[i] = x[i] - (f0 * rows[0, i] + f1 * rows[1, i] + f2 * rows[2, i] + f3 * rows[3, i])
 
 
-@merged
-def _note_oscillation(run, level):
-    """Write what oscillates on a step with smooth nodes into ``scratch.oscillation``.
+@inner
+def note_oscillation(run, level):
+    """Write what oscillates on the step tried, with smooth nodes, into ``scratch.oscillation``, if it is not there yet.
 
     The blocks respond to forces that are polynomials by a polynomial of the same degree, which the nodes hold exactly,
     and by an oscillation: what the state at the start has more than that polynomial. Four terms of it are taken off; a
     block that oscillates between the nodes follows the others so little that they may count as oscillation.
     """
     problem, tables, scratch = run.problem, run.tables, run.scratch
+    if scratch.is_split[0]:
+        return
     x, per_h = swing_of(run), 1.0 / tables.contact_step[level]
     for u in range(problem.gap.size):
         if acts(problem, run.state, u):
@@ -437,24 +460,6 @@ def _note_oscillation(run, level):
             _take_off_following(x, tables.force_following[u], scratch.trial, per_h, scratch.oscillation)
             x = scratch.oscillation
     scratch.is_split[0] = 1
-
-
-@inner
-def oscillation_of(run, level, r, alias):
-    """`ripple_of` by what oscillates on the step tried, without what follows its forces."""
-    if not run.scratch.is_split[0]:
-        _note_oscillation(run, level)
-    return _sum_of_swings(run.tables.ripple_weight[r], alias, run.scratch.oscillation, run.problem.k.size)
-
-
-@inner
-def rate_ripple_of(run, r, alias):
-    """The same of its rate, m/s."""
-    problem, weight, x = run.problem, run.tables.ripple_weight[r], swing_of(run)
-    error, n = 0.0, problem.k.size
-    for b in range(n):
-        error += weight[b] * math.sqrt(problem.k[b]) * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
-    return error
 
 
 @reordered

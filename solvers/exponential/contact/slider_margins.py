@@ -54,7 +54,16 @@ from solvers.exponential.circles.friction import (
 )
 from solvers.exponential.contact.crossings import REST, ROUNDING
 from solvers.exponential.contact.first_step import NEW
-from solvers.exponential.contact.node_response import DELTAS, FORCES, KNOWN, RATES, RTOL, rate_ripple_of, ripple_of
+from solvers.exponential.contact.node_response import (
+    DELTAS,
+    FORCES,
+    KNOWN,
+    RATES,
+    RTOL,
+    rate_ripple_of,
+    ripple_of,
+    swing_of,
+)
 from solvers.exponential.contact.nodes import AT_BEGIN, AT_END, LOCAL_SLOPES, SLOPE_AT_BEGIN, SLOPE_AT_END, S
 from solvers.exponential.contact.peaks import BELOW_PEAK, local_maximum, motion_around
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR
@@ -313,11 +322,10 @@ def _add_rounding(run, s, slopes, ripple, faster):
 @inlined
 def _ripples(run, s, alias):
     """Bounds of the errors of δ or ξ, m, and of their rates, m/s, by blocks that the nodes do not resolve."""
-    problem = run.problem
-    ripple, faster, first = 0.0, 0.0, row_of(problem, s)
+    ripple, faster, first, x = 0.0, 0.0, row_of(run.problem, s), swing_of(run)
     for r in range(first, first + 2):
-        ripple += ripple_of(run, r, alias)
-        faster += rate_ripple_of(run, r, alias)
+        ripple += ripple_of(run, x, r, alias)
+        faster += rate_ripple_of(run, x, r, alias)
     return ripple, faster
 
 
