@@ -38,6 +38,7 @@ from solvers.exponential.contact.crossings import (
     ON_BORDER,
     REST,
     ROUNDING,
+    UNRESOLVED,
     WATCHED_BELOW,
     extremum,
     time_of_place,
@@ -75,7 +76,6 @@ from solvers.exponential.contact.slider_margins import (
 )
 from solvers.problem.friction import CODE, FREE, PRESSES, STICK
 
-UNRESOLVED = -2  # in place of an element: the step is too long to tell whether a border is crossed
 _TOGETHER = 1e-9  # margin, relative to its value at the start, at which a border counts as reached along with another
 _MISSED = 1e-5  # the most, in units of its largest, by which a margin may be negative after a landing on its border
 _SHORTLY = 1e-3  # part of a step or landing over which a margin is extrapolated by the rates at its end

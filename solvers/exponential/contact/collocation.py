@@ -343,7 +343,6 @@ def step_error(run, node_set, level):
     """Largest error of an indentation rate over the step just solved, in units of its tolerance rtol × speed."""
     problem, scratch = run.problem, run.scratch
     h, worst = run.tables.contact_step[level], 0.0
-    scratch.is_split[0] = 0
     if scratch.control[NEW]:
         _note_ringing(run, h)
     for u in range(problem.gap.size):

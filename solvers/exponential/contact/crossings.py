@@ -47,9 +47,13 @@ from solvers.exponential.contact.node_response import (
     RATES,
     RTOL,
     motion_of,
+    note_oscillation,
+    rate_ripple_of,
     respond,
+    ripple_of,
     ripple_of_stop,
     shortest_step,
+    swing_of,
 )
 from solvers.exponential.contact.nodes import LOCAL, S
 from solvers.exponential.contact.peaks import largest_indentation, maximum_and_place, motion_around
@@ -57,6 +61,7 @@ from solvers.exponential.flight import energy_norms
 from solvers.exponential.tables import DAMPING, EXPONENT, FACTOR, FORCE, RATE, STIFFNESS
 
 CLEAR, TOO_LONG = -1, -2  # results of `before_landing`: no other event, or one that requires shorter steps
+UNRESOLVED = -2  # in place of a stop or element: the step is too long to tell whether it crosses a bend or border
 # event functions of bends, and margins of borders, in units of their largest on the step:
 ROUNDING = 1e-11  # up to which they may be rounding
 ON_BORDER = 1e-9  # up to which a step counts as begun on the bend or border
@@ -266,6 +271,7 @@ def choose_sides(run):
 def first_bend(run, node_set, level, is_new):
     """(time after the start of the step, stop) of the first bend that the step just tried crosses, or (inf, -1).
 
+    The stop is `UNRESOLVED` if fast blocks, which the nodes do not resolve, may cross one between them and back.
     A stop that begins on its bend (``is_new``), or has crossed it as another stop landed, gets the side of the first
     node. An event function within its tolerance crosses nothing.
     """
@@ -293,6 +299,9 @@ def first_bend(run, node_set, level, is_new):
         time = _bend_at_nodes(run, node_set, h, s, begin, largest)
         if time == np.inf:
             time = _bend_between_nodes(run, node_set, h, s, begin, largest)
+        resolved = level == tables.contact_step.size - 1 or tables.aliased[tables.kind[node_set], level] == 0.0
+        if time == np.inf and not resolved and _may_hide_bend(run, node_set, level, s, negligible):
+            return np.inf, UNRESOLVED
         if time < first:
             first, stop = time, s
             scratch.bend_values[S + 1] = largest
@@ -331,6 +340,40 @@ def _bend_between_nodes(run, node_set, h, s, begin, largest):
         if deep > tolerance and place > LOCAL[0]:
             return time_of_place(run.tables, node_set, h, i, place)
     return np.inf
+
+
+@inner
+def _may_hide_bend(run, node_set, level, s, negligible):
+    """Whether fast blocks may take the event function of stop s to the other side by more than ``negligible``.
+
+    It comes nearest to that at one of the nodes, or at the end of the step. There it is evaluated again with the ripple
+    of δ and of δ̇, at last that of what does not follow the forces.
+    """
+    scratch, alias = run.scratch, run.tables.alias[run.tables.kind[node_set], level]
+    values, side, nearest = scratch.bend_values, scratch.side[s], 0
+    for i in range(1, S):
+        if side * values[i] < side * values[nearest]:
+            nearest = i
+    ripple = _ripple_of_bend(run, s, swing_of(run), alias, nearest)
+    lowest = min(side * values[nearest], side * values[S])
+    if ripple <= max(lowest, negligible) or node_set > 0:
+        return ripple > max(lowest, negligible)
+    note_oscillation(run, level)
+    return _ripple_of_bend(run, s, scratch.oscillation, alias, nearest) > max(lowest, negligible)
+
+
+@inner
+def _ripple_of_bend(run, s, x, alias, node):
+    """Change of the event function of stop s at a node by the ripple of δ and of δ̇, where blocks oscillate by x."""
+    scratch, first = run.scratch, row_of(run.problem, s)
+    delta, rate, motion = scratch.local_motion[DELTAS], scratch.local_motion[RATES], motion_of(run, s)
+    for i in range(3):
+        delta[i], rate[i] = max(motion[0, node], run.problem.knots[s, 0]), motion[1, node]
+    for r in range(first, first + (2 if is_circle(run.problem, s) else 1)):
+        delta[1] += ripple_of(run, x, r, alias)
+        rate[2] += rate_ripple_of(run, x, r, alias)
+    _sides(run, s, 3, delta[:3], rate[:3], scratch.numbers[:3])
+    return abs(scratch.numbers[1] - scratch.numbers[0]) + abs(scratch.numbers[2] - scratch.numbers[0])
 
 
 @inlined

@@ -11,8 +11,8 @@ from numba import types
 
 from solvers.compiled.kernels import REAL, indentation
 from solvers.compiled.parts import FIRST_END, GO_BEYOND, LAND, LAND_IN_TIME, part
-from solvers.exponential.contact.borders import UNRESOLVED, border_ahead, renew_all, renew_border
-from solvers.exponential.contact.crossings import first_bend
+from solvers.exponential.contact.borders import border_ahead, renew_all, renew_border
+from solvers.exponential.contact.crossings import UNRESOLVED, first_bend
 from solvers.exponential.contact.landing import land, land_on_bend_or_border
 from solvers.exponential.contact.node_response import LANDED
 
@@ -43,7 +43,7 @@ def first_end(run, node_set, level, is_new):
     """
     first, stop = first_bend(run, node_set, level, is_new)
     time, element, border, slope = border_ahead(run, node_set, level)
-    if element == UNRESOLVED and level < run.tables.contact_step.size - 1:
+    if min(stop, element) == UNRESOLVED and level < run.tables.contact_step.size - 1:
         return np.inf, UNRESOLVED, -1, 0.0
     return (time, element, border, slope) if time < first else (first, stop, -1, 0.0)
 

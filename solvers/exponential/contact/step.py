@@ -56,9 +56,9 @@ from solvers.compiled.state import (
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import guess_radial_forces
 from solvers.exponential.circles.friction import guess_rubbing_forces
-from solvers.exponential.contact.borders import UNRESOLVED, border_behind, margins_of
+from solvers.exponential.contact.borders import border_behind, margins_of
 from solvers.exponential.contact.collocation import end_state, solve_forces, step_error
-from solvers.exponential.contact.crossings import leaves_segment
+from solvers.exponential.contact.crossings import UNRESOLVED, leaves_segment
 from solvers.exponential.contact.first_step import (
     ENTRY,
     LEVEL,
@@ -241,6 +241,7 @@ def _attempt(run, node_set, level):
     problem = run.problem
     shortest = level == run.tables.contact_step.size - 1
     time, element, border, slope = np.inf, -1, -1, 0.0
+    run.scratch.is_split[0] = 0
     free_response(run, node_set, level)
     _predict(run, level)
     if not solve_forces(run, node_set, level):
