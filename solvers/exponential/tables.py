@@ -60,7 +60,7 @@ class Tables(NamedTuple):
     load_rows: Annotated[Any, "L, 2, N8"]  # state rate of p and v per unit of a signal
     block_k_c: Annotated[Any, "2, N8"]  # k in 1/s², c in 1/s
     observed: Annotated[float, "number"]  # contact step from which on the energy balance has tables
-    force_following: Annotated[Any, "R, 4, 2*N"]  # the same of forces on the rows, of all blocks with k > 0
+    force_following: Annotated[Any, "R, 4, 2*N"]  # `following` of forces on the rows, all blocks with k > 0
     stop_rows: Annotated[Any, "R, 4, N8"]  # the first two rows give δ + gap from p and v, the others δ̇
     acceleration_weight: Annotated[Any, "R, N8"]  # |δ̈| <= Σ weight × energy norm
     acceleration_signal: Annotated[Any, "R, L, 5"]  # see `_acceleration_by_signal`

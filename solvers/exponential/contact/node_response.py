@@ -421,12 +421,8 @@ def rate_ripple_of(run, x, r, alias):
 @reordered
 def force_ripple_of(run, x, r, alias, stiffness, damping):
     """The same of a force, N, with these slopes by the displacement and its rate."""
-    weight, rate_weight, n, error = (
-        run.tables.ripple_weight[r],
-        run.tables.rate_ripple_weight[r],
-        run.problem.k.size,
-        0.0,
-    )
+    weight, rate_weight, n = run.tables.ripple_weight[r], run.tables.rate_ripple_weight[r], run.problem.k.size
+    error = 0.0
     for b in range(n):
         slope = stiffness * weight[b] + damping * rate_weight[b]
         error += slope * (alias[b] * abs(x[b]) + alias[n + b] * abs(x[n + b]))
