@@ -436,22 +436,25 @@ def test_good_runs_are_not_stopped(method):
     assert integrate(late, [0.0], [0.0], 1.0, method=method(1e-3)).status.good
 
 
+@pytest.mark.parametrize("rtol", [1e-8, 1e-10])
 @pytest.mark.parametrize(
     ("omega", "direction", "stiffness", "damping", "duration"),
     [
+        ([1.0, 61.95, 134.46], [-0.035, 0.672, -0.9173], 92.9, 52.8, 98.4),
         ([1.0, 10.0, 35.0, 525.0, 986.0], [0.3, -0.5, -0.6, -0.4, -0.5], 13.0, 610.0, 40.0),
         ([1.0, 14.8, 25.0, 403.0], [0.43, -0.2, -0.11, 0.165], 3.0, 740.0, 23.0),
     ],
 )
 def test_undamped_modes_between_the_nodes_do_not_swing_by_a_dashpot_in_contact(
-    omega, direction, stiffness, damping, duration
+    omega, direction, stiffness, damping, duration, rtol
 ):
     """A stop that is never left, beside its matrix exponential.
 
     The force that a fast mode makes at the nodes, a smooth polynomial between them, moved it more than it swung itself:
-    from rounding on it grew by up to 5 a step. Rates were off by up to a thousand rtol.
+    from rounding on it grew by up to 5 a step. Rates were off by up to a thousand rtol, and in the first case by 13 to
+    43 if only the ripple of the dashpot counts.
     """
-    n, row, rtol = len(omega), np.array(direction), 1e-10
+    n, row = len(omega), np.array(direction)
     K = np.diag(np.square(omega)) + stiffness * np.outer(row, row)
     A = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -damping * np.outer(row, row)]])
     rest = np.linalg.solve(K, 50.0 * stiffness * row)
@@ -460,4 +463,4 @@ def test_undamped_modes_between_the_nodes_do_not_swing_by_a_dashpot_in_contact(
     system = System.modal(omega, 0.0, [stop])
     run = integrate(system, rest + start[:n], start[n:], duration, dt=duration / 8, method=Exponential(rtol))
     exact = [expm(A * t) @ start for t in run.t]
-    assert np.abs(run.q_dot - np.array(exact)[:, n:]).max() < 30.0 * rtol
+    assert np.abs(run.q_dot - np.array(exact)[:, n:]).max() < 5.0 * rtol

@@ -179,15 +179,13 @@ def build(
     h, contact_h = _steps(omega, damping, tones, shortened)
     node_sets = node_sets_of(series)
     blocks = blocks_of(problem, tones, h, contact_h, node_sets)
-    follows = not kinked and dt_cell > 0.0
-    response = following(problem, problem.load, _FOLLOWS / dt_cell if follows else np.inf)
+    response = following(problem, problem.load, np.inf if kinked else _FOLLOWS / dt_cell)
     cell_error, cell_error_signal = cell_errors(problem, dt_cell, response)
+    own, alias = size - tones, blocks.alias[node_sets.kind[0]]
     ready = {**node_sets._asdict(), **blocks._asdict(), **laws}  # `alias` is that of the blocks
     signal_rows, power_rows, loss_rows = energy_rows
-    own, ripple_weight = size - tones, _ripple_weight(problem.read, omega)
-    ringing = np.hypot(problem.push[:, size:], omega * problem.push[:, :size])
-    ringing /= np.where(omega > 0.0, problem.k, np.inf)
     return Tables(
+        **_ripples(problem, contact_h, alias, own),
         **{name: ready[name] for name in Tables._fields if name in ready},
         flight_step=h,
         signal=_in_eights(signal_responses(problem, h).reshape(len(h), len(problem.load), 6, 2, size)),
@@ -212,15 +210,11 @@ def build(
         own_blocks=float(own),
         accelerance=-problem.read_rate @ problem.push.T,
         contact_step=contact_h,
-        ringing=ringing,
-        reactions=reactions(problem, contact_h, blocks.alias[node_sets.kind[0]], ripple_weight * ringing, own),
-        ripple_weight=ripple_weight,
-        rate_ripple_weight=ripple_weight * omega,
         aliased=blocks.alias.max(axis=2),
         signal_rows=signal_rows,
         power_rows=power_rows,
         loss_rows=loss_rows,
-        steady_rate=np.zeros((2 * tones, padded(size - tones))),
+        steady_rate=np.zeros((2 * tones, padded(own))),
         gauss=_gauss_rule(),
     )
 
@@ -279,6 +273,16 @@ def _steps_of(omegas: bytes, dampings: bytes, doublings: int, shortened: int) ->
     first = int(np.searchsorted(-h, -_MOST_RADIANS / fastest))
     bottom = math.ceil(4.0 * math.log2(longest / (min(_CONTACT_REACH / fastest, _SHORT) * SHORTER**shortened)))
     return h, longest * 2.0 ** (-0.25 * np.arange(first, bottom + 2, 2))
+
+
+def _ripples(problem: Problem, h: Any, alias: Any, own: int) -> dict[str, Any]:
+    """The tables of what oscillates between the nodes, by name; ``alias`` is that of the smooth nodes."""
+    size, omega = len(problem.k), np.sqrt(problem.k)
+    weight = _ripple_weight(problem.read, omega)
+    ringing = np.hypot(problem.push[:, size:], omega * problem.push[:, :size])
+    ringing /= np.where(omega > 0.0, problem.k, np.inf)
+    moved = reactions(problem, h, alias, weight * ringing, own)
+    return {"ringing": ringing, "reactions": moved, "ripple_weight": weight, "rate_ripple_weight": weight * omega}
 
 
 def _ripple_weight(read: Any, omega: Any) -> Any:

@@ -64,6 +64,7 @@ from solvers.exponential.contact.many_stops import add_end_response, pair_respon
 from solvers.exponential.contact.node_newton import MOST_ITERATIONS, newton
 from solvers.exponential.contact.node_response import (
     FORCES,
+    LEFT_BY_ITERATION,
     RTOL,
     STRAIGHT,
     error_of_work,
@@ -141,7 +142,7 @@ def _set_accuracy(run, h):
                         sensitivity, abs(run.tables.accelerance[r, u]) / scratch.reference_speed[element_of(problem, r)]
                     )
                 copy(scratch.force[u], scratch.guess[u], S)
-            scratch.force_tolerance[s] = 0.05 * scratch.accuracy[RTOL] / (h * sensitivity)
+            scratch.force_tolerance[s] = LEFT_BY_ITERATION * scratch.accuracy[RTOL] / (h * sensitivity)
             stiff |= h * own_accelerance(run, s) * scratch.viscous[s] > 1.0
     for s in range(problem.law.size if not stiff else 0):
         scratch.viscous[s] = 0.0

@@ -58,6 +58,7 @@ RTOL, REACH = range(2)  # places in Scratch.accuracy
 WHEN, SLOPE = range(2)  # places in Scratch.ahead and expected: s; slope by time of the margin at its zero, 0 if unknown
 ELEMENT, BORDER, ONLY_EXPECTED = range(3)  # places in Scratch.ahead_of; the first two also in expected_of
 _KINK_JUMP = 1e-2  # jump of a third derivative, over signal/dt³, that is a kink; smooth signals have a tenth
+LEFT_BY_ITERATION = 0.05  # of rtol × reference speed: what the iterated forces of a step may leave open of a rate
 STRAIGHT = 1e-9  # change of a law's slope on a step, in units of the slope, that is rounding
 _WORK_TOLERANCE = 10.0  # part of a force, in units of rtol × the largest force, that a step may leave out for its work
 _ROUNDINGS = 4.0  # rounding of the coefficients of a force, in units of that of its values

@@ -58,6 +58,7 @@ from solvers.exponential.contact.node_response import (
     DELTAS,
     FORCES,
     KNOWN,
+    LEFT_BY_ITERATION,
     RATES,
     RTOL,
     rate_ripple_of,
@@ -76,7 +77,6 @@ _SLOPE_ROUNDING = 1e-8  # of a margin, in units of its largest, that contains th
 _TINY = 1e-300  # m, keeps N/δ finite
 _DIFFERENCE_STEP = 1e-6  # relative step in δ and δ̇ for differences of the slopes of N
 _LEFT_OUT, _CLEAR_OF_ZERO = 4.0, 0.05  # see `_ends_by_polynomial`
-_LEFT_BY_ITERATION = 0.05  # of rtol, in units of the reference speed: what the forces of a step leave open of a rate
 _ON_BEND = 1e-9  # δ̇, in units of the reference speed, that a landing on a bend at δ̇ = 0 may leave
 
 
@@ -305,7 +305,7 @@ def _add_rounding(run, s, slopes, ripple, faster):
     slider, slips = slider_of(problem, s), _slips(slider_of(problem, s))
     xi, xi_rate = xi_tolerances(problem, s, state.now[T], state.x)
     rest, own_by_way = REST * scratch.reference_speed[s], slider[STIFFNESS] if slider[CODE] == STICK else 0.0
-    left = _LEFT_BY_ITERATION * scratch.accuracy[RTOL] * scratch.reference_speed[s]
+    left = LEFT_BY_ITERATION * scratch.accuracy[RTOL] * scratch.reference_speed[s]
     delta, rate = surface_tolerance(problem, s, state.x), max(rate_tolerance(problem, s, state.x), rest)
     for j in range(problem.border_count[s]):
         by_delta, by_rate, by_way, by_speed = own_by_delta, own_by_rate, own_by_way, 1.0 if slips else 0.0
