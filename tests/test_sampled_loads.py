@@ -12,7 +12,7 @@ import pytest
 from scipy.optimize import brentq
 
 import fembeam as fb
-from contacts import Hertz, KelvinVoigt, Polynomial
+from contacts import Hertz, Hysteretic, KelvinVoigt, Polynomial
 from solvers import RK4, Contact, DormandPrince, Exponential, System, integrate, integrate_many
 from solvers.exponential.flight import cell_of
 from solvers.exponential.phi_functions import signal_responses
@@ -232,6 +232,24 @@ def test_an_entry_just_before_a_kink(place):
     assert ours.contacts.speed_in[0] == pytest.approx(math.sin(t_in), rel=1e-12)
     assert ours.q == pytest.approx(other.q, abs=1e-8)
     assert ours.cost.steps < 50  # cells are as long as the time between samples
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-6, 1e-7])
+def test_a_stop_that_opens_for_a_moment_within_a_landing_is_seen(rtol):
+    """A swift mode lifts a stop by 2e-7 m on the way to a kink; by a cubic for δ it stayed in contact."""
+    k = np.arange(1, 7)
+    middle, third, place, pushed = (np.sin(k * math.pi * z) for z in (0.5, 1.0 / 3.0, 0.48323, 0.20897))
+    C = 15.425 * np.outer(middle, middle) + 4.564 * np.outer(third, third)
+    stop = Contact(place, Hysteretic(742993.0, 1.65724, clamp=False))
+    forces = [0.1177, -1.1661, 2.1103, 0.7143, 0.0832, 0.9392, -1.0142, 0.3397, 1.6482, -5.4487, -4.8238]
+    load = fb.Record(0.002650937 * np.arange(11), forces, quantity="force", interpolation="linear")
+    system = System(np.eye(6), C, np.diag(37.46855 * k**2) ** 2, [stop], [(pushed, load)])
+    q = [-0.000342415, 0.000430492, -0.000676116, -0.000695854, -0.000321337, 0.000839515]
+    q_dot = [-0.295, 0.312761, 0.210523, -0.04811, -0.0847417, -0.406261]
+    ours, exact = (integrate(system, q, q_dot, 0.0265, method=m) for m in (Exponential(rtol), DormandPrince(1e-11)))
+    assert len(exact.contacts) == len(ours.contacts) == 2
+    assert ours.contacts.t_out == pytest.approx(exact.contacts.t_out, abs=1e-6)
+    assert ours.q[-1] == pytest.approx(exact.q[-1], abs=1e3 * rtol * np.abs(exact.q[-1]).max())
 
 
 def test_a_table_may_tell_both_sides_of_kinks_but_not_of_jumps():

@@ -17,7 +17,7 @@ import math
 import numpy as np
 from numba import types
 
-from solvers.compiled.dop853_tableau import STAGES, C
+from solvers.compiled.dop853_tableau import STAGES, A, C
 from solvers.compiled.kernels import (
     REAL,
     VECTOR,
@@ -39,11 +39,12 @@ from solvers.compiled.kernels import (
 from solvers.compiled.parts import BOUNDS, LEAVES, SIDE, part
 from solvers.compiled.simd import largest8, least8, load8, splat8, store8
 from solvers.compiled.state import OUTSIDE, PEAK_FORCE, T_IN, T, acts, begins_and_ends, is_open
-from solvers.compiled.sums import above
+from solvers.compiled.sums import above, combine
 from solvers.exponential.circles.contact import radial_nodes, stays_in_circle
 from solvers.exponential.contact.many_stops import CONTINUING, ENTERING, add_block_motion, motion_at_nodes, uses_blocks
 from solvers.exponential.contact.node_response import (
     DELTAS,
+    DIFFERENCE,
     RATES,
     RTOL,
     motion_of,
@@ -377,10 +378,26 @@ def _ripple_of_bend(run, s, x, alias, node):
 
 
 @inlined
-def _leaves_on_landing(run, s, w, x, slopes, long):
-    """Stop s if its δ has left its segment where a landing ends, `TOO_LONG` if it has done so in between, or `CLEAR`.
+def _error_of_cubic(run, s, w, d, a, slope_a, b, slope_b):
+    """Largest error on a landing of length d of the cubic for δ of stop s, m, by the rate at one stage inside.
 
-    ``slopes`` are its δ̇ in the states w and x; a landing that is not ``long`` is not looked into.
+    The cubic through (0, a) and (d, b) with these slopes errs by M t²(d - t)² where δ⁗ is constant; M follows from the
+    difference of its slope from δ̇ at the stage.
+    """
+    stages, width = run.scratch.stages, run.state.x.size
+    inside = stages[DIFFERENCE]
+    combine(stages, A[_WITHIN], _WITHIN, w, inside)
+    mean, y = (b - a) / d, (inside[width] - w[width]) / d
+    slope = slope_a + y * (6.0 * mean - 4.0 * slope_a - 2.0 * slope_b + 3.0 * y * (slope_a + slope_b - 2.0 * mean))
+    rate = indentation_rate(run.problem, s, inside)
+    return abs(rate - slope) * d / (32.0 * y * (1.0 - y) * max(abs(1.0 - 2.0 * y), 0.1))
+
+
+@inlined
+def _leaves_on_landing(run, s, w, x, slopes, long):
+    """Stop s if its δ has left its segment where a landing ends, `TOO_LONG` if it may have done so in between.
+
+    Else `CLEAR`. ``slopes`` are its δ̇ in the states w and x; a landing that is not ``long`` is not looked into.
     """
     problem = run.problem
     width, segment = run.state.x.size, run.state.segment[s]
@@ -389,8 +406,12 @@ def _leaves_on_landing(run, s, w, x, slopes, long):
     lower = problem.knots[s, segment - 1] - tolerance if segment > 0 else -np.inf
     if not lower <= b <= upper:
         return s
-    if long and _cubic_leaves(x[width] - w[width], a, slopes[0], b, slopes[1], lower, upper):
-        return TOO_LONG
+    if long and slopes[0] * slopes[1] < 0.0:
+        d, top = x[width] - w[width], slopes[0] > 0.0
+        turned = extremum(d, a, slopes[0], b, slopes[1])
+        error = _error_of_cubic(run, s, w, d, a, slopes[0], b, slopes[1])
+        if turned + error > upper if top else turned - error < lower:
+            return TOO_LONG
     return CLEAR
 
 
