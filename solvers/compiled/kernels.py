@@ -43,8 +43,9 @@ from solvers.problem.friction import ACCOUNTS, ARM, CODE, STICK
 
 
 class Problem(NamedTuple):
-    """Arrays that kernels read and, but for latched numbers, never write; `state.problem_of` fills them, in SI units.
+    """Arrays that kernels read; in `parameters` they write what laws latch, and what sliders hold.
 
+    `state.problem_of` fills them, in SI units.
     z = [p, v] are block coordinates, for mass-normalised modes in √kg m and √kg m/s.
     """
 

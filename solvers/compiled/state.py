@@ -55,7 +55,8 @@ KIND, BEGAN, ENDED, SPAN, FIRST, SECOND, HEAD = range(7)  # columns of State.eve
 class State(NamedTuple):
     """All that a run changes; a run can be continued from it.
 
-    `begin_state` fills it; from then on kernels alone write to it. Units as in `kernels.Problem`.
+    `begin_state` fills it; from then on kernels write to it, and `integration` samples at the ends of the run. Units
+    as in `kernels.Problem`.
     """
 
     now: Annotated[Any, "6"]  # s, places named above; the steps are those of `stepping`, for LEFT see `summed`

@@ -126,7 +126,7 @@ def _begin(run):
     problem, past, scratch, derivatives = run.problem, run.past, run.scratch, run.derivatives
     for s in range(problem.law.size):
         if rubs(problem, s):
-            scratch.node_directions[6 * s, 0] = slider_of(problem, s)[CODE]
+            scratch.slider_code[s] = slider_of(problem, s)[CODE]
     begin_contacts(problem, past)
     for s in range(problem.law.size):
         if past.segment[s] > 0:
@@ -134,7 +134,7 @@ def _begin(run):
             for c in range(derivatives.y.shape[0]):
                 change = change_of(run, past.x, c, s, 1, 0.0)
                 derivatives.entry[c, s] = 0.0 if abs(rate) < problem.floor[s] else np.sign(rate) * change
-            if rubs(problem, s) and scratch.node_directions[6 * s, 0] == FREE:
+            if rubs(problem, s) and scratch.slider_code[s] == FREE:
                 latch_begin(run, s)
 
 
@@ -293,7 +293,7 @@ def _land(run, row):
         scratch.before_cut[s] = 0.0
     _update_sides(run, past.x)
     while True:
-        landing_step(run.here, False, np.int64(STAGES), variable, stop, span, w, scratch.before_cut, scratch.stages)
+        landing_step(run.here, False, np.int64(STAGES), variable, stop, span, w, scratch.before_cut)
         if not _update_sides(run, scratch.stages[LANDED]):
             break
     trial = scratch.stages[STAGES + 1]

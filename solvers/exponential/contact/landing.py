@@ -4,14 +4,14 @@ It is a step of DOP853 with t among the unknowns. The independent variable is on
 
     INDENTATION   dt = dδ/δ̇                                ends exactly on a knot, or on the surface of a stop
     ROOT          dt = κ u^{κ-1} du/δ̇, u = δ^{1/κ}         ends exactly on δ = 0, where δ^{3/2} is singular
-    TIME          dt                                       ends on a bend or border, by the secant rule
+    TIME          dt                                       ends on a bend or border, or on the kink of a load
     SINCE         dt = κ u^{κ-1} du, u = (t - t_in)^{1/κ}  the same in a step from an entry on, singular like δ^{3/2}
 
-with κ as at entry. The first two know the length of the step beforehand. The others iterate for a zero of the *event
-function* of a bend or border (`_event_function`); forces are continuous there. A border of friction just before δ = 0
-is located in the variable of `ROOT` too. The polynomial through the nodes of the step tried before gives the time to
-about 1e-5 of its length; the correction is a short step of the midpoint rule or the classical one, so that most
-landings take one step of DOP853.
+with κ as at entry. The first two know the length of the step beforehand. To a bend or border the others iterate by the
+secant rule for a zero of its *event function* (`_event_function`); forces are continuous there. A border of friction
+just before δ = 0 is located in the variable of `ROOT` too. The polynomial through the nodes of the step tried before
+gives the time to about 1e-5 of its length; the correction is a short step of the midpoint rule or the classical one, so
+that most landings take one step of DOP853.
 
 The unknowns are [p, v, energy balance, t, u]. A landing lasts at most `landing_reach` radians of the fastest block, up
 to which DOP853 is exact to the tolerance for every block. The error by the forces is in units of each stop's tolerance.
@@ -253,7 +253,7 @@ def take_step(run, variable, stop, span):
     scratch = run.scratch
     run.state.count[CALLS] += landing_step(
         *(run, scratch.control[BALANCED] > 0, np.int64(STAGES), variable, stop, span),
-        *(scratch.stages[START], scratch.side, scratch.stages),
+        *(scratch.stages[START], scratch.side),
     )
 
 
@@ -264,7 +264,7 @@ def _short_step(run, variable, stop, span, count):
     copy(scratch.stages[LANDED], scratch.stages[WITHIN], scratch.stages.shape[1])
     run.state.count[CALLS] += landing_step(
         *(run, scratch.control[BALANCED] > 0, np.int64(count), variable, stop, span),
-        *(scratch.stages[WITHIN], scratch.side, scratch.stages),
+        *(scratch.stages[WITHIN], scratch.side),
     )
 
 

@@ -9,7 +9,6 @@ from numba import types
 
 from solvers.compiled.dop853_tableau import STAGES, A
 from solvers.compiled.kernels import (
-    MATRIX,
     REAL,
     VECTOR,
     add_friction,
@@ -78,9 +77,9 @@ def _force(run, s, delta, delta_dot, side, batch):
 
 
 @merged
-def _rate(run, with_energy, variable, stop, span, w, side, out, batch):
+def _rate(run, with_energy, variable, stop, span, w, side, out):
     """Write d[state, t, u]/d(variable) × ``span`` at w = [state, t, u] into ``out``; returns the law calls."""
-    problem, segment = run.problem, run.state.segment
+    problem, segment, batch = run.problem, run.state.segment, run.scratch.stages[BATCH]
     n, calls, pace = problem.k.size, 0, np.nan
     size, t = 2 * n, width_of(problem)
     for b in range(n):
@@ -124,20 +123,21 @@ def _rate(run, with_energy, variable, stop, span, w, side, out, batch):
     return calls
 
 
-@part(LANDING_STEP, types.int64, *_CHOICE, REAL, VECTOR, VECTOR, MATRIX)
-def landing_step(run, with_energy, count, variable, stop, span, w, side, work):
-    """One step of ``count`` stages and length ``span`` in the variable from ``w`` to ``work[LANDED]``; law calls.
+@part(LANDING_STEP, types.int64, *_CHOICE, REAL, VECTOR, VECTOR)
+def landing_step(run, with_energy, count, variable, stop, span, w, side):
+    """One step of ``count`` stages and length ``span`` from w to ``scratch.stages[LANDED]``; returns law calls.
 
-    Its order is 8 with the stages of DOP853, which stay in ``work``; 2 with two of the midpoint rule or 4 with four of
-    the classical method, which leave those as they are.
+    Its order is 8 with the stages of DOP853, which stay there; 2 with two of the midpoint rule or 4 with four of the
+    classical method, which leave those as they are.
     """
-    batch, trial, calls = work[BATCH], work[LANDED], 0
+    work = run.scratch.stages
+    trial, calls = work[LANDED], 0
     stages = work if count == STAGES else work[SHORT:]
     tableau = A if count == STAGES else CLASSICAL if count == 4 else MIDPOINT
     for i in range(count):
         combine(stages, tableau[i], i, w, trial)
         counts = with_energy and tableau[count, i] != 0.0  # in the balance, whose own rates it does not change
-        calls += _rate(run, counts, variable, stop, span, trial, side, stages[i], batch)
+        calls += _rate(run, counts, variable, stop, span, trial, side, stages[i])
     combine(stages, tableau[count], count, w, trial)
     return calls
 

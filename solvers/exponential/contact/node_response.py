@@ -68,10 +68,10 @@ _RESOLVED = 4.0  # times the last two coefficients of a signal: differences up t
 class Scratch(NamedTuple):
     """Working arrays of the exponential integrator; the first index of many arrays is the row or element.
 
-    Only kernels write to them. `previous`, `control` and arrays with one number per stop may last from step to step;
-    values at the nodes are new in each step. States are block coordinates (for mass-normalised modes in √kg m and
-    √kg m/s), then the energy balance in J, and J and N s per stop; indentations are in m, rates in m/s, forces in N,
-    signals in their own units.
+    Kernels write to them, `Workspace.begin` sets them back and writes `accuracy`. `previous`, `control` and arrays with
+    one number per stop may last from step to step; values at the nodes are new in each step. States are block
+    coordinates (for mass-normalised modes in √kg m and √kg m/s), then the energy balance in J, and J and N s per stop;
+    indentations are in m, rates in m/s, forces in N, signals in their own units.
     """
 
     x_new: Annotated[Any, "X8"]  # state at the end of the step tried
@@ -88,7 +88,7 @@ class Scratch(NamedTuple):
     per_row: Annotated[Any, "R"]  # bounds of |δ̈| in m/s², errors of δ in m, or of δ̇ in m/s
     split_state: Annotated[Any, "7, 2, N8"]  # p and v of the blocks, of several states; see `energy.flight_balance`
     motion: Annotated[Any, "R+A, 2, S"]  # displacements of the rows and their rates at the nodes, δ and δ̇ of circles
-    clipped: Annotated[Any, "S"]  # indentations of one stop at the nodes, not below 0
+    clipped: Annotated[Any, "S"]  # indentations of a stop at the nodes, not below its first knot; or other values
     free: Annotated[Any, "R, 2, S"]  # the motion of the rows without contact forces
     force: Annotated[Any, "R+L, S"]  # forces on the rows, then values of the signals
     law_force: Annotated[Any, "R+A, S"]  # forces on the rows by the laws for the present motion, then the radial ones
@@ -123,7 +123,8 @@ class Scratch(NamedTuple):
     node_time: Annotated[Any, "S"]  # s, of the nodes of the step tried
     slid: Annotated[Any, "G, 4, S"]  # ξ, ξ̇ and F_t at the nodes, then scratch; see `circles.friction`
     row_slopes: Annotated[Any, "9*G, 2, S"]  # of forces on the rows of an element with friction, by these
-    node_directions: Annotated[Any, "6*G, S"]  # ∂δ/∂y and ∂ξ/∂y of each of its rows at the nodes, for Newton's method
+    node_directions: Annotated[Any, "6*G, S"]  # ∂δ/∂y and ∂ξ/∂y of each of its rows at the nodes, for derivatives
+    slider_code: Annotated[Any, "E"]  # code of each slider before the contacts begin, for derivatives
     point: Annotated[Any, "2, 6"]  # motion of an element with friction, now and extrapolated, see `compiled.sliding`
     numbers: Annotated[Any, "S"]  # for a law call
     margin: Annotated[Any, "B*S"]  # margins of an element's borders at points, row by row; see `borders`
@@ -138,7 +139,7 @@ class Scratch(NamedTuple):
     margin_before: Annotated[Any, "B"]  # of the element whose border is landed on
     largest: Annotated[Any, "E, B"]  # largest margins on the step tried last
     noise: Annotated[Any, "E, B"]  # their rounding
-    last_resort: Annotated[Any, "int 1"]  # 1 where no step could end before a border, nor the landing last longer
+    last_resort: Annotated[Any, "int 1"]  # 1 allows a landing of any error, `TURNED` tells that such a one has turned
     block_motion: Annotated[Any, "2*M, S"]  # p and v at the nodes; as the next two see `many_stops`
     block_force: Annotated[Any, "2*M, S"]  # state rates of the blocks by the forces at the nodes
     pair_weights: Annotated[Any, "M8"]  # products of a read row with the push of another row

@@ -56,7 +56,7 @@ from solvers.compiled.state import (
 from solvers.compiled.sums import combine
 from solvers.exponential.circles.contact import guess_radial_forces
 from solvers.exponential.circles.friction import guess_rubbing_forces
-from solvers.exponential.contact.borders import border_behind, margins_of
+from solvers.exponential.contact.borders import border_behind
 from solvers.exponential.contact.collocation import end_state, solve_forces, step_error
 from solvers.exponential.contact.crossings import UNRESOLVED, leaves_segment
 from solvers.exponential.contact.first_step import (
@@ -104,26 +104,13 @@ NEITHER, MOVES_OUT, RESTS = range(3)  # what `_leave_or_rest` finds
 _ONE_LEVEL = 2.0 ** (-0.5 * _ORDER)  # ratio of the errors of two steps whose lengths differ by √2, one level
 
 
-@inlined
-def _begins_beyond_a_border(run):
-    """Whether a law with memory passes a border before the first step, such as that of a preloaded yielding stop."""
-    beyond = False
-    for s in range(run.problem.law.size):
-        count = 0 if rubs(run.problem, s) else run.problem.border_count[s]
-        if count > 0:
-            margins_of(run, s, run.state.now[T], run.state.x, run.scratch.ends[:count])
-        for j in range(count):
-            beyond |= run.scratch.ends[j] < 0.0
-    return beyond
-
-
 @part(PRESSED, types.boolean)
 def _switch_pressed(run):
     """Switch every stop at rest on its surface that other stops' forces press into it; whether there was any."""
     problem, state = run.problem, run.state
     switched = False
-    if state.now[T] == 0.0 and _begins_beyond_a_border(run):
-        return False  # forces are those of segments that end at once
+    if state.now[T] == 0.0 and problem.parts[BEHIND] and border_behind(run)[0] >= 0:
+        return False  # forces are those of segments that end at once, as of a preloaded yielding stop
     for s in range(problem.law.size):
         if state.segment[s] > 0 or abs(indentation(problem, s, state.x)) > surface_tolerance(problem, s, state.x):
             continue
@@ -425,13 +412,20 @@ def advance_contact(run):
         longest = min(longest, allowed)
     # `longest` may be 0, beside a surface that is left or entered at rest
     level = level_of(tables, longest) if longest < tables.contact_step[wanted] else wanted
+    return _step(run, node_set, level, wanted)
+
+
+@merged
+def _step(run, node_set, level, wanted):
+    """Try a step of a level, and shorter ones, until one is accepted or a landing is done; returns a status code."""
+    state, scratch, shortest = run.state, run.scratch, run.tables.contact_step.size - 1
     copy(scratch.side, scratch.side_at_begin, scratch.side.size)
-    if tables.follows > 0.0:
+    if run.tables.follows > 0.0:
         note_swing(run)
     while True:
         tried = _attempt(run, node_set, level)
         element, border = tried.element, tried.border
-        if tried.error <= 1.0 and (element < 0 or not rubs(problem, element)):
+        if tried.error <= 1.0 and (element < 0 or not rubs(run.problem, element)):
             break
         on_it = tried.time == 0.0 and border >= 0  # the step begins on the border
         if element >= 0 and not on_it:
