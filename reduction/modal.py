@@ -226,7 +226,7 @@ def _rigid_with_root(omega: Vector, scale: float) -> float:
 
 def _largest(part: Vector, omega: Vector, rigid: float) -> float:
     """The largest part of an elastic mode's frequency."""
-    return float(np.max(np.where(omega > rigid, part / np.maximum(omega, rigid), 0.0)))
+    return float(np.max(np.divide(part, omega, out=np.zeros_like(omega), where=omega > rigid)))
 
 
 def ritz(M: Matrix, K: Matrix, root: Matrix | None, vectors: Vector) -> tuple[Vector, Vector]:
@@ -291,11 +291,15 @@ def _verify(basis: Basis, M: sparse.csc_matrix, K: sparse.csc_matrix) -> None:
 
 
 def _residual(basis: Basis, M: sparse.csc_matrix, K: sparse.csc_matrix) -> Vector:
-    """‖K φ - ω² M φ‖ of each mode over the size of its terms, every dof in units of √M_ii."""
+    """‖K φ - ω² M φ‖ of each mode over the size of its terms, every dof in units of √M_ii.
+
+    Of rigid motions these are at least the largest K_ii/M_ii, as in a mesh: superelements have but rounding there.
+    """
     unit = 1 / np.sqrt(M.diagonal())[:, None]
     phi, lam = basis.vectors, basis.omega**2
     residual = np.linalg.norm(unit * (K @ phi - (M @ phi) * lam), axis=0)
     terms = np.linalg.norm(unit * (abs(K) @ np.abs(phi) + (abs(M) @ np.abs(phi)) * lam), axis=0)
+    terms = np.where(lam > 0.0, terms, np.maximum(terms, _scale(M, K) ** 2))
     return residual / np.where(terms > 0, terms, 1.0)
 
 

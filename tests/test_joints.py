@@ -170,3 +170,25 @@ def test_what_holds_a_released_node():
     )
     assert arm.omega[0] == pytest.approx(np.sqrt(10.0), rel=1e-3)
     assert inertia.omega[0] == pytest.approx(np.sqrt(10.0), rel=1e-9)
+
+
+def matrices_alone(frame):
+    """The same body without the strains that a frame knows."""
+    made = frame.assembled(elements=24)
+    labels = [one if one[0] in frame.nodes else (f"inside {i}", "mode") for i, one in enumerate(made.labels)]
+    return Structure(made.K, made.M, labels=labels)
+
+
+@pytest.mark.parametrize("modes", [0, 1, 3, 6, 12, 24])
+@pytest.mark.parametrize("nodes", [["f"], ["f", "t"]])
+@pytest.mark.parametrize("given", [lambda frame: frame, matrices_alone])
+def test_a_free_superelement_has_six_rigid_motions(given, nodes, modes):
+    """A slender arm on one flange or two: its interface resists no rigid motion, its frequencies come from above."""
+    arm = fb.Frame.polyline({"f": (0, 0, 0), "m": (0, 0.4, 0), "t": (0.1, 0.5, 0.3)}, FLAT)
+    small = given(arm).reduced(nodes, modes=modes)
+    found = fb.Scene(small).reduce(modes="all").omega
+    exact = fb.Scene(arm).reduce(modes=10).omega[6]
+    assert np.all(found[:6] == 0.0)
+    assert np.all(found[6:] > exact * (1.0 - 1e-6))
+    assert modes < 6 or found[6] < exact * 1.01
+    assert "resists" not in " ".join(small.check())

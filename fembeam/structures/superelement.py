@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 Vector = NDArray[np.float64]
 UNIT = 1e-12  # of 1: entries of a row that stands for one dof
+ROUNDED = 1e-12  # of the terms a strain is the sum of: of rigid motions rounding leaves some 1e-14
+HIDDEN = 1e-14  # of the terms a stiffness is the sum of, as in `reduction.modal_basis`
 
 
 def reduced(body: Any, made: Assembled, nodes: Sequence[Any], modes: int, where: str) -> Structure:
@@ -92,7 +94,10 @@ def _shapes(made: Assembled, kept: NDArray[np.int64], rest: NDArray[np.int64], m
     loose = int(np.sum(basis.omega == 0.0))
     require(loose == 0, "the nodes together must hold the body", f"{loose} motions without resistance", where,
             "name more of them")  # fmt: skip
-    T[rest, :count] = -sparse_linalg.splu(K.tocsc()).solve(made.K[rest][:, kept].toarray())
+    solve = sparse_linalg.splu(K.tocsc()).solve
+    T[rest, :count] = -solve(made.K[rest][:, kept].toarray())
+    if root is not None:  # forces from strains, in which rigid motions cancel better than in K
+        T[rest, :count] -= solve((root.T @ (made.root @ T[:, :count])).real)
     T[rest, count:] = basis.vectors[:, :modes]
     return T
 
@@ -101,16 +106,38 @@ def _stiffness(made: Assembled, T: Vector, count: int) -> tuple[Vector, sparse.c
     """TᵀKT, and R with RᵀR = TᵀKT where one of K is known; interface and modes are not coupled."""
     if made.root is None:
         K = np.asarray(T.T @ (made.K @ T))
+        terms = np.sum(np.abs(T[:, :count]) * (abs(made.K) @ np.abs(T[:, :count])), axis=0)
+        K[:count, :count] = _stiffnesses(K[:count, :count], np.sqrt(terms))
         K[:count, count:], K[count:, :count] = 0.0, 0.0
         K[count:, count:] = np.diag(np.diag(K)[count:])
         return (K + K.T) / 2, None
     strain = np.asarray(made.root @ T)
-    interface = np.asarray(np.linalg.qr(strain[:, :count].real, mode="r"))
+    size = np.linalg.norm(abs(made.root) @ np.abs(T[:, :count]), axis=0)
+    interface = _strains(strain[:, :count].real, size)
     if np.iscomplexobj(strain):  # rows are real or imaginary
-        interface = np.vstack([interface, 1j * np.asarray(np.linalg.qr(strain[:, :count].imag, mode="r"))])
+        interface = np.vstack([interface, 1j * _strains(strain[:, :count].imag, size)])
     modes = np.sqrt(np.sum(strain[:, count:] ** 2, axis=0).real)
     root = sparse.block_diag([interface, np.diag(modes)], format="csr")
     return (root.T @ root).real.toarray(), root
+
+
+def _stiffnesses(K: Vector, size: Vector) -> Vector:
+    """K (n, n) free of what rounding, in parts of size² (n,), makes of rigid motions."""
+    unit = np.where(size > 0.0, size, 1.0)
+    found, shapes = np.linalg.eigh((K + K.T) / (2 * np.outer(unit, unit)))
+    shapes = shapes[:, np.abs(found) > HIDDEN] * unit[:, None]
+    return np.asarray(shapes * found[np.abs(found) > HIDDEN] @ shapes.T)
+
+
+def _strains(strain: Vector, size: Vector) -> Vector:
+    """R (≤ n, n) with RᵀR = strainᵀ strain, free of what rounding, in parts of `size` (n,), makes of rigid motions.
+
+    Beside the frequencies of the mesh that is nothing, beside the few of a superelement it is not.
+    """
+    unit = np.where(size > 0.0, size, 1.0)
+    triangle = np.linalg.qr(strain / unit, mode="r")
+    left, found, _ = np.linalg.svd(triangle)
+    return np.asarray(left[:, found > ROUNDED].T @ triangle * unit)
 
 
 def _lines(body: Any) -> list[tuple[Any, Any]]:
