@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from solvers.integration import BLOCK_STEPS, prepared_once
 from solvers.problem import Array, SolverError, Status, System, counted
-from solvers.problem.matrices import number
+from solvers.problem.matrices import number, reals
 from solvers.problem.run_arguments import output_times
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ def integrate_many(
 
 def _starts(system: System, q0: ArrayLike, q_dot0: ArrayLike) -> Array:
     """Checked starts (k, 2n), in the coordinates of the blocks."""
-    n, parts = system.size, [np.asarray(values, dtype=float) for values in (q0, q_dot0)]
+    n, parts = system.size, [reals(q0, "q0"), reals(q_dot0, "q_dot0")]
     for name, part in zip(("q0", "q_dot0"), parts, strict=True):
         if part.ndim != 2 or part.shape[1] != n or not len(part):
             raise ValueError(f"{name} must have shape (k, {n}), a start in each of k > 0 rows, got {part.shape}")

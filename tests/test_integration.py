@@ -24,6 +24,7 @@ from solvers import (
     System,
     integrate,
     integrate_many,
+    orbit,
 )
 
 FINE = DormandPrince(rtol=1e-13)
@@ -397,7 +398,9 @@ def test_plain_loads_that_the_first_nodes_miss_are_no_jumps():
 test_signals_that_are_no_signals_are_refused = refused_by(
     lambda signal: hit_by(signal),
     (Nodes(length=0.2), r"the signal of load 0 ends at 0.2 s, the run at 0.5 s"),
-    (lambda t: 1.0, r"the signal of load 0 must broadcast: \(65,\) times gave \(\) values"),
+    (lambda t: 1.0, r"the signal of load 0 must broadcast: \(65,\) times gave \(\) values; a constant is np.full_like"),
+    (lambda t: 1.0 if t > 0.3 else 0.0, r"the signal of load 0 must take an array of times, got ValueError .*np.where"),
+    (math.sin, r"the signal of load 0 must take an array of times, got TypeError .*np.sin for math.sin"),
     (lambda t: np.where(np.asarray(t) > 0.3, np.nan, 1.0), r"the signal of load 0 is nan at t = 0.304688 s"),
     (lambda t: np.exp(1j * t), "the signal of load 0 must be real"),
     (lambda t: np.where(t > 0.3, 1.0, 0.0), r"the signal of load 0 jumps at t = 0.3 s"),  # took up to 90 s
@@ -408,6 +411,20 @@ test_signals_that_are_no_signals_are_refused = refused_by(
     (Tone(1.0, np.nan), r"tones\(\) of the signal of load 0 must be finite"),
     (Tone(np.inf, 31.0), r"tones\(\) of the signal of load 0 must be finite"),
     (Tone(np.array([1.0, 2.0]), 31.0), r"tones\(\) of the signal of load 0 must give frequencies and as many"),
+)
+
+WAVES, STILL = np.array([0.1 + 0.2j]), np.zeros(1)  # as eigenvectors are: numpy drops imaginary parts with a warning
+ONE = System([[1.0]], [[0.1]], [[100.0]])
+
+test_complex_arrays_are_no_motions = refused_by(
+    lambda ask: ask(),
+    (lambda: integrate(ONE, WAVES, STILL, 1.0), "q0 must be real numbers"),
+    (lambda: integrate(ONE, STILL, WAVES, 1.0), "q_dot0 must be real numbers"),
+    (lambda: integrate(ONE, STILL, STILL, 1.0, WAVES), "dt as output times must be real numbers"),
+    (lambda: integrate_many(ONE, WAVES[None], STILL[None], 1.0), "q0 must be real numbers"),
+    (lambda: orbit(ONE, 1.0, np.append(WAVES, STILL)), "start must be real numbers"),
+    (lambda: System([[1.0]], [[0.1]], [[100.0]], loads=[(WAVES, np.sin)]), "vector of load 0 must be real numbers"),
+    (lambda: Contact(WAVES, KelvinVoigt(1e3, 0.0)), "direction of a Contact must be real numbers"),
 )
 
 

@@ -32,6 +32,7 @@ from solvers.orbits.periodic_orbit import Orbit, OrbitError, at_zero, orbit_of, 
 from solvers.orbits.shots import Chain, PeriodicProblem, constant
 from solvers.orbits.whole_state import counts, run, state_after, with_initial_memory
 from solvers.problem import Array, System
+from solvers.problem.matrices import reals
 from solvers.problem.run_arguments import check_slopes, latched_at_start
 
 _MOST_SHOTS = 6
@@ -221,7 +222,7 @@ def why_not_periodic(system: System, period: float) -> str:
 
 def checked_start(system: System, start: ArrayLike, period: float, method: Any) -> Array:
     """A start of the right shape with latched numbers, which if not given come from a run of two periods."""
-    x = np.array(start, dtype=float)
+    x = reals(start, "start")
     n2 = 2 * system.size
     whole = n2 + sum(counts(system))
     if x.shape not in ((n2,), (whole,)) or not np.all(np.isfinite(x)):

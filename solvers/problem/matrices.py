@@ -29,6 +29,8 @@ def number(value: Any, what: str) -> float:
 def reals(values: Any, what: str, dimensions: int = 0, kind: Any = float) -> Array:
     """Numbers, real if not of another kind, in rows of equal length as a new array of at least so many dimensions."""
     try:
+        if kind is float and np.iscomplexobj(values):  # numpy would drop the imaginary parts
+            raise TypeError
         return np.array(values, dtype=kind, ndmin=dimensions)
     except (TypeError, ValueError):
         raise ValueError(f"{what} must be real numbers in rows of equal length, got {values!r}") from None

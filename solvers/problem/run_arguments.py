@@ -85,6 +85,8 @@ def checked_start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any)
     """Checked start in the coordinates a method steps in: decoupled blocks, or the system's own."""
     n = system.size
     try:
+        if np.iscomplexobj(q0) or np.iscomplexobj(q_dot0):  # numpy would drop the imaginary parts
+            raise TypeError
         start = np.array((q0, q_dot0), dtype=float)
         fits = start.shape == (2, n)
     except (TypeError, ValueError):  # also of different lengths
@@ -171,7 +173,7 @@ def output_arrays(times: Array, duration: float, width: int) -> dict[str, Array]
 
 def _given_times(duration: float, given: ArrayLike) -> Array:
     """Checked output times."""
-    times = np.array(given, dtype=float)
+    times = reals(given, "dt as output times")
     if times.ndim != 1 or not np.isfinite(times).all() or np.any(np.diff(times) <= 0.0):
         raise ValueError(f"dt as output times must be one increasing row of finite numbers (s), got {given!r}")
     if times.size and not (times[0] >= 0.0 and times[-1] <= duration * (1.0 + 1e-12)):

@@ -197,9 +197,14 @@ def _check_nodes(rows: Array, dt: float, duration: float, load: int) -> None:
 
 def _values(signal: Signal, t: Any, load: int) -> Array:
     """Checked values (k,) of a plain callable, which may change the times that it is given."""
-    found = np.asarray(signal(t.copy()))
+    try:
+        found = np.asarray(signal(t.copy()))
+    except (TypeError, ValueError) as error:
+        told = f"the signal of load {load} must take an array of times, got {type(error).__name__} ({error})"
+        raise ValueError(f"{told}; write np.sin for math.sin, np.where for if") from error
     if found.shape != t.shape:
-        raise ValueError(f"the signal of load {load} must broadcast: {t.shape} times gave {found.shape} values")
+        told = f"the signal of load {load} must broadcast: {t.shape} times gave {found.shape} values"
+        raise ValueError(f"{told}; a constant is np.full_like(t, value)")
     if np.iscomplexobj(found):
         raise ValueError(
             f"the signal of load {load} must be real, got {found[0]} at t = {t[0]:g} s; give its real part"
