@@ -160,6 +160,9 @@ def test_arrays_without_a_row_are_no_list_and_numbers_no_parameter(straight):
         fb.Scene(BEAM, ["A"])
     with pytest.raises(TypeError, match=r"masses\[0\] must be a LumpedMass or .* in Scene; move it to its own list"):
         fb.Scene(BEAM, [fb.Clamped(0.0)], masses=[fb.Clamped(0.0)])
+    frame = fb.Frame.straight(1.0, fb.Section.circle(2.0e11, 7800.0, 0.02))
+    with pytest.raises(TypeError, match=r"bodies\[0\] must be a Scene, got Frame.* in Scene; write Scene\(…\)"):
+        fb.Scene(frame, bodies=[frame])
     with pytest.raises(TypeError, match=r"elements must be a list of Element, got array\(3\) in Scene"):
         fb.Scene(BEAM, elements=np.array(3))
     for bad in (None, 1.0, ["omega"]):

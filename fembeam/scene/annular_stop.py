@@ -171,7 +171,7 @@ def _directed(body: Any, stop: AnnularStop, where: str) -> AnnularStop:
     axes = _axes_at(own, stop.z)
     lies = axes is not None and bool(np.all(np.abs(np.abs(axes).max(axis=1) - 1.0) < ACROSS))
     one = lies and len({int(np.argmax(axis)) for axis in np.abs(axes)}) == 1
-    require(one, f"directions must be given where no one member along a global axis is ({quoted(stop.z)})", None, where,
+    require(one, f"directions must be given: {quoted(stop.z)} is on no one member along a global axis", None, where,
             "write directions=('x', 'y'), or two vectors")  # fmt: skip
     first, second = (c for c, part in zip(COMPONENTS[:3], np.abs(axes[0]), strict=True) if part < 0.5)
     return replace(stop, directions=(first, second))

@@ -512,7 +512,7 @@ def _listed(name: str, value: Any, kinds: tuple[type, ...]) -> tuple[Any, ...]:
     entries = tuple(value)
     for index, entry in enumerate(entries):
         if not isinstance(entry, kinds):
-            part = is_dataclass(entry) and not isinstance(entry, type)
+            part = is_dataclass(entry) and not isinstance(entry, type) and Scene not in kinds
             advice = "move it to its own list" if part else f"write {kinds[0].__name__}(…)"
             raise TypeError(f"{name}[{index}] must be a {names}, got {entry!r} in Scene; {advice}")
     return entries
