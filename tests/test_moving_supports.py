@@ -154,6 +154,20 @@ def test_contacts():
     assert np.allclose(one.contacts.t_in[:3], two.contacts.t_in[:3], rtol=1e-7)
 
 
+def test_a_run_longer_than_the_period_of_its_noise_starts_where_its_supports_are():
+    """Without a period asked for, such a run takes another realisation: its start must be of that one."""
+    band = (0.0, 2e4)  # its period, left out, is 1.3 s
+
+    def run(period):
+        feet = {"y": fb.BandNoise(1e-3, band, seed=1, period=period)}
+        scene = fb.Scene(fb.Beam(1.0, SPAN), [fb.Clamped(0.0, motion=feet), fb.Clamped(1.0)], **DAMPED)
+        return scene.reduce(modes=1, elements=4).simulate(1.5, 0.1)
+
+    left_out, given = run(None), run(1.5)
+    np.testing.assert_array_equal(left_out.q, given.q)
+    np.testing.assert_array_equal(left_out.q_dot, given.q_dot)
+
+
 def test_joined_pieces():
     """Feet of three joined pieces: the run, reactions and section forces of the portal in one piece."""
     pieces = [fb.Frame({n: PORTAL[n] for n in (one.a, one.b)}, [one]) for one in portal().members]

@@ -230,8 +230,8 @@ class Model(Printed, ModalEquations):
         require_positive("duration", duration, "Model.simulate", "give s")
         if dt is not None:
             numbers("dt", dt, "Model.simulate", "give the output sampling in s, or output times")
-        q, q_dot, memory = initial_states.split_start(self, self.rest() if start is None else start)
         model = self.for_duration(duration)
+        q, q_dot, memory = initial_states.split_start(model, model.rest() if start is None else start)
         with bar(duration, progress) as report:
             solution = solvers.integrate(
                 model.system, q, q_dot, duration, dt, solver, progress=report, memory=memory or None
