@@ -172,12 +172,14 @@ def integrate(
 
 
 def _chosen(method: Any) -> Any:
-    """The method, the default one instead of None."""
-    if method is not None:
-        return method
-    from solvers.exponential.method import Exponential
+    """The method, the default one instead of None, checked."""
+    if method is None:
+        from solvers.exponential.method import Exponential
 
-    return Exponential()
+        return Exponential()
+    if not hasattr(method, "engine") or isinstance(method, type):
+        raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
+    return method
 
 
 def prepared_run(
@@ -191,8 +193,7 @@ def prepared_run(
     memory: Sequence[ArrayLike | None] | None = None,
 ) -> _Run:
     """A run ready to start, everything checked."""
-    if not hasattr(method, "engine") or isinstance(method, type):
-        raise TypeError(f"method must be one of solvers, made with its settings, such as Exponential(), got {method!r}")
+    method = _chosen(method)
     duration = number(duration, "duration")
     check_tangent(tangent, method, system)
     z = checked_start(system, q0, q_dot0, method)

@@ -22,6 +22,7 @@ from fembeam.response import PlacedLog
 from fembeam.response.shapes import Vector
 from fembeam.scene import for_duration, respun, with_signals, with_value
 from fembeam.support import Part, Printed, bar, is_whole, note, numbers, require, require_positive
+from solvers.integration import loads_taken
 from solvers.problem import counted
 from solvers.problem.whole_runs import whole_runs
 
@@ -195,7 +196,8 @@ class Model(Printed, ModalEquations):
             the log, but has no sample), or the output times themselves, increasing; None keeps the final state and
             the contact log only, no histories.
         start : (2n,) as made by `rest`, `state` or `equilibrium`; None is rest. Or the (2n + l,) of `Run.end`, with
-            what the laws have latched, from which the run goes on, of signals that begin anew at t = 0.
+            what the laws have latched, from which the run goes on, of signals that begin anew at t = 0. What
+            follows sampled motions of supports begins where the run takes these to be, which is right to rtol.
         solver : one of the methods in `solvers`; None is the library's best.
         progress : show a bar (on terminals and in notebooks only).
 
@@ -232,9 +234,13 @@ class Model(Printed, ModalEquations):
             numbers("dt", dt, "Model.simulate", "give the output sampling in s, or output times")
         model = self.for_duration(duration)
         q, q_dot, memory = initial_states.split_start(model, model.rest() if start is None else start)
+        moved = np.concatenate((q, q_dot))
+        if len(model.following):
+            taken = loads_taken(model.system, duration, np.zeros(1), solver)
+            moved += initial_states.taken_along(model, taken)
         with bar(duration, progress) as report:
             solution = solvers.integrate(
-                model.system, q, q_dot, duration, dt, solver, progress=report, memory=memory or None
+                model.system, *np.split(moved, 2), duration, dt, solver, progress=report, memory=memory or None
             )
         run = Run.of(model, solution, memory, dt is not None, Made(np.concatenate((q, q_dot)), duration, solver))
         note("%r, integrated in %.3g s", run, run.cost.seconds)
