@@ -173,6 +173,24 @@ def test_places_close_to_a_support_do_not_swing_about_the_table_of_its_motion():
     assert np.abs(found - known).max() < 1e3 * rtol * np.abs(known).max()
 
 
+def test_statistics_over_realisations_of_the_noise_that_moves_supports():
+    """Equal motions are a base motion; with each new realisation the supports jumped, which all damped at 10/s kept."""
+    noise, rod = fb.BandNoise(1e-3, (0.0, 200.0), seed=1), fb.Section(E=2.1e11, rho=7800.0, A=1e-4, I=8.3e-10)
+
+    def response(supports, base=None):
+        scene = fb.Scene(fb.Beam(1.0, rod), supports, damping=fb.Rayleigh(20.0, 0.0), base=base)
+        watch = {
+            "u": lambda run: run.displacement(0.5, absolute=True),
+            "a": lambda run: run.acceleration(0.5, absolute=True),
+        }
+        return fb.study.stationary(scene.reduce("all", elements=4), 16.0, 2e-3, watch, discard=1.0, segment=256)
+
+    known = response([fb.Clamped(0.0), fb.Pinned(0.7)], noise)
+    found = response([fb.Clamped(0.0, motion={"y": noise}), fb.Pinned(0.7, motion={"y": noise})])
+    for name in ("u", "a"):
+        assert found[name].std.value == pytest.approx(known[name].std.value, rel=1e-4)
+
+
 def test_a_run_longer_than_the_period_of_its_noise_starts_where_its_supports_are():
     """Without a period asked for, such a run takes another realisation: its start must be of that one."""
     band = (0.0, 2e4)  # its period, left out, is 1.3 s

@@ -5,7 +5,7 @@ q = Φᵀ M u,    K q = f + Σ w_s F_s(-w_s·q - gap_s)
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -47,35 +47,25 @@ MOST_STEPS = 2000
 
 def rest(model: ModalEquations) -> Vector:
     """[q, q_dot] (2n,): zero but for the impactors' velocities, and for supports that move, which all follow."""
-    start = _following(model, lambda load, signal: _at_start(signal))
+    start = follow(model)
     if impactors := model.matrices.impactors:
         start[-len(impactors) :] = [np.sqrt(impactor.mass) * impactor.velocity for impactor in impactors]
     return start
 
 
-def taken_along(model: ModalEquations, taken: Mapping[int, Vector]) -> Vector:
-    """[q, q_dot] (2n,) between the supports of a run, whose sampled loads are ``taken`` (1,) at t = 0, and the signals.
+def follow(model: ModalEquations, t: float = 0.0, taken: Mapping[int, Vector] | None = None) -> Vector:
+    """[q, q_dot] (2n,) of places that follow supports at a time, by their signals or by what is ``taken`` of loads.
 
-    Tables are right to rtol. A stiff coordinate that is to follow one would swing about the difference, with its own
-    frequency: an acceleration many times rtol.
+    These are values (1,) by the numbers of loads, of the tables of a run, which are right to rtol. A stiff coordinate
+    that begins beside them swings about the difference, with its own frequency: an acceleration many times rtol.
     """
-    return _following(model, lambda load, signal: taken[load] - _at_start(signal) if load in taken else 0.0)
-
-
-def _following(model: ModalEquations, value: Callable[[int, Any], Any]) -> Vector:
-    """[q, q_dot] (2n,) that follow values of the displacements and speeds of supports, by number of load and signal."""
-    n = len(model.omega)
-    start = np.zeros((2, n))
+    at, known = np.array([t]), taken or {}
     moved = [signal for _, signal in support_loads(model.scene, model.matrices)]
+    start = np.zeros((2, len(model.omega)))
     for i, shape in enumerate(model.following):
         for part, load in zip(start, loads_of_dof(i), strict=False):  # the third is by acceleration
-            part += float(np.squeeze(value(load, moved[load]))) * shape
+            part += float(np.squeeze(known[load] if load in known else moved[load](at))) * shape
     return start.ravel()
-
-
-def _at_start(signal: Any) -> Any:
-    """The value of a signal at t = 0, one or (1,)."""
-    return signal(np.zeros(1))
 
 
 def state(model: Model, displacement: Field | Sequence[Field], velocity: Field | Sequence[Field]) -> Vector:

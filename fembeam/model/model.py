@@ -237,7 +237,7 @@ class Model(Printed, ModalEquations):
         moved = np.concatenate((q, q_dot))
         if len(model.following):
             taken = loads_taken(model.system, duration, np.zeros(1), solver)
-            moved += initial_states.taken_along(model, taken)
+            moved += initial_states.follow(model, taken=taken) - initial_states.follow(model)
         with bar(duration, progress) as report:
             solution = solvers.integrate(
                 model.system, *np.split(moved, 2), duration, dt, solver, progress=report, memory=memory or None

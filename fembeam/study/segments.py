@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fembeam.excitation import BandNoise
 from fembeam.model import Model, Run
+from fembeam.model.initial_states import follow, split_start
 from fembeam.scene import signals_of
 from fembeam.statistics.initial_transient import FEWEST_BATCHES
 from fembeam.study.decay import correlation_time
@@ -53,7 +54,7 @@ class Segments:
     model: Model
     duration: float
     dt: float
-    state: Vector
+    state: Vector  # without what follows supports: their motion is another one in a segment of renewed noise
     solver: Any
     correlation_time: float
     repeats: bool  # more than one segment is possible
@@ -76,6 +77,7 @@ class Segments:
     ) -> Segments:
         """The plan for a model; a realisation holds two half-overlapping segments (samples) of the spectrum."""
         state = model.rest() if start is None else numbers("start", start, "stationary", "give (2n,) numbers")
+        split_start(model, state)  # checks it
         tau = correlation_time(model, lambda seconds: _pilot(model, seconds, dt, state, solver), duration)
         found = list(signals_of(model.scene).values())
         repeats = _repeat(found)
@@ -89,6 +91,7 @@ class Segments:
         short = max(0.0, FEWEST_BATCHES * tau - longest)  # of what the transient is looked for in
         lead = LEAD_IN * tau + short if discard is None else discard
         batches = 1 if repeats and random else BATCHES
+        state = _shifted(state, -follow(model))
         return cls(model, duration, dt, state, solver, tau, repeats, random, lead, longest, batches, shortest)
 
     def pieces(self) -> Iterator[Segment]:
@@ -113,7 +116,8 @@ class Segments:
         model, later = self.model, partial(continued, time=self.time, duration=duration)
         if self.repeats:  # all changes at once: each makes another scene and system
             model = renewed(model, lambda _, seed: child(seed, i), later)
-        run = model.go_on(duration, self.dt, self.state, self.solver)
+        model = model.for_duration(duration)
+        run = model.go_on(duration, self.dt, _shifted(self.state, follow(model)), self.solver)
         self.seconds += run.cost.seconds
         return run
 
@@ -162,8 +166,17 @@ class Segments:
         """Continue from the border of a segment."""
         run, whole = piece.run, piece.end == len(piece.run.t) - 1
         assert run.end is not None
-        self.state = run.end if whole else np.concatenate((run.q[piece.end], run.q_dot[piece.end]))
-        self.time += self.dt * piece.end
+        assert run.model is not None
+        state = run.end if whole else np.concatenate((run.q[piece.end], run.q_dot[piece.end]))
+        t = self.dt * piece.end
+        taken = run.loads_taken(np.array([t])) if run.loads_taken else None
+        self.state = _shifted(state, -follow(run.model, t, taken))
+        self.time += t
+
+
+def _shifted(state: Vector, motion: Vector) -> Vector:
+    """A start with another motion of what follows supports; what laws have latched stays."""
+    return np.concatenate((state[: motion.size] + motion, state[motion.size :]))
 
 
 def check_duration(found: list[Any], duration: float, dt: float, discard: float | None, tau: float) -> None:
