@@ -95,6 +95,20 @@ def test_overdamped_and_dragged_bodies():
     assert heun(1.0).stable_dt(System([[1.0]], [[200.0]], [[0.0]])).flight == pytest.approx(0.01, rel=1e-6)
 
 
+@pytest.mark.parametrize("zeta", [2.0, 30.0, 300.0])
+def test_limits_of_overdamped_modes(zeta):
+    """4 + (4γ-2) h c - (2γ-4β) h² k = 0, see `critical_step`: far beyond 1/c, and with γ > ½ beyond 1/√k."""
+    c, k = 2.0 * zeta, 1.0
+    system = System.modal([1.0], zeta)
+    assert CentralDifference(1.0).stable_dt(system).flight == pytest.approx(2.0, rel=1e-6)
+    assert linear_acceleration(1.0).stable_dt(system).flight == pytest.approx(math.sqrt(12.0), rel=1e-6)
+    longest = max(np.roots([-1.5 * k, c, 4.0]))  # β = 0, γ = ¾
+    assert Newmark(1.0, 0.0, 0.75).stable_dt(system).flight == pytest.approx(longest, rel=1e-4)
+    assert Newmark(1.0).stable_dt(system).flight == math.inf
+    with pytest.raises(ValueError, match="unstable in flight"):
+        integrate(system, [1.0], [0.0], 1e3, method=CentralDifference(2.1))
+
+
 @pytest.mark.parametrize("method", [heun, RK4, CentralDifference, Newmark, linear_acceleration, GeneralizedAlpha])
 def test_a_run_grows_by_the_spectral_radius_a_step(method):
     omega, zeta, x = 10.0, 0.03, 0.6 if method is heun else 1.1

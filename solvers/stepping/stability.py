@@ -28,7 +28,7 @@ Radius = Callable[[Any, Any, Any], Any]
 EXPECTED_SPEED = 1.0  # m/s; the frequency on a Hertz stop goes with its fifth root, so a guess is good enough
 _SLACK = 1e-10  # rounding of ρ
 _GROWTH = 0.1  # allowed logarithm of the amplification of a mode in a run
-_SMALLEST, _LARGEST, _PER_DECADE = 1e-2, 1e2, 60  # range of hω searched; below it a method counts as never stable
+_SMALLEST, _LARGEST, _PER_DECADE = 1e-2, 1e2, 60  # h × fastest rate, searched first; never stable below
 _AT_ONCE = 100  # modes that are searched in one array
 
 
@@ -92,13 +92,20 @@ def largest_steps(radius: Radius, k: Array, c: Array, duration: float) -> Array:
     moving = np.flatnonzero(fastest > 0.0)
     for start in range(0, moving.size, _AT_ONCE):
         part = moving[start : start + _AT_ONCE]
-        found[part] = _first_border(stable, part, fastest[part], duration)
+        found[part] = _first_border(stable, part, fastest[part], duration, _LARGEST)
+    # Of an overdamped mode c is the fastest rate. Implicit damping leaves borders at 1/√k, or at c/k with γ > ½.
+    slow = np.flatnonzero((found == math.inf) & (k > 0.0) & (c**2 > k))
+    if slow.size:
+        most = _LARGEST * float((c[slow] ** 2 / k[slow]).max())
+        found[slow] = _first_border(stable, slow, fastest[slow], duration, most)
     return found
 
 
-def _first_border(stable: Callable[[Array, Any], Any], modes: Any, fastest: Array, duration: float) -> Array:
+def _first_border(
+    stable: Callable[[Array, Any], Any], modes: Any, fastest: Array, duration: float, most: float
+) -> Array:
     """Longest step of the first interval of stable steps, by search on a grid and bisection, for modes (j,)."""
-    grid = np.geomspace(_SMALLEST, _LARGEST, round(_PER_DECADE * math.log10(_LARGEST / _SMALLEST)) + 1)
+    grid = np.geomspace(_SMALLEST, most, round(_PER_DECADE * math.log10(most / _SMALLEST)) + 1)
     steps = grid / fastest[:, None]
     good = stable(steps, modes[:, None])
     border, first = np.full(len(modes), math.inf), np.argmin(good, axis=1)
