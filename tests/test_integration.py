@@ -600,6 +600,17 @@ def test_tolerance_out_of_range_is_refused(rtol):
         DormandPrince(rtol=rtol)
 
 
+@pytest.mark.parametrize("mass", [1.0, 1e-9, 1e-15])
+def test_what_a_pressed_stop_sets_moving_from_rest_keeps_to_rtol(mass):
+    """δ = δ₀ cos ωt until it opens at t = π/2ω with the speed δ₀ω, whatever the size of √m δ₀ beside atol."""
+    depth, omega, rtol = 1e-9, 1e4, 1e-10
+    stop = Contact([1.0], KelvinVoigt(mass * omega**2, 0.0), gap=-depth)
+    ball = System([[mass]], [[0.0]], [[0.0]], [stop])
+    log = integrate(ball, [0.0], [0.0], 1e-3, method=DormandPrince(rtol)).contacts
+    assert log.t_out[0] == pytest.approx(0.5 * math.pi / omega, rel=30.0 * rtol)
+    assert log.speed_out[0] == pytest.approx(depth * omega, rel=30.0 * rtol)
+
+
 @pytest.mark.parametrize("bad", [0.0, -1e-5, math.nan, math.inf])
 def test_absolute_tolerances_and_constant_steps_must_be_positive(bad):
     for make, name in (

@@ -97,7 +97,8 @@ class DormandPrince:
     ----------
     rtol : relative tolerance of a step, in [1e-14, 1e-2], against the largest coordinate.
     atol : absolute tolerance of coordinates (m or modal) and rates; keeps a start at rest from stalling. Where start
-        and loads are so small that it would stand above rtol times the motion, that is taken instead.
+        and loads, or at rest what stops are pressed, are so small that it would stand above rtol times the motion, that
+        is taken instead.
 
     Notes
     -----

@@ -34,12 +34,20 @@ from solvers.stepping.loop import march_of, new_space
 from solvers.stepping.stability import half_periods, kinks_of
 
 
-def absolute_tolerance(method: Any, problem: Any, z: Array, fastest: float) -> float:
-    """The method's own, or less if start and loads are so small or slow that it would exceed rtol times the motion."""
+def absolute_tolerance(method: Any, system: System, problem: Any, z: Array, fastest: float) -> float:
+    """The method's own, or less if all that moves is so small or slow that it would exceed rtol times the motion."""
     p, v = np.abs(z).reshape(2, -1).max(axis=1)
     push = np.abs(problem.load).max(axis=1, initial=0.0) @ largest_loads(problem) / fastest
-    size = max(p, v / fastest, push / fastest) * min(fastest, 1.0)  # it holds for rates, too
+    size = max(p, v / fastest, push / fastest) or _released(system, problem)
+    size *= min(fastest, 1.0)  # it holds for rates, too
     return float(min(method.atol, method.rtol * size) if size > 0.0 else method.atol)
+
+
+def _released(system: System, problem: Any) -> float:
+    """Block coordinate by which the largest indentation at q = 0 is given back: what is at rest moves by about that."""
+    rest, reach = np.zeros(system.size), np.linalg.norm(problem.read[:, : problem.k.size], axis=1)
+    delta = [abs(float(c.indentation(rest))) if c.always else float(c.indentation(rest)) for c in system.contacts]
+    return max([0.0, *(d / r for d, r in zip(delta, reach[problem.first[:-1]], strict=True) if r > 0.0)])
 
 
 class Engine:
@@ -59,7 +67,7 @@ class Engine:
         least = negligible_energy(self.problem, np.sum(self.problem.load * self.problem.power, axis=1), dt)
         fastest = max([math.sqrt(abs(k)) for k in self.problem.k] + list(self.problem.c) + [1.0 / duration])
         self.state.now[[H_FLIGHT, H_CONTACT]] = (0.1 / fastest, 0.01 / fastest) if method.adaptive else method.steps
-        atol = absolute_tolerance(method, self.problem, z, fastest)
+        atol = absolute_tolerance(method, system, self.problem, z, fastest)
         self.space = new_space(self.problem, self.state, method, atol, watched(system, self.back @ z, least))
         self.space.kinks[:] = kinks_of(system)
         self.rate, loop = rhs, march_of(isinstance(self.problem, PlanarProblem))
