@@ -499,6 +499,15 @@ def test_a_resonant_tone_is_as_exact_as_other_sampled_loads_whatever_the_toleran
     np.testing.assert_allclose(found.q[:, 0], 0.25 * found.t * np.sin(2.0 * found.t), atol=1e-6 * 25.0)
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+def test_a_tone_next_to_resonance_leaves_a_slider_to_rtol(rtol):
+    """The steady response is 25000 times what the tone moves in 20 s: steps must not be measured by it."""
+    slider = Contact([1.0], Jenkins(100.0, 60.0), always=True)
+    system = System.modal([2.0], [0.0], [slider], [([1.0], fb.Harmonic(80.0, 2.000002))])
+    ours, theirs = (integrate(system, [1.0], [-20.0], 20.0, 1.0, m) for m in (Exponential(rtol), RK))
+    np.testing.assert_allclose(ours.q, theirs.q, rtol=0.0, atol=10.0 * rtol * np.abs(theirs.q).max())
+
+
 def test_a_resonant_tone_is_sampled_once_for_all_starts():
     system = free_mass(Hertz(1e5), gap=0.01, loads=[([-1.0], fb.Harmonic(1.0, 1e-3))])
     forcing, _ = prepared_once(system, Exponential(), 0.4)

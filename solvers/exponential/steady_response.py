@@ -15,12 +15,14 @@ def without_resonance(system: System, forcing: Forcing, duration: float, rtol: f
     """The forcing with tones near resonance replaced by samples, as exact as other sampled signals.
 
     A tone is replaced if it is at the frequency of a hardly damped block, or if its steady response l/|k - Ω² + iΩc| is
-    a thousand times the motion it can cause within the duration, l duration²/2: the difference would lose its digits.
+    a thousand times the motion it can cause within the duration T, l T min(T, 1/Ω)/2: the difference would lose its
+    digits, and errors of steps are measured by what the two could reach apart.
     """
     key = "distances", forcing.tone_omega.tobytes(), forcing.tone_load.tobytes()
     tones = zip(forcing.tone_omega, forcing.tone_load, strict=True)
     found = system.kept.get(key, lambda: [_distance(system, omega, load) for omega, load in tones])
-    resonant = [i for i, (absolute, relative) in enumerate(found) if relative <= 1e-6 or absolute * duration**2 < 2e-3]
+    grown = duration / np.maximum(forcing.tone_omega, 1.0 / duration)  # twice what a load of 1 moves
+    resonant = [i for i, (far, relative) in enumerate(found) if relative <= 1e-6 or far * grown[i] < 2e-3]
     return tones_as_nodes(forcing, resonant, duration, sampling_tolerance(rtol)) if resonant else forcing
 
 
