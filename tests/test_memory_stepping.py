@@ -7,6 +7,7 @@ import pytest
 from scipy.sparse import csc_array
 from sliders import Slider
 
+import fembeam as fb
 from contacts import Coulomb, Hertz, Jenkins, KelvinVoigt
 from contacts.memory import WaltonBraun
 from solvers import (
@@ -224,3 +225,15 @@ def test_a_force_that_jumps_leaves_constant_steps_order_one():
             end = run(method(h), law, duration=6.0)
             apart = math.hypot(end.q[-1, 0] - exact.q[-1, 0], end.q_dot[-1, 0] - exact.q_dot[-1, 0])
             assert apart < 1.0 * h
+
+
+@pytest.mark.parametrize("seed", [0, 1, 11, 13, 22])
+def test_a_coarse_tolerance_does_not_end_in_stick_and_slip_at_one_instant(seed):
+    """A step too long for the fast modes tells stick and slip in turn: it has to be shorter."""
+    rng, n = np.random.default_rng(seed), 10
+    omega = np.append(1.0, np.sort(10.0 ** rng.uniform(0.0, 2.5, n - 1)))
+    slider = Contact(rng.standard_normal(n).round(1), Jenkins(10.0, 3.0), always=True)
+    load = rng.standard_normal(n).round(1), fb.Harmonic(5.0, 1.3)
+    system = System.modal(omega.round(2), 0.01, [slider], [load])
+    coarse, fine = (integrate(system, np.zeros(n), np.zeros(n), 20.0, 1.0, DormandPrince(r)) for r in (1e-3, 1e-10))
+    np.testing.assert_allclose(coarse.q, fine.q, rtol=0.0, atol=1e-3 * np.abs(fine.q).max())

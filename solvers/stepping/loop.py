@@ -16,6 +16,7 @@ from solvers.compiled.fields import packed_type, zeros_of
 from solvers.compiled.kernels import PLANAR_PROBLEM, PROBLEM, REAL, bends_at, entry, inlined, inner, merged, rhs
 from solvers.compiled.sliding import POINT
 from solvers.compiled.state import (
+    AT_ONCE,
     CALLS,
     GAINED,
     H_CONTACT,
@@ -52,6 +53,7 @@ from solvers.stepping.shared import shared
 
 _LEAST_STEP = 1e-290  # s: at t = 0 any step changes the time
 _MOST_NODES = 16  # of a signal on a step; a period of its fastest part has ten or more
+_PATIENCE = 8  # events at one instant after which the step is divided by so much
 _FEW_NODES = 2  # so many, or fewer: a step that would pass these ends on the next one
 
 
@@ -199,6 +201,8 @@ def march(step, rate_of, gained, problem, state, space, budget, adaptive, events
             theta, stop, direction, _, border = event
             if border >= 0 and theta == 0.0:  # the step begins on the border and crosses it
                 renew_border(problem, state, space, stop, border)
+                if count[AT_ONCE] % _PATIENCE == _PATIENCE - 1:  # a step this long may tell stick and slip in turn
+                    now[phase] = h / _PATIENCE
                 _update_rate(rate_of, problem, state, space)
                 continue
             if theta == UNRESOLVED:
