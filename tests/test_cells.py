@@ -128,7 +128,7 @@ def test_contacts_are_those_of_steps_that_look_at_the_stops_every_time(omega):
     """
     found = 0
     for seed in range(12):
-        system = system_under_noise(omega, 0.02, [1.0, 0.7, 0.3][: len(omega)], 2e-5 * (1 + seed % 4), seed)
+        system = system_under_noise(omega, 0.02, [1.0, 7.0, 0.3][: len(omega)], 1e-4 * (1 + seed % 4), seed)
         plain, _ = crossings(system, 12.0, None)
         cell = prepared(system, 12.0)[0].table_dt[0]
         sampled, delta = crossings(system, 12.0, 0.37 * cell)
@@ -144,10 +144,15 @@ def test_contacts_are_those_of_steps_that_look_at_the_stops_every_time(omega):
 
 
 def test_a_bound_of_zero_would_miss_contacts(monkeypatch):
-    """What the tests above rest on: without the bound cells are crossed in which δ rises above zero and falls back."""
-    system = system_under_noise([100.0, 900.0], 0.02, [1.0, 0.7], 4e-5, 3)
-    known = len(crossings(system, 12.0, None)[0].contacts)
-    bounds = tables.cell_errors
+    """What the tests above rest on: without the bound cells are crossed in which δ rises above zero and falls back.
+
+    So are lost 9 of 1167 contacts, of seven of the twelve systems.
+    """
+
+    def found():
+        systems = [system_under_noise([100.0, 900.0], 0.02, [1.0, 7.0], 4e-4, seed) for seed in range(12)]
+        return sum(len(crossings(system, 12.0, None)[0].contacts) for system in systems)
+
+    known, bounds = found(), tables.cell_errors
     monkeypatch.setattr(tables, "cell_errors", lambda *arguments: tuple(0.0 * part for part in bounds(*arguments)))
-    system = system_under_noise([100.0, 900.0], 0.021, [1.0, 0.7], 4e-5, 3)
-    assert len(crossings(system, 12.0, None)[0].contacts) < known
+    assert found() < known
