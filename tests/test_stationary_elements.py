@@ -38,6 +38,7 @@ def rate(run):
     return run.q_dot[:, 0]
 
 
+@pytest.mark.drawn
 def test_a_dashpot_among_the_elements_gives_the_variance():
     """c φ² E[q'²] is the power of a white force, G φ² π/2, less c φ²/ω_c of it."""
     model, phi, omega, level = undamped(lambda k: KelvinVoigt(0.2 * k, 0.1 * k / 100.0))
@@ -51,6 +52,7 @@ def test_a_dashpot_among_the_elements_gives_the_variance():
     assert exact * 0.998 < high
 
 
+@pytest.mark.drawn
 def test_a_slider_takes_all_that_is_given():
     """Friction is all the damping there is: its mean power is that of the white force, whatever the limit."""
     model, phi, omega, level = undamped(lambda k: Jenkins(3.0 * k, 0.3 * k * SIZE))
