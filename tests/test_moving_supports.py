@@ -295,5 +295,6 @@ def test_stiff_coordinate_that_follows_a_sampled_motion(rtol):
         forces=[fb.PointForce(0.26325, fb.Pulse(5.0, 0.05, 0.01)), fb.PointForce(0.3956, fb.Step(5.0, 0.03))],
     )
     run = scene.reduce(modes=6, residual=True).simulate(0.3, 1e-3, solver=Exponential(rtol))
-    assert run.cost.steps < 20_000  # of 100 000 where what follows the load counts as oscillating
+    # 12 000 or 14 000 by the rounding of its modes, 100 000 where what follows the load counts as oscillating
+    assert run.cost.steps < 40_000
     assert np.abs(run.energy.residual).max() < 1e-7 * np.abs(run.energy.input).max()
