@@ -209,7 +209,8 @@ def test_factors_of_large_matrices(monkeypatch):
     assert modal.factored(K).nnz < 0.7 * factors.nnz
     np.testing.assert_allclose(reduction.modal_basis(M, K, 6).omega, usual.omega, rtol=1e-9)
     again = reduction.static_shapes(M, K, load, np.zeros((K.shape[0], 0)))
-    np.testing.assert_allclose(again, shapes, rtol=0, atol=1e-12 * abs(shapes).max())
+    rounding = np.finfo(float).eps * 1.9e5  # times the condition of K
+    np.testing.assert_allclose(again, shapes, rtol=0, atol=rounding * abs(shapes).max())
 
 
 EYE = np.eye(3)
