@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from contacts import Hertz
 from solvers import Contact, Exponential, Status, System, integrate
@@ -135,6 +136,31 @@ def test_grazes_of_one_fast_mode_at_the_limit():
         assert len(run.contacts) in (1, 2)
         length = (run.contacts.t_out - run.contacts.t_in) * omega / (2 * math.pi)
         np.testing.assert_allclose(length, share, rtol=0.1)
+
+
+def over_a_slow_swing(fast, gap):
+    """δ = 0.05 cos(ωt) - cos t - gap, with a fast mode of 0.05 m on a slow one of 1 m."""
+    return System.modal([1.0, fast], 0.0, [Contact([-1.0, -1.0], SOFT, gap)]), [-1.0, 0.05], [0.0, 0.0]
+
+
+@pytest.mark.parametrize("dt", [None, 1.0])
+@pytest.mark.parametrize("fast", [1e2, 1e4, 1e6])
+def test_a_fast_mode_that_cannot_reach_a_stop_does_not_shorten_flight(fast, dt):
+    """By |δ̈| alone 16 periods of the slow mode took 2200 to 22 million steps, with its amplitude about 170."""
+    run = integrate(*over_a_slow_swing(fast, 1.1), 100.0, dt)
+    assert len(run.contacts) == 0
+    assert run.cost.steps < (300 if dt is None else 1200)
+
+
+@pytest.mark.parametrize("fast", [1e2, 1e3, 1e4])
+def test_the_first_crest_of_a_fast_mode_above_a_stop_is_met(fast):
+    gap = 1.04
+    crests = 2.0 * math.pi / fast * np.arange(int(fast))
+    first = crests[np.flatnonzero(0.05 - np.cos(crests) > gap)[0]]
+    low = first - math.pi / fast  # a trough
+    entry = brentq(lambda t: 0.05 * math.cos(fast * t) - math.cos(t) - gap, low, first, xtol=1e-16, rtol=1e-15)
+    run = integrate(*over_a_slow_swing(fast, gap), first)
+    assert run.contacts.t_in == pytest.approx([entry], rel=1e-13)
 
 
 def test_entries_land_on_the_surface():

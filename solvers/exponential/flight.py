@@ -236,6 +236,17 @@ def motion_of_row(run, row, x):
 
 
 @inlined
+def motion_of_slowest(run, row, x, count):
+    """Parts of the same by the ``count`` slowest blocks; the gap is taken off the displacement."""
+    tables, rows, delta, rate = run.tables, run.tables.stop_rows[row], -run.problem.gap[row], 0.0
+    for i in range(count):
+        b = int(tables.slowest[i])
+        delta += rows[0, b] * x[0, b] + rows[1, b] * x[1, b]
+        rate += rows[2, b] * x[0, b] + rows[3, b] * x[1, b]
+    return delta, rate
+
+
+@inlined
 def weighted_norms(weights, tables, x):
     """Σ_b weight_b ε_b of the blocks' energy norms, from p and v."""
     total = splat8(0.0)

@@ -5,8 +5,10 @@ distance g = -δ that opens at the rate v = -δ̇ cannot be reached before
 
     τ = (v + √(v² + 2 B g))/B,
 
-so steps of at most τ are safe. Close to a contact τ tends to the root from below; within reach of a Taylor
-polynomial of order 6 the root is found on that polynomial, which is exact to rounding there.
+so steps of at most τ are safe. Fast blocks make most of B and hardly move the stop. So τ is also computed with B, g
+and v of the slowest blocks alone, g less the amplitude Σ r_b ε_b of all others; the longer one is taken. Close to a
+contact τ tends to the root from below; within reach of a Taylor polynomial of order 6 the root is found on that
+polynomial, which is exact to rounding there.
 
 Under sampled signals whole cells are crossed first. Within a cell of length h, δ exceeds the larger of its values at
 both ends by at most the error of linear interpolation, which one bound e covers for the next m cells:
@@ -21,6 +23,8 @@ bounds have parts in |ṡ|max, |s̈|max and |s⃛|max instead. Under coupling, |
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -58,6 +62,7 @@ from solvers.exponential.flight import (
     join,
     level_within,
     motion_of_row,
+    motion_of_slowest,
     propagate_blocks,
     propagate_split,
     safe_time,
@@ -69,7 +74,13 @@ from solvers.exponential.flight import (
 )
 
 _PART_OF_CELL = 0.01  # longest Taylor step, in cells of the signals: s⁽⁵⁾ t⁷/5040 of a quintic, left out, is rounding
+_FAST = 2.0  # angle of the fastest block, rad, from which on its amplitude may bound it better than |δ̈|
 _REFRESH = 8  # flight steps between two evaluations of the bound
+COUNT, BOUND, AMPLITUDE = range(3)
+"""Places in `Scratch.slow`: how many of the slowest blocks are bounded by |δ̈|, 0 if none, `UNKNOWN` if not chosen yet;
+
+their bound of |δ̈|, m/s²; the amplitude of the other blocks, m."""
+UNKNOWN = -1.0
 _GROUP = 8  # cells that one bound covers: with more the bound grows, with fewer it is computed more often
 
 
@@ -166,26 +177,81 @@ def _sample_here(run):
     state.count[SAMPLED] += 1
 
 
+@inlined
+def _choose_slowest(run, row, x):
+    """Choose how many of the slowest blocks, a power of two, are bounded by |δ̈|; returns the longest safe time.
+
+    Blocks with k = 0 have no amplitude: they are among the slowest.
+    """
+    tables, slow, rows = run.tables, run.scratch.slow[row], run.tables.stop_rows[row]
+    k, accelerations, amplitudes = tables.block_k_c[0], tables.acceleration_weight[row], tables.amplitude_weight[row]
+    delta, rate, bound, count, longest = -run.problem.gap[row], 0.0, 0.0, 1, 0.0
+    others = weighted_norms(amplitudes, tables, x)
+    slow[COUNT] = 0.0
+    for i in range(tables.slowest.size - 1):
+        b = int(tables.slowest[i])
+        p, v = x[0, b], x[1, b]
+        norm = math.sqrt(v * v + k[b] * p * p)
+        delta, rate = delta + rows[0, b] * p + rows[1, b] * v, rate + rows[2, b] * p + rows[3, b] * v
+        bound, others = bound + accelerations[b] * norm, others - amplitudes[b] * norm
+        if i + 1 == count:
+            count *= 2
+            if delta + others < 0.0 and k[int(tables.slowest[i + 1])] > 0.0:
+                time = safe_time(-delta - others, -rate, bound)
+                if time > longest:
+                    longest, slow[COUNT], slow[BOUND], slow[AMPLITUDE] = time, i + 1.0, bound, others
+    return longest
+
+
+@inlined
+def _safe_by_slowest(run, row, x, known):
+    """Safe time by the slowest blocks alone, the others being bounded by their amplitude, or the ``known`` longer one.
+
+    Closer to the stop more blocks are told apart, at last none.
+    """
+    slow = run.scratch.slow[row]
+    if slow[COUNT] == 0.0:
+        return known
+    if slow[COUNT] > 0.0:
+        delta, rate = motion_of_slowest(run, row, x, int(slow[COUNT]))
+        distance = -delta - slow[AMPLITUDE]
+        time = safe_time(distance, -rate, slow[BOUND]) if distance > 0.0 else 0.0
+        if time > known:
+            return time
+    return max(known, _choose_slowest(run, row, x))
+
+
+@inlined
+def _safe_flight(run, x, span, renew_bounds):
+    """``span``, or the shorter time within which no stop can be reached from x without signals."""
+    problem, tables, scratch = run.problem, run.tables, run.scratch
+    for r in range(problem.gap.size if renew_bounds else 0):
+        scratch.per_row[r] = weighted_norms(tables.acceleration_weight[r], tables, x)
+        scratch.slow[r, COUNT] = UNKNOWN
+    for s in range(problem.law.size):
+        if is_circle(problem, s):
+            span = min(span, span_of_circle(run, s, x))
+            continue
+        row = row_of(problem, s)
+        delta, rate = motion_of_row(run, row, x)
+        time = safe_time(-delta, -rate, scratch.per_row[row])
+        if time < span:
+            fast = time * tables.fastest > _FAST
+            span = min(span, _safe_by_slowest(run, row, x, time) if fast else time)
+    return span
+
+
 @inner
 def _fly_unsampled(run, longest, budget):
     """Tabulated steps without signals or output, until a stop is near, ``longest`` has passed or the budget is spent.
 
     Returns the number of steps, and the safe time left.
     """
-    problem, tables, state, scratch = run.problem, run.tables, run.state, run.scratch
-    x, flown, rounding, count = scratch.split_state[0], 0.0, 0.0, 0
+    problem, tables, state = run.problem, run.tables, run.state
+    x, flown, rounding, count = run.scratch.split_state[0], 0.0, 0.0, 0
     split(problem, state.x, x)
     while True:
-        span = longest - flown
-        for r in range(problem.gap.size if count % _REFRESH == 0 else 0):
-            scratch.per_row[r] = weighted_norms(tables.acceleration_weight[r], tables, x)
-        for s in range(problem.law.size):
-            if is_circle(problem, s):
-                span = min(span, span_of_circle(run, s, x))
-                continue
-            row = row_of(problem, s)
-            delta, rate = motion_of_row(run, row, x)
-            span = min(span, safe_time(-delta, -rate, scratch.per_row[row]))
+        span = _safe_flight(run, x, longest - flown, count % _REFRESH == 0)
         if span < tables.flight_step[tables.flight_step.size - 1] or count >= budget:
             break
         level = level_within(tables, span)
@@ -271,18 +337,14 @@ def _cross_cells(run, most):
 
 
 @inlined
-def _safe_span(run, span, horizon, renew_bounds):
-    """``span``, or the shorter time within which no stop can be reached.
-
-    ``renew_bounds`` of |δ̈| for the ``horizon`` first.
-    """
+def _safe_under_signals(run, span, horizon):
+    """The same under sampled signals, with bounds of |δ̈| for the ``horizon``, from the present state."""
     problem, state, scratch = run.problem, run.state, run.scratch
-    if renew_bounds:
-        split(problem, state.x, scratch.split_state[SWING])
-        if run.tables.follows > 0.0:
-            take_off_following(run, state.now[T])
-        for r in range(problem.gap.size):
-            scratch.per_row[r] = _acceleration_bound(run, r, scratch.split_state[SWING], horizon)
+    split(problem, state.x, scratch.split_state[SWING])
+    if run.tables.follows > 0.0:
+        take_off_following(run, state.now[T])
+    for r in range(problem.gap.size):
+        scratch.per_row[r] = _acceleration_bound(run, r, scratch.split_state[SWING], horizon)
     for s in range(problem.law.size):
         if is_circle(problem, s):
             span = min(span, span_of_circle_at(run, s))
@@ -376,7 +438,12 @@ def fly(run, budget):
                 if with_energy and sampled:
                     account_state(run)
                 split(problem, state.x, run.scratch.split_state[2])
-            span = _safe_span(run, span, rest, sampled or count % _REFRESH == 0)
+            if sampled:
+                span = _safe_under_signals(run, span, rest)
+            else:
+                x = run.scratch.split_state[SWING]
+                split(problem, state.x, x)
+                span = _safe_flight(run, x, span, count % _REFRESH == 0)
         h, stop = _fly_step(run, span, target, place)
         move_clock(now, h)
         now[T] = min(now[T], target)

@@ -33,6 +33,7 @@ TAYLOR_REACH = 0.02  # |λ| h up to which a Taylor step of order 6 is exact to r
 _MOST_RADIANS = 2000.0  # |λ| h of the largest contact step
 _AT_ENDS = 2.1  # √Σ L_i², L_i the polynomials through the smooth nodes at an end of the step
 OBSERVED_RADIANS = 200.0  # |λ| h up to which contact steps have tables of the energy
+_MOST_SLOW = 17  # blocks of which flight may tell apart what the slowest and the others do to a row
 _CONTACT_REACH = 1e-6  # |λ| h of the smallest one, at most
 _SLOWEST = 1e-9  # rate in units of the fastest, below which blocks do not lengthen the steps in the tables
 _SHORT = 1e-9  # s, of the smallest contact step, at most: a stop may be far stiffer than the structure
@@ -63,6 +64,8 @@ class Tables(NamedTuple):
     force_following: Annotated[Any, "R, 4, 2*N"]  # `following` of forces on the rows, all blocks with k > 0
     stop_rows: Annotated[Any, "R, 4, N8"]  # the first two rows give δ + gap from p and v, the others δ̇
     acceleration_weight: Annotated[Any, "R, N8"]  # |δ̈| <= Σ weight × energy norm
+    amplitude_weight: Annotated[Any, "R, N8"]  # |δ + gap| <= Σ weight × energy norm, of blocks with k > 0
+    slowest: Annotated[Any, "slowest"]  # numbers of the slowest blocks, by k, kept as reals; see `safe_steps`
     acceleration_signal: Annotated[Any, "R, L, 5"]  # see `_acceleration_by_signal`
     rate_weight: Annotated[Any, "R, N"]  # |δ̇| <= Σ weight × energy norm
     load_acceleration: Annotated[Any, "R, L"]  # δ̈ per unit of a signal
@@ -153,7 +156,7 @@ def uncut_parameters(contacts: Sequence[Any]) -> Any:
 TONE_TABLES = (
     *("flight_propagator", "contact_propagator", "free", "node_propagator", "alias", "aliased"),
     *("ripple_weight", "rate_ripple_weight"),
-    *("block_k_c", "stop_rows", "acceleration_weight", "rate_weight"),
+    *("block_k_c", "stop_rows", "acceleration_weight", "amplitude_weight", "slowest", "rate_weight"),
     *("signal_rows", "power_rows", "loss_rows", "steady_rate", "cell", "cell_error"),
 )
 
@@ -202,6 +205,8 @@ def build(
         force_following=following(problem, problem.push, 0.0, 4),
         stop_rows=_in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
         acceleration_weight=_in_eights(_acceleration_weight(problem)),
+        amplitude_weight=_in_eights(_ripple_weight(problem.read, omega)),
+        slowest=_slowest(problem.k),
         acceleration_signal=_acceleration_by_signal(problem, response),
         rate_weight=np.abs(problem.read[:, :size]) + np.abs(problem.read[:, size:]) * (omega + damping),
         load_acceleration=problem.read_rate @ problem.load.T,
@@ -235,6 +240,7 @@ def fill_tones(tables: Tables, problem: Problem, tones: int, series: tuple[tuple
     tables.acceleration_weight[:, own:size], tables.rate_weight[:, own:] = p * omega + v * k, p + v * omega
     tables.block_k_c[0, own:size] = k
     tables.ripple_weight[:, own:] = _ripple_weight(problem.read, np.sqrt(problem.k))[:, own:]
+    tables.amplitude_weight[:, own:size], tables.slowest[:] = tables.ripple_weight[:, own:], _slowest(problem.k)
     tables.rate_ripple_weight[:, own:] = tables.ripple_weight[:, own:] * np.sqrt(k)
     for i, rows in enumerate((problem.read, problem.read_rate)):
         tables.stop_rows[:, 2 * i : 2 * i + 2, own:size] = rows.reshape(-1, 2, size)[:, :, own:]
@@ -313,6 +319,11 @@ def _acceleration_weight(problem: Problem) -> Any:
     size, omega, c = len(problem.k), np.sqrt(problem.k), problem.c
     p, v = np.abs(problem.read[:, :size]), np.abs(problem.read[:, size:])
     return p * (omega + c) + v * (problem.k + c * (omega + c))
+
+
+def _slowest(k: Any) -> Any:
+    """Numbers of the slowest blocks, ascending in k."""
+    return np.argsort(k, kind="stable")[:_MOST_SLOW].astype(float)
 
 
 def _load_norm(problem: Problem) -> Any:
