@@ -32,11 +32,31 @@ def prepared(system, duration):
     return engine.problem, engine.prepared.tables.value
 
 
+class Kinked:
+    """A signal whose slope and curvature jump at every node, or only the slope of straight lines."""
+
+    def __init__(self, seed, straight):
+        rng, self.dt = np.random.default_rng(seed), 2e-3
+        sides = rng.standard_normal((2, CELLS + 3, 2)) / self.dt ** np.array([1, 2])
+        value = rng.standard_normal(CELLS + 3)
+        if straight:
+            slope = np.diff(value, prepend=0.0, append=0.0) / self.dt
+            sides = np.stack([np.column_stack((of, np.zeros(CELLS + 3))) for of in (slope[1:], slope[:-1])])
+        self.rows = np.column_stack((value, sides[0], value, sides[1]))
+
+    def __call__(self, t):
+        raise AssertionError("its nodes say all")
+
+    def nodes(self, duration, rtol):
+        return self.dt, self.rows
+
+
+@pytest.mark.parametrize("signal", ["noise", "jumps", "straight"])
 @settings(max_examples=30, deadline=None)
 @given(
     fast=st.lists(st.floats(0.0, 6.0), min_size=1, max_size=5), damping=st.floats(-3.0, 0.3), seed=st.integers(0, 10**6)
 )
-def test_the_bound_of_cells_holds_for_any_modes(fast, damping, seed):
+def test_the_bound_of_cells_holds_for_any_modes(signal, fast, damping, seed):
     """δ between two nodes is nearer to the chord than the bound for 1 and for 8 cells says, and |δ̈| within a cell is
     less than its bound: slow, fast and overdamped modes; half of the runs begin with the fast ones along the signal.
     """
@@ -44,12 +64,14 @@ def test_the_bound_of_cells_holds_for_any_modes(fast, damping, seed):
     omega, row = np.where(np.array(fast) < 0.3, 0.0, 10.0 ** np.array(fast)), rng.standard_normal(n)
     push = np.where(omega > 3e3, omega**2, 1.0)  # so that fast modes move as far as slow ones
     system = system_under_noise(omega, 10.0**damping, row, AFAR, seed, push=push)
-    problem, known = prepared(system, 1.0)
+    if signal != "noise":
+        system = System.modal(omega, 10.0**damping, system.contacts, [(push, Kinked(seed, signal == "straight"))])
+    problem, known = prepared(system, 1.0 if signal == "noise" else CELLS * 2e-3)
     h, parts = problem.table_dt[0], 16
     t = np.arange(CELLS * parts + 1) * (h / parts)
     start = rng.standard_normal((2, n)) * [[1e-3], [1.0]]
     if seed % 2:
-        (s, rate, _), fast = problem.table[0], omega > 3e3
+        (s, rate, _), fast = problem.table[0, :3], omega > 3e3
         start[:, fast] = [[s - 2.0 * 10.0**damping * rate / w for w in omega[fast]], np.full(np.sum(fast), rate)]
     run = integrate(system, *start, t[-1] * (1 + 1e-9), t, METHOD)
     delta = -run.q @ row
@@ -57,22 +79,21 @@ def test_the_bound_of_cells_holds_for_any_modes(fast, damping, seed):
     apart = np.abs(delta - chord)[:-1].reshape(CELLS, parts).max(axis=1)
     z = np.hstack((run.q, run.q_dot))[::parts] @ system.blocks.inverse.T
     follows = known.following[0, :, :, :n].reshape(3, 2 * n)
-    left = z - problem.table[: CELLS + 1] @ follows
+    left = z[:-1] - problem.table[:CELLS, :3] @ follows
     norms = np.sqrt(left[:, n:] ** 2 + problem.k * left[:, :n] ** 2)
     bounds = np.array([derivative_bounds(problem, k) for k in range(CELLS)])
-    largest = np.abs(system.loads[0][1](t[:-1])).reshape(CELLS, parts).max(axis=1)
-    assert np.all(largest <= 1.00001 * bounds[:, 0])
+    value = signal_of(problem)(t[:-1])
+    assert np.all(np.abs(value).reshape(CELLS, parts).max(axis=1) <= 1.00001 * bounds[:, 0])
     for m in (1, 8):
         for k in range(0, CELLS - m, m):
             s, rate, second, third = bounds[k : k + m].max(axis=0)
-            by_s, growing, by_second, by_third, left_over, by_rate = known.cell_error_signal[0, 0]
+            by_s, growing, by_second, by_third, left_over, by_rate, *jumps = known.cell_error_signal[0, 0]
             bound = norms[k] @ known.cell_error[0, :n] + s * (by_s + m * growing) + second * by_second
-            bound += third * (by_third + m * left_over) + rate * by_rate
+            bound += third * (by_third + m * left_over) + rate * by_rate + m * ([rate, second] @ np.array(jumps))
             assert apart[k : k + m].max() <= bound * (1.0 + 1e-9) + 1e-13 * np.abs(delta).max()
-    signal = BPoly.from_derivatives(h * np.arange(CELLS + 1), problem.table[: CELLS + 1])  # as it is integrated
-    value = signal(t)[:, None] * push
-    second = (value - 2.0 * 10.0**damping * omega * run.q_dot - omega**2 * run.q) @ row
-    terms = (np.abs(omega**2 * run.q) + np.abs(value)).max() * np.abs(row).max()
+    value = value[:, None] * push
+    second = (value - (2.0 * 10.0**damping * omega * run.q_dot + omega**2 * run.q)[:-1]) @ row
+    terms = (np.abs(omega**2 * run.q[:-1]) + np.abs(value)).max() * np.abs(row).max()
     for k in range(CELLS):
         by_s, growing, *others, left_over = known.acceleration_signal[0, 0]
         factors = by_s + h * growing, *others, h * left_over
@@ -80,9 +101,21 @@ def test_the_bound_of_cells_holds_for_any_modes(fast, damping, seed):
         assert np.abs(second[k * parts : (k + 1) * parts]).max() <= bound * (1.0 + 1e-6) + 1e-10 * terms
 
 
+def signal_of(problem):
+    """The signal as it is integrated."""
+    h, cells = problem.table_dt[0], range(len(problem.table) - 1)
+    pieces = [BPoly.from_derivatives([0.0, h], ends_of(problem, k)).c[:, 0] for k in cells]
+    return BPoly(np.array(pieces).T, h * np.arange(len(pieces) + 1))
+
+
+def ends_of(problem, cell):
+    """s, ṡ and s̈ at both ends of a cell."""
+    return np.array([problem.table[cell, :3], problem.table[cell + 1, -3:]])
+
+
 def derivative_bounds(problem, cell):
     """Bounds of |s|, |ṡ|, |s̈| and |s⃛| on a cell, those of the derivatives by the compiled function's Python code."""
-    h, nodes, found = problem.table_dt[0], problem.table[cell : cell + 2], np.zeros(4)
+    h, nodes, found = problem.table_dt[0], ends_of(problem, cell), np.zeros(4)
     found[0] = (np.abs(nodes) @ (1.0, 0.4 * h, 0.05 * h * h)).max()
     safe_steps._bound_derivatives.py_func(*nodes, h, found)
     return found

@@ -279,6 +279,7 @@ def _bound_cells(run, x, cell, count):
             factors, bounds = tables.cell_error_signal[r, problem.table_load[j]], scratch.signal_bounds[j]
             error += bounds[0] * (factors[0] + count * factors[1]) + bounds[2] * factors[2]
             error += bounds[3] * (factors[3] + count * factors[4]) + bounds[1] * factors[5]
+            error += count * (bounds[1] * factors[6] + bounds[2] * factors[7])
         scratch.per_row[r] = error
     return _is_any_near(run, x)
 

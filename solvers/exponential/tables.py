@@ -54,7 +54,7 @@ class Tables(NamedTuple):
     cell: Annotated[Any, "2, N8"]  # α, β over a whole cell of the sampled signals
     cell_signal: Annotated[Any, "L, 6, 2, N8"]  # state change over a cell by s, s', s'' at its start, then at its end
     cell_error: Annotated[Any, "R, N8"]  # see `cell_errors`
-    cell_error_signal: Annotated[Any, "R, L, 6"]
+    cell_error_signal: Annotated[Any, "R, L, 8"]
     following: Annotated[Any, "L, 3, 2, N8"]  # see `following`
     follows: Annotated[float, "number"]  # 1 where any block follows a signal
     derived: Annotated[float, "number"]  # 1 where bounds have parts in the derivatives of signals
@@ -173,8 +173,8 @@ def build(
 ) -> Tables:
     """Tables of a problem whose last blocks are ``tones``; the columns of these are filled by `fill_tones`.
 
-    Contact steps go down to 1e-5 of the usual shortest one for each time they have been ``shortened``. A block that
-    follows signals whose slope jumps at nodes, ``kinked``, oscillates from there on: then none is taken to follow.
+    Contact steps go down to 1e-5 of the usual shortest one for each time they have been ``shortened``. The slopes of
+    ``kinked`` signals jump at nodes.
     """
     size = len(problem.k)
     omega, damping = np.sqrt(problem.k), problem.c
@@ -182,8 +182,8 @@ def build(
     h, contact_h = _steps(omega, damping, tones, shortened)
     node_sets = node_sets_of(series)
     blocks = blocks_of(problem, tones, h, contact_h, node_sets)
-    response = following(problem, problem.load, np.inf if kinked else _FOLLOWS / dt_cell)
-    cell_error, cell_error_signal = cell_errors(problem, dt_cell, response)
+    response = following(problem, problem.load, _FOLLOWS / dt_cell)
+    cell_error, cell_error_signal = cell_errors(problem, dt_cell, response, kinked)
     own, alias = size - tones, blocks.alias[node_sets.kind[0]]
     ready = {**node_sets._asdict(), **blocks._asdict(), **laws}  # `alias` is that of the blocks
     signal_rows, power_rows, loss_rows = energy_rows
@@ -349,8 +349,8 @@ def following(problem: Problem, rates: Any, slowest: float, terms: int = 3) -> A
     return out.reshape(-1, terms, 2 * n)
 
 
-def cell_errors(problem: Problem, h: float, response: Any) -> tuple[Any, Any]:
-    """Weights (R, N) and (R, L, 6) of a bound of how far δ is from its linear interpolant between the ends of a cell.
+def cell_errors(problem: Problem, h: float, response: Any, kinked: bool = False) -> tuple[Any, Any]:
+    """Weights (R, N) and (R, L, 8) of a bound of how far δ is from its linear interpolant between the ends of a cell.
 
     A block's share of δ differs from its interpolant by at most h²/8 max|δ̈_b|, and by at most twice its amplitude
     r_b E_b, whichever is smaller. With E_b the largest energy norm, |δ̈_b| <= w_b E_b + |a_b s|, so that
@@ -363,13 +363,17 @@ def cell_errors(problem: Problem, h: float, response: Any) -> tuple[Any, Any]:
     of s; where some take the second bound it adds |ṡ|max |Σ_b d_b b_b| h²/8, summed over these, d_b b_b s in δ̇_b.
 
     Of blocks that follow the signal E_b is that of d, see `following`, W_b = 2 r_b, dε_b/dt <= μ_b |s⃛|, and the rest
-    is c_0 s + c_1 ṡ + c_2 s̈, which adds |s̈|max (h²/8 |c_0| + 2 |c_2|) + |s⃛|max (h²/8 |c_1| + m h Σ W_b μ_b). Returned
-    are W, then A, G, these three factors, and that of the part in ṡ.
+    is c_0 s + c_1 ṡ + c_2 s̈, which adds |s̈|max (h²/8 |c_0| + 2 |c_2|) + |s⃛|max (h²/8 |c_1| + m h Σ W_b μ_b). Where ṡ
+    and s̈ of ``kinked`` signals jump, by at most twice their largest values, d jumps by F_1 and F_2 times that, which
+    adds 2 m Σ W_b (|F_1|_b |ṡ|max + |F_2|_b |s̈|max). Returned are W, then A, G, the three factors before, that of the
+    part in ṡ, and these two.
     """
     follows, growth = _left_over(response, problem.k)
+    jump = follows * (2.0 if kinked else 0.0)
     bent, both = _cell_weights(problem, h)
     oscillates = follows | (both < bent)
     weight = np.where(oscillates, both, bent)
+    jumps = ((jump * weight) @ _norms_of_response(response, problem.k)[:, i].T for i in (1, 2))
     rate = np.where(np.tile(oscillates, 2), 0.0, problem.read_rate)
     at_once = np.abs(rate @ problem.load.T) * (h * h / 8.0)
     moved = np.abs(np.where(np.tile(oscillates, 2), problem.read, 0.0) @ problem.load.T) * (h * h / 8.0)
@@ -377,7 +381,7 @@ def cell_errors(problem: Problem, h: float, response: Any) -> tuple[Any, Any]:
     factors = (
         *(at_once, h * np.where(follows, 0.0, weight) @ _load_norm(problem).T),
         *(h * h / 8.0 * place[0] + 2.0 * place[2], h * h / 8.0 * place[1], h * (follows * weight) @ growth.T),
-        moved,
+        *(moved, *jumps),
     )
     return weight, np.stack(factors, axis=2)
 
@@ -390,8 +394,14 @@ def _cell_weights(problem: Problem, h: float) -> tuple[Any, Any]:
 
 def _left_over(response: Any, k: Any) -> tuple[Any, Any]:
     """(N,) whether a block follows a signal; (L, N) μ, the rate at which s⃛ raises the energy norm of what is left."""
+    norms = _norms_of_response(response, k)
+    return norms.any(axis=(0, 1)), norms[:, 2]
+
+
+def _norms_of_response(response: Any, k: Any) -> Any:
+    """(L, 3, N) energy norms of F_0, F_1 and F_2."""
     parts = response.reshape(len(response), 3, 2, len(k))
-    return parts.any(axis=(0, 1, 2)), np.hypot(parts[:, 2, 1], np.sqrt(k) * parts[:, 2, 0])
+    return np.hypot(parts[:, :, 1], np.sqrt(k) * parts[:, :, 0])
 
 
 def _acceleration_by_signal(problem: Problem, response: Any) -> Any:
