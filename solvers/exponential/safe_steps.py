@@ -19,7 +19,7 @@ both ends by at most the error of linear interpolation, which one bound e covers
 reached on a cell at whose ends δ + e < 0. Only where this does not hold are steps of length τ taken.
 
 Blocks faster than the cells follow the signals. Of these ε is that of what is left, d of `tables.following`, and both
-bounds have parts in |ṡ|max, |s̈|max and |s⃛|max instead. Under coupling, |ṡ|max adds to e.
+bounds have parts in |ṡ|max, |s̈|max and |s⃛|max instead. Under coupling, |ṡ|max adds to e; where ṡ and s̈ jump, so does d.
 """
 
 from __future__ import annotations
