@@ -85,10 +85,8 @@ def checked_start(system: System, q0: ArrayLike, q_dot0: ArrayLike, method: Any)
     """Checked start in the coordinates a method steps in: decoupled blocks, or the system's own."""
     n = system.size
     try:
-        if np.iscomplexobj(q0) or np.iscomplexobj(q_dot0):  # numpy would drop the imaginary parts
-            raise TypeError
-        start = np.array((q0, q_dot0), dtype=float)
-        fits = start.shape == (2, n)
+        start = np.array((q0, q_dot0))
+        fits = start.shape == (2, n) and start.dtype == float
     except (TypeError, ValueError):  # also of different lengths
         fits = False
     start = start.ravel() if fits else _joined(n, q0, q_dot0)
