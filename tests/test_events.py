@@ -7,6 +7,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from problems import DampedHalfWave, HertzBounce, bilinear, bounce, free_mass, paper_scene
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import fembeam as fb
@@ -117,6 +118,25 @@ def test_floor_is_the_laws_own():
     law = replace(LN, entry_rate_floor=0.5)
     assert bounce(law, 0.4).contacts.entry_rate_clipped[0]
     assert not bounce(law, 0.6).contacts.entry_rate_clipped[0]
+
+
+@pytest.mark.parametrize("method", [FINE, Exponential(1e-11)])
+def test_each_part_of_a_sum_has_its_own_floor(method):
+    """Entry at 0.3 m/s: one part divides by its floor of 0.5 m/s, the other, with a floor of 0.1, by the entry rate."""
+    parts = Hysteretic(1e5, 0.4, entry_rate_floor=0.5), Hysteretic(2e5, 0.6, entry_rate_floor=0.1)
+
+    def motion(t, y):
+        depth = max(y[0], 0.0) ** 1.5
+        return y[1], -depth * (1e5 * (1.0 + 0.4 * y[1] / 0.5) + 2e5 * (1.0 + 0.6 * y[1] / 0.3))
+
+    def leaves(t, y):
+        return y[0]
+
+    leaves.terminal, leaves.direction = True, -1
+    alone = solve_ivp(motion, (0.0, 1.0), [0.0, 0.3], "DOP853", events=leaves, rtol=1e-12, atol=1e-16, max_step=1e-4)
+    log = integrate(free_mass(parts[0] + parts[1]), [0.0], [-0.3], 0.1, method=method).contacts
+    assert log.t_out == pytest.approx(alone.t_events[0], rel=1e-8)
+    assert log.speed_out == pytest.approx(-alone.y_events[0][:, 1], rel=1e-8)
 
 
 def test_grazing_leaves_no_trace():
