@@ -152,6 +152,27 @@ def test_a_fast_mode_that_cannot_reach_a_stop_does_not_shorten_flight(fast, dt):
     assert run.cost.steps < (300 if dt is None else 1200)
 
 
+@pytest.mark.parametrize("clearance", [1.6, -0.9])
+def test_fast_modes_do_not_shorten_flight_in_a_circle_or_around_a_disk(clearance):
+    """A place on a circle of 1 m, with fast modes of 0.02 m: 180 and 450 steps, by |ü| alone 3e7."""
+    rows = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])
+    stop = Contact(rows, SOFT, abs(clearance), map="annulus", outer=clearance < 0.0)
+    system, fast = System.modal([1.0, 1.0, 1e6, 1.01e6], 0.0, [stop]), 0.02
+    run = integrate(system, [-1.0, 0.0, fast, 0.0], [0.0, 1.0, 0.0, 1e6 * fast], 100.0)
+    assert len(run.contacts) == 0
+    assert run.cost.steps < 1000
+
+
+def test_crests_of_fast_modes_meet_a_circle():
+    """|u| = |e^{it} - 0.05 e^{iωt}| comes to 1.05 m where both point the same way, first at t = π/(ω - 1)."""
+    rows = np.array([[1.0, 0.0, 1.0, 0.0], [0.0, 1.0, 0.0, 1.0]])
+    fast, share = 1e3, 0.05
+    system = System.modal([1.0, 1.0, fast, fast], 0.0, [Contact(rows, SOFT, 1.0499, map="annulus")])
+    run = integrate(system, [1.0, 0.0, -share, 0.0], [0.0, 1.0, 0.0, -share * fast], 10.0 / fast)
+    between = math.acos((1.0499**2 - 1.0 - share**2) / (2.0 * share))  # of the two directions
+    assert run.contacts.t_in[0] == pytest.approx((math.pi - between) / (fast - 1.0), rel=1e-12)
+
+
 @pytest.mark.parametrize("fast", [1e2, 1e3, 1e4])
 def test_the_first_crest_of_a_fast_mode_above_a_stop_is_met(fast):
     gap = 1.04

@@ -20,6 +20,12 @@ ORDER = 6  # of Taylor steps
 _LOG_ERROR = int(0.345 * 2**50)  # four times 0.0863, the error of a logarithm linear between powers of two
 SERIES_TERMS = 14  # terms of a series that is exact to rounding up to |λ| x = SERIES_REACH: 0.6^14/14! = 9e-15
 SERIES_REACH = 0.6
+COUNT, BOUND, AMPLITUDE = range(3)
+"""Places in `Scratch.slow`: how many of the slowest blocks are told apart, 0 if none, `UNKNOWN` if not decided yet;
+their bound of |δ̈|, m/s²; the amplitude of all other blocks, m."""
+UNKNOWN = -1.0
+FAST = 2.0  # angle of the fastest block, rad, from which on its amplitude may bound it better than |δ̈|
+_SHARE = 0.25  # of the distance to a stop, by which the others may move it where the slowest blocks are told apart
 SWING = 6  # index in Scratch.split_state: the state without what follows the sampled signals
 _ROUNDING = 9e-16  # of a time over the length of a cell, relative
 
@@ -236,10 +242,10 @@ def motion_of_row(run, row, x):
 
 
 @inlined
-def motion_of_slowest(run, row, x, count):
-    """Parts of the same by the ``count`` slowest blocks; the gap is taken off the displacement."""
+def motion_of_slowest(run, row, x):
+    """Parts of the same by the slowest blocks that are told apart; the gap is taken off the displacement."""
     tables, rows, delta, rate = run.tables, run.tables.stop_rows[row], -run.problem.gap[row], 0.0
-    for i in range(count):
+    for i in range(int(run.scratch.slow[row, COUNT])):
         b = int(tables.slowest[i])
         delta += rows[0, b] * x[0, b] + rows[1, b] * x[1, b]
         rate += rows[2, b] * x[0, b] + rows[3, b] * x[1, b]
@@ -254,6 +260,35 @@ def weighted_norms(weights, tables, x):
         p, v = load8(x[0], i), load8(x[1], i)
         total += load8(weights, i) * sqrt8(v * v + load8(tables.block_k_c[0], i) * p * p)
     return sum8(total)
+
+
+@inner
+def _tell_slowest(run, row, x, distance):
+    """Tell so many of the slowest blocks apart that all others move the row by less than the ``distance``.
+
+    By at most `_SHARE` of it, if possible. Blocks with k = 0 have no amplitude: they are among the slowest.
+    """
+    tables, slow, k = run.tables, run.scratch.slow[row], run.tables.block_k_c[0]
+    accelerations, amplitudes = tables.acceleration_weight[row], tables.amplitude_weight[row]
+    bound, others = 0.0, weighted_norms(amplitudes, tables, x)
+    slow[COUNT] = 0.0
+    for i in range(tables.slowest.size - 1):
+        b = int(tables.slowest[i])
+        norm = math.sqrt(x[1, b] * x[1, b] + k[b] * x[0, b] * x[0, b])
+        bound, others = bound + accelerations[b] * norm, others - amplitudes[b] * norm
+        if others < distance and k[int(tables.slowest[i + 1])] > 0.0:
+            slow[COUNT], slow[BOUND], slow[AMPLITUDE] = i + 1.0, bound, others
+            if others <= _SHARE * distance:
+                return
+
+
+@inlined
+def tells_slowest(run, row, x, distance):
+    """Whether some of the slowest blocks are told apart, the others moving the row by less than the ``distance``."""
+    slow = run.scratch.slow[row]
+    if slow[COUNT] == UNKNOWN or (slow[COUNT] > 0.0 and slow[AMPLITUDE] >= distance):
+        _tell_slowest(run, row, x, distance)
+    return slow[COUNT] > 0.0
 
 
 @inlined

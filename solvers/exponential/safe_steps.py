@@ -6,7 +6,8 @@ distance g = -δ that opens at the rate v = -δ̇ cannot be reached before
     τ = (v + √(v² + 2 B g))/B,
 
 so steps of at most τ are safe. Fast blocks make most of B and hardly move the stop. So τ is also computed with B, g
-and v of the slowest blocks alone, g less the amplitude Σ r_b ε_b of all others; the longer one is taken. Close to a
+and v of the slowest blocks alone, g less the amplitude Σ r_b ε_b of all others, which is at most a quarter of the
+distance if so many are told apart; the longer one is taken. Close to a
 contact τ tends to the root from below; within reach of a Taylor polynomial of order 6 the root is found on that
 polynomial, which is exact to rounding there.
 
@@ -23,8 +24,6 @@ bounds have parts in |ṡ|max, |s̈|max and |s⃛|max instead. Under coupling, |
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -52,8 +51,13 @@ from solvers.exponential.energy.flight_balance import (
 )
 from solvers.exponential.first_contact import first_root
 from solvers.exponential.flight import (
+    AMPLITUDE,
+    BOUND,
+    COUNT,
+    FAST,
     SERIES_REACH,
     SWING,
+    UNKNOWN,
     cell_of,
     cross_cell,
     derive_signals,
@@ -70,17 +74,12 @@ from solvers.exponential.flight import (
     take_off_following,
     taylor_step,
     taylor_terms,
+    tells_slowest,
     weighted_norms,
 )
 
 _PART_OF_CELL = 0.01  # longest Taylor step, in cells of the signals: s⁽⁵⁾ t⁷/5040 of a quintic, left out, is rounding
-_FAST = 2.0  # angle of the fastest block, rad, from which on its amplitude may bound it better than |δ̈|
 _REFRESH = 8  # flight steps between two evaluations of the bound
-COUNT, BOUND, AMPLITUDE = range(3)
-"""Places in `Scratch.slow`: how many of the slowest blocks are bounded by |δ̈|, 0 if none, `UNKNOWN` if not chosen yet;
-
-their bound of |δ̈|, m/s²; the amplitude of the other blocks, m."""
-UNKNOWN = -1.0
 _GROUP = 8  # cells that one bound covers: with more the bound grows, with fewer it is computed more often
 
 
@@ -178,47 +177,12 @@ def _sample_here(run):
 
 
 @inlined
-def _choose_slowest(run, row, x):
-    """Choose how many of the slowest blocks, a power of two, are bounded by |δ̈|; returns the longest safe time.
-
-    Blocks with k = 0 have no amplitude: they are among the slowest.
-    """
-    tables, slow, rows = run.tables, run.scratch.slow[row], run.tables.stop_rows[row]
-    k, accelerations, amplitudes = tables.block_k_c[0], tables.acceleration_weight[row], tables.amplitude_weight[row]
-    delta, rate, bound, count, longest = -run.problem.gap[row], 0.0, 0.0, 1, 0.0
-    others = weighted_norms(amplitudes, tables, x)
-    slow[COUNT] = 0.0
-    for i in range(tables.slowest.size - 1):
-        b = int(tables.slowest[i])
-        p, v = x[0, b], x[1, b]
-        norm = math.sqrt(v * v + k[b] * p * p)
-        delta, rate = delta + rows[0, b] * p + rows[1, b] * v, rate + rows[2, b] * p + rows[3, b] * v
-        bound, others = bound + accelerations[b] * norm, others - amplitudes[b] * norm
-        if i + 1 == count:
-            count *= 2
-            if delta + others < 0.0 and k[int(tables.slowest[i + 1])] > 0.0:
-                time = safe_time(-delta - others, -rate, bound)
-                if time > longest:
-                    longest, slow[COUNT], slow[BOUND], slow[AMPLITUDE] = time, i + 1.0, bound, others
-    return longest
-
-
-@inlined
-def _safe_by_slowest(run, row, x, known):
-    """Safe time by the slowest blocks alone, the others being bounded by their amplitude, or the ``known`` longer one.
-
-    Closer to the stop more blocks are told apart, at last none.
-    """
+def _safe_by_slowest(run, row, x):
+    """Safe time by the slowest blocks alone, the others being bounded by their amplitude; 0 if that tells nothing."""
     slow = run.scratch.slow[row]
-    if slow[COUNT] == 0.0:
-        return known
-    if slow[COUNT] > 0.0:
-        delta, rate = motion_of_slowest(run, row, x, int(slow[COUNT]))
-        distance = -delta - slow[AMPLITUDE]
-        time = safe_time(distance, -rate, slow[BOUND]) if distance > 0.0 else 0.0
-        if time > known:
-            return time
-    return max(known, _choose_slowest(run, row, x))
+    delta, rate = motion_of_slowest(run, row, x)
+    distance = -delta - slow[AMPLITUDE]
+    return safe_time(distance, -rate, slow[BOUND]) if distance > 0.0 else 0.0
 
 
 @inlined
@@ -236,8 +200,9 @@ def _safe_flight(run, x, span, renew_bounds):
         delta, rate = motion_of_row(run, row, x)
         time = safe_time(-delta, -rate, scratch.per_row[row])
         if time < span:
-            fast = time * tables.fastest > _FAST
-            span = min(span, _safe_by_slowest(run, row, x, time) if fast else time)
+            if time * tables.fastest > FAST and tells_slowest(run, row, x, -delta):
+                time = max(time, _safe_by_slowest(run, row, x))
+            span = min(span, time)
     return span
 
 

@@ -17,7 +17,16 @@ from numba import types
 
 from solvers.compiled.kernels import MATRIX, REAL, VECTOR, dot, inlined, inner
 from solvers.compiled.parts import CIRCLE_NEAR, CIRCLE_ROOT, CIRCLE_SPAN, CIRCLE_SPAN_AT, part
-from solvers.exponential.flight import ORDER, motion_of_row, safe_time
+from solvers.exponential.flight import (
+    AMPLITUDE,
+    BOUND,
+    FAST,
+    ORDER,
+    motion_of_row,
+    motion_of_slowest,
+    safe_time,
+    tells_slowest,
+)
 
 
 @inlined
@@ -44,7 +53,27 @@ def span_of_circle(run, s, x):
     w, w_dot = motion_of_row(run, row + 1, x)
     bound = math.hypot(run.scratch.per_row[row], run.scratch.per_row[row + 1])
     uu, uv, vv = u * u + w * w, u * u_dot + w * w_dot, u_dot * u_dot + w_dot * w_dot
-    return _safe_in_circle(run.problem.radius[s], uu, uv, vv, bound)
+    time = _safe_in_circle(run.problem.radius[s], uu, uv, vv, bound)
+    return max(time, _by_slowest(run, s, x, math.sqrt(uu))) if time * run.tables.fastest > FAST else time
+
+
+@inlined
+def _by_slowest(run, s, x, r):
+    """The same by the slowest blocks alone, the others being bounded by their amplitude; 0 if that tells nothing."""
+    row, radius = run.problem.first[s], run.problem.radius[s]
+    distance = radius - r if radius > 0.0 else r + radius
+    if not (tells_slowest(run, row, x, distance) and tells_slowest(run, row + 1, x, distance)):
+        return 0.0
+    slow, (u, u_dot), (w, w_dot) = (
+        run.scratch.slow,
+        motion_of_slowest(run, row, x),
+        motion_of_slowest(run, row + 1, x),
+    )
+    bound = math.hypot(slow[row, BOUND], slow[row + 1, BOUND])
+    reduced = radius - math.hypot(slow[row, AMPLITUDE], slow[row + 1, AMPLITUDE])
+    uu, uv, vv = u * u + w * w, u * u_dot + w * w_dot, u_dot * u_dot + w_dot * w_dot
+    clear = math.sqrt(uu) < reduced if radius > 0.0 else math.sqrt(uu) > -reduced
+    return _safe_in_circle(reduced, uu, uv, vv, bound) if clear else 0.0
 
 
 @part(CIRCLE_SPAN_AT, REAL, types.int64)

@@ -86,7 +86,7 @@ class Scratch(NamedTuple):
     driven_speed: Annotated[Any, "tables"]  # √J: energy norm that its largest value drives in a cell of a table
     signal_bounds: Annotated[Any, "L, 4"]  # of the sampled signals and their three derivatives on some cells
     per_row: Annotated[Any, "R"]  # bounds of |δ̈| in m/s², errors of δ in m, or of δ̇ in m/s
-    slow: Annotated[Any, "R, 3"]  # of the rows in flight, places named in `safe_steps`
+    slow: Annotated[Any, "R, 3"]  # of the rows in flight, places named in `flight`
     split_state: Annotated[Any, "7, 2, N8"]  # p and v of the blocks, of several states; see `energy.flight_balance`
     motion: Annotated[Any, "R+A, 2, S"]  # displacements of the rows and their rates at the nodes, δ and δ̇ of circles
     clipped: Annotated[Any, "S"]  # indentations of a stop at the nodes, not below its first knot; or other values
