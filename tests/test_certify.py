@@ -152,6 +152,16 @@ def test_a_fast_mode_that_cannot_reach_a_stop_does_not_shorten_flight(fast, dt):
     assert run.cost.steps < (300 if dt is None else 1200)
 
 
+def test_two_rigid_modes_beside_a_fast_one_meet_a_stop():
+    """δ = (0.1 + 0.4) t + 1e-3 cos(1e5 t) - 1: neither rigid mode has an amplitude; a slow one makes long steps."""
+    system = System.modal([0.0, 0.0, 1.0, 1e5], 0.0, [Contact([-1.0, -1.0, -1.0, -1.0], SOFT, 1.0)])
+    t = np.linspace(1.997, 2.0, 200001)
+    first = t[np.flatnonzero(0.5 * t + 1e-3 * np.cos(1e5 * t) > 1.0)[0]]
+    entry = brentq(lambda t: 0.5 * t + 1e-3 * math.cos(1e5 * t) - 1.0, first - 2e-8, first, xtol=1e-16, rtol=1e-15)
+    run = integrate(system, [0.0, 0.0, 0.0, 1e-3], [0.1, 0.4, 0.0, 0.0], 2.1)
+    assert run.contacts.t_in[0] == pytest.approx(entry, abs=1e-12)
+
+
 @pytest.mark.parametrize("clearance", [1.6, -0.9])
 def test_fast_modes_do_not_shorten_flight_in_a_circle_or_around_a_disk(clearance):
     """A place on a circle of 1 m, with fast modes of 0.02 m: 180 and 450 steps, by |ü| alone 3e7."""
