@@ -21,11 +21,11 @@ _LOG_ERROR = int(0.345 * 2**50)  # four times 0.0863, the error of a logarithm l
 SERIES_TERMS = 14  # terms of a series that is exact to rounding up to |λ| x = SERIES_REACH: 0.6^14/14! = 9e-15
 SERIES_REACH = 0.6
 COUNT, BOUND, AMPLITUDE = range(3)
-"""Places in `Scratch.slow`: how many of the slowest blocks are told apart, 0 if none, `UNKNOWN` if not decided yet;
+"""Places in `Scratch.slow`: how many of the slowest blocks are bounded apart, 0 if none, `UNKNOWN` if not chosen yet;
 their bound of |δ̈|, m/s²; the amplitude of all other blocks, m."""
 UNKNOWN = -1.0
 FAST = 2.0  # angle of the fastest block, rad, from which on its amplitude may bound it better than |δ̈|
-_SHARE = 0.25  # of the distance to a stop, by which the others may move it where the slowest blocks are told apart
+_SHARE = 0.25  # of the distance to a stop, by which all others than the slowest blocks may move it
 SWING = 6  # index in Scratch.split_state: the state without what follows the sampled signals
 _ROUNDING = 9e-16  # of a time over the length of a cell, relative
 
@@ -243,7 +243,7 @@ def motion_of_row(run, row, x):
 
 @inlined
 def motion_of_slowest(run, row, x):
-    """Parts of the same by the slowest blocks that are told apart; the gap is taken off the displacement."""
+    """Parts of the same by the slowest blocks that are chosen; the gap is taken off the displacement."""
     tables, rows, delta, rate = run.tables, run.tables.stop_rows[row], -run.problem.gap[row], 0.0
     for i in range(int(run.scratch.slow[row, COUNT])):
         b = int(tables.slowest[i])
@@ -263,8 +263,8 @@ def weighted_norms(weights, tables, x):
 
 
 @inner
-def _tell_slowest(run, row, x, distance):
-    """Tell so many of the slowest blocks apart that all others move the row by less than the ``distance``.
+def _choose_slowest(run, row, x, distance):
+    """Choose so many of the slowest blocks that all others move the row by less than the ``distance``.
 
     By at most `_SHARE` of it, if possible. Blocks with k = 0 have no amplitude: they are among the slowest.
     """
@@ -283,11 +283,11 @@ def _tell_slowest(run, row, x, distance):
 
 
 @inlined
-def tells_slowest(run, row, x, distance):
-    """Whether some of the slowest blocks are told apart, the others moving the row by less than the ``distance``."""
+def uses_slowest(run, row, x, distance):
+    """Whether some of the slowest blocks are chosen such that all others move the row by less than the ``distance``."""
     slow = run.scratch.slow[row]
     if slow[COUNT] == UNKNOWN or (slow[COUNT] > 0.0 and slow[AMPLITUDE] >= distance):
-        _tell_slowest(run, row, x, distance)
+        _choose_slowest(run, row, x, distance)
     return slow[COUNT] > 0.0
 
 

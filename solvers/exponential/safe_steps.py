@@ -6,10 +6,10 @@ distance g = -δ that opens at the rate v = -δ̇ cannot be reached before
     τ = (v + √(v² + 2 B g))/B,
 
 so steps of at most τ are safe. Fast blocks make most of B and hardly move the stop. So τ is also computed with B, g
-and v of the slowest blocks alone, g less the amplitude Σ r_b ε_b of all others, which is at most a quarter of the
-distance if so many are told apart; the longer one is taken. Close to a
-contact τ tends to the root from below; within reach of a Taylor polynomial of order 6 the root is found on that
-polynomial, which is exact to rounding there.
+and v of the slowest blocks alone, g less the amplitude Σ r_b ε_b of all others; the longer one is taken. The slowest
+are so many that the others have at most a quarter of the distance, if possible. Close to a contact τ tends to the root
+from below; within reach of a Taylor polynomial of order 6 the root is found on that polynomial, which is exact to
+rounding there.
 
 Under sampled signals whole cells are crossed first. Within a cell of length h, δ exceeds the larger of its values at
 both ends by at most the error of linear interpolation, which one bound e covers for the next m cells:
@@ -74,7 +74,7 @@ from solvers.exponential.flight import (
     take_off_following,
     taylor_step,
     taylor_terms,
-    tells_slowest,
+    uses_slowest,
     weighted_norms,
 )
 
@@ -200,7 +200,7 @@ def _safe_flight(run, x, span, renew_bounds):
         delta, rate = motion_of_row(run, row, x)
         time = safe_time(-delta, -rate, scratch.per_row[row])
         if time < span:
-            if time * tables.fastest > FAST and tells_slowest(run, row, x, -delta):
+            if time * tables.fastest > FAST and uses_slowest(run, row, x, -delta):
                 time = max(time, _safe_by_slowest(run, row, x))
             span = min(span, time)
     return span

@@ -25,7 +25,7 @@ from solvers.exponential.flight import (
     motion_of_row,
     motion_of_slowest,
     safe_time,
-    tells_slowest,
+    uses_slowest,
 )
 
 
@@ -62,13 +62,10 @@ def _by_slowest(run, s, x, r):
     """The same by the slowest blocks alone, the others being bounded by their amplitude; 0 if that tells nothing."""
     row, radius = run.problem.first[s], run.problem.radius[s]
     distance = radius - r if radius > 0.0 else r + radius
-    if not (tells_slowest(run, row, x, distance) and tells_slowest(run, row + 1, x, distance)):
+    if not (uses_slowest(run, row, x, distance) and uses_slowest(run, row + 1, x, distance)):
         return 0.0
-    slow, (u, u_dot), (w, w_dot) = (
-        run.scratch.slow,
-        motion_of_slowest(run, row, x),
-        motion_of_slowest(run, row + 1, x),
-    )
+    slow, (u, u_dot) = run.scratch.slow, motion_of_slowest(run, row, x)
+    w, w_dot = motion_of_slowest(run, row + 1, x)
     bound = math.hypot(slow[row, BOUND], slow[row + 1, BOUND])
     reduced = radius - math.hypot(slow[row, AMPLITUDE], slow[row + 1, AMPLITUDE])
     uu, uv, vv = u * u + w * w, u * u_dot + w * w_dot, u_dot * u_dot + w_dot * w_dot
