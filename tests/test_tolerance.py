@@ -39,10 +39,10 @@ def test_slow_push_out_of_a_stop(rtol, q0):
 @pytest.mark.parametrize(
     ("stop", "n", "steps", "calls"),
     [
-        ("hysteretic", 2, (663, 767, 915), (19816, 21516, 24048)),
-        ("hysteretic", 10, (1323, 1781, 2841), (50204, 58540, 88364)),
-        ("elastic", 2, (505, 542, 599), (3500, 5228, 7364)),
-        ("elastic", 10, (786, 798, 868), (4380, 5204, 7444)),
+        ("hysteretic", 2, (627, 702, 895), (15904, 16932, 22884)),
+        ("hysteretic", 10, (1298, 1758, 2816), (50204, 58540, 88364)),
+        ("elastic", 2, (514, 533, 599), (3756, 4868, 7292)),
+        ("elastic", 10, (722, 732, 802), (4380, 5204, 7492)),
     ],
 )
 def test_tail_and_cost_of_jittered_starts(stop, n, steps, calls):
