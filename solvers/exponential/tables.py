@@ -182,38 +182,20 @@ def build(
     h, contact_h = _steps(omega, damping, tones, shortened)
     node_sets = node_sets_of(series)
     blocks = blocks_of(problem, tones, h, contact_h, node_sets)
-    response = following(problem, problem.load, _FOLLOWS / dt_cell)
-    cell_error, cell_error_signal = cell_errors(problem, dt_cell, response, kinked)
     own, alias = size - tones, blocks.alias[node_sets.kind[0]]
     ready = {**node_sets._asdict(), **blocks._asdict(), **laws}  # `alias` is that of the blocks
     signal_rows, power_rows, loss_rows = energy_rows
     return Tables(
         **_ripples(problem, contact_h, alias, own),
+        **_of_signals(problem, h, dt_cell, kinked),
+        **_of_rows(problem),
         **{name: ready[name] for name in Tables._fields if name in ready},
         flight_step=h,
-        signal=_in_eights(signal_responses(problem, h).reshape(len(h), len(problem.load), 6, 2, size)),
-        cell=_in_eights(_cell(problem, dt_cell)),
-        cell_signal=_in_eights(quintic_responses(problem, dt_cell)),
-        cell_error=_in_eights(cell_error),
-        cell_error_signal=cell_error_signal,
-        following=_in_eights(response.reshape(-1, 3, 2, size)),
-        follows=float(response.any()),
-        derived=float(response.any() or cell_error_signal[:, :, 2:].any()),
-        load_rows=_in_eights(problem.load.reshape(-1, 2, size)),
         block_k_c=_in_eights(np.array([problem.k, problem.c])),
         observed=float(np.count_nonzero(contact_h * (omega + damping)[:own].max() > OBSERVED_RADIANS)),
         force_following=following(problem, problem.push, 0.0, 4),
-        stop_rows=_in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
-        acceleration_weight=_in_eights(_acceleration_weight(problem)),
-        amplitude_weight=_in_eights(_ripple_weight(problem.read, omega)),
-        slowest=_slowest(problem.k),
-        acceleration_signal=_acceleration_by_signal(problem, response),
-        rate_weight=np.abs(problem.read[:, :size]) + np.abs(problem.read[:, size:]) * (omega + damping),
-        load_acceleration=problem.read_rate @ problem.load.T,
-        load_norm=_load_norm(problem),
         fastest=fastest,
         own_blocks=float(own),
-        accelerance=-problem.read_rate @ problem.push.T,
         contact_step=contact_h,
         aliased=blocks.alias.max(axis=2),
         signal_rows=signal_rows,
@@ -222,6 +204,40 @@ def build(
         steady_rate=np.zeros((2 * tones, padded(own))),
         gauss=_gauss_rule(),
     )
+
+
+def _of_signals(problem: Problem, h: Any, dt_cell: float, kinked: bool) -> dict[str, Any]:
+    """The tables of sampled signals on steps h and on their cells, by name."""
+    size, response = len(problem.k), following(problem, problem.load, _FOLLOWS / dt_cell)
+    cell_error, cell_error_signal = cell_errors(problem, dt_cell, response, kinked)
+    return {
+        "signal": _in_eights(signal_responses(problem, h).reshape(len(h), len(problem.load), 6, 2, size)),
+        "cell": _in_eights(_cell(problem, dt_cell)),
+        "cell_signal": _in_eights(quintic_responses(problem, dt_cell)),
+        "cell_error": _in_eights(cell_error),
+        "cell_error_signal": cell_error_signal,
+        "following": _in_eights(response.reshape(-1, 3, 2, size)),
+        "follows": float(response.any()),
+        "derived": float(response.any() or cell_error_signal[:, :, 2:].any()),
+        "load_rows": _in_eights(problem.load.reshape(-1, 2, size)),
+        "load_norm": _load_norm(problem),
+        "acceleration_signal": _acceleration_by_signal(problem, response),
+    }
+
+
+def _of_rows(problem: Problem) -> dict[str, Any]:
+    """The tables of the rows' motion by that of the blocks, and its bounds, by name."""
+    size, omega = len(problem.k), np.sqrt(problem.k)
+    p, v = np.abs(problem.read[:, :size]), np.abs(problem.read[:, size:])
+    return {
+        "stop_rows": _in_eights(np.concatenate((problem.read, problem.read_rate), axis=1).reshape(-1, 4, size)),
+        "acceleration_weight": _in_eights(_acceleration_weight(problem)),
+        "amplitude_weight": _in_eights(_ripple_weight(problem.read, omega)),
+        "slowest": _slowest(problem.k),
+        "rate_weight": p + v * (omega + problem.c),
+        "load_acceleration": problem.read_rate @ problem.load.T,
+        "accelerance": -problem.read_rate @ problem.push.T,
+    }
 
 
 @lru_cache(maxsize=1)
@@ -349,7 +365,7 @@ def following(problem: Problem, rates: Any, slowest: float, terms: int = 3) -> A
     return out.reshape(-1, terms, 2 * n)
 
 
-def cell_errors(problem: Problem, h: float, response: Any, kinked: bool = False) -> tuple[Any, Any]:
+def cell_errors(problem: Problem, h: float, response: Any, kinked: bool) -> tuple[Any, Any]:
     """Weights (R, N) and (R, L, 8) of a bound of how far δ is from its linear interpolant between the ends of a cell.
 
     A block's share of δ differs from its interpolant by at most h²/8 max|δ̈_b|, and by at most twice its amplitude
