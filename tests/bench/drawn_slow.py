@@ -205,6 +205,11 @@ def draw_slow(rng: np.random.Generator) -> Any:
 def _motion(rng: np.random.Generator, size: float, low: float, dt: float, duration: float) -> tuple[list[Any], str]:
     """Displacement of a support in cells dt, with speed and acceleration where these are known."""
     kind, band = rng.integers(6), low * 10.0 ** rng.uniform(-0.5, 0.7)
+    if kind == 0 and rng.random() < 0.5:  # its acceleration has kinks
+        t = dt * np.arange(max(math.ceil(duration / dt) + 2, 8))
+        values = size * band**2 * rng.standard_normal(t.size)
+        record = fb.Record(t, values, quantity="acceleration", interpolation="linear")
+        return [record.derivative(i) for i in range(3)], "accelerogram"
     if kind == 0:
         signal, words = draw_table(rng, size, dt, duration)
         return [signal], words
