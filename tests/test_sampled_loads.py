@@ -248,8 +248,8 @@ def test_a_stop_that_opens_for_a_moment_within_a_landing_is_seen(rtol):
     q_dot = [-0.295, 0.312761, 0.210523, -0.04811, -0.0847417, -0.406261]
     ours, exact = (integrate(system, q, q_dot, 0.0265, method=m) for m in (Exponential(rtol), DormandPrince(1e-11)))
     assert len(exact.contacts) == len(ours.contacts) == 2
-    assert ours.contacts.t_out == pytest.approx(exact.contacts.t_out, abs=1e-6)
-    assert ours.q[-1] == pytest.approx(exact.q[-1], abs=1e3 * rtol * np.abs(exact.q[-1]).max())
+    assert ours.contacts.t_out == pytest.approx(exact.contacts.t_out, abs=0.1 * rtol)
+    assert ours.q[-1] == pytest.approx(exact.q[-1], abs=10.0 * rtol * np.abs(exact.q[-1]).max())
 
 
 def test_a_table_may_tell_both_sides_of_kinks_but_not_of_jumps():
